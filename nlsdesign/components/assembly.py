@@ -1,0 +1,236 @@
+"""An assembly: bodies, elements tied between them, and sensors, all by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+from ..errors import ArrangementError, unknown_name
+from ..quantity import Quantity
+from .bodies import Body, Fixed
+from .element import Element
+from .part import Part, quantities, replaced, walk, with_values
+from .sensors import Sensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tie(Part):
+    """An element between two bodies; its motion is that of the first minus that of the second.
+
+    Parameters
+    ----------
+    element
+        What relates motion and effort.
+    between
+        Names of the two bodies; one name means: against the resting frame.
+    """
+
+    element: Element
+    between: tuple[str, ...]
+
+    def children(self) -> Mapping[str, Part]:
+        """Return the parts of the element: the tie adds no level to the names."""
+        return self.element.children()
+
+    def with_children(self, children: Mapping[str, Part]) -> Self:
+        """Return a copy with other parts in the element."""
+        return replace(self, element=self.element.with_children(children))
+
+    def parameters(self) -> dict[str, Quantity]:
+        """Return the numbers of the element."""
+        return self.element.parameters()
+
+
+def tie(element: Element, *between: str) -> Tie:
+    """Tie an element between two bodies, or between one body and the resting frame.
+
+    Parameters
+    ----------
+    element
+        For instance a spring.
+    *between
+        One or two names of bodies.
+    """
+    if not 1 <= len(between) <= 2:
+        raise ArrangementError("tie", "an element has one body at each end", next_step="name one or two bodies")
+    return Tie(element=element, between=between)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Named parts that make one system.
+
+    Parameters
+    ----------
+    name
+        Short name; also that of generated code.
+    parts
+        Pairs of name and body, tie or sensor, in written order.
+    description
+        One sentence.
+    """
+
+    name: str
+    parts: tuple[tuple[str, Part], ...]
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        bodies = {n: p for n, p in self.parts if isinstance(p, Body)}
+        for name, part in self.parts:
+            if isinstance(part, Tie):
+                _check_tie(name, part, bodies)
+            elif not isinstance(part, Body | Sensor):
+                raise ArrangementError(
+                    f"part '{name}'",
+                    f"is a {type(part).__name__}; an assembly holds bodies, ties and sensors",
+                    next_step="tie an element to bodies with tie(element, 'motor', 'load')",
+                )
+        if not bodies:
+            raise ArrangementError(f"assembly '{self.name}'", "has no body", next_step="add for instance load=Fixed()")
+
+    def __getitem__(self, path: str) -> Part:
+        """Return the part at a path.
+
+        Parameters
+        ----------
+        path
+            For instance ``"spring.rubber"``.
+        """
+        for where, part in self.walk():
+            if where == path:
+                return part
+        raise unknown_name("part", path, (where for where, _ in self.walk()))
+
+    def walk(self) -> list[tuple[str, Part]]:
+        """Return every part with its path, in written order."""
+        return [pair for name, part in self.parts for pair in walk(part, name)]
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return every number by full name."""
+        return {k: q for name, part in self.parts for k, q in quantities(part, name).items()}
+
+    def with_values(self, values: Mapping[str, Quantity | float | tuple[float, ...]]) -> Assembly:
+        """Return a copy with other numbers.
+
+        Parameters
+        ----------
+        values
+            Quantities, or numbers in SI, by full name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest name that exists.
+        """
+        known = self.quantities()
+        parts = dict(self.parts)
+        for name, value in values.items():
+            row = name.partition("[")[0]
+            if row not in known:
+                raise unknown_name("parameter", name, known)
+            head, _, tail = name.partition(".")
+            part = parts[head]
+            inner = part.element if isinstance(part, Tie) else part
+            changed = with_values(inner, {tail: value})
+            parts[head] = replace(part, element=changed) if isinstance(part, Tie) else changed
+        return replace(self, parts=tuple(parts.items()))
+
+    def with_part(self, path: str, new: Part) -> Assembly:
+        """Return a copy in which a part is added, or another one stands in its place.
+
+        Parameters
+        ----------
+        path
+            Existing path, or a new name at the top or inside a combination.
+        new
+            The part; a bare element in place of a tie keeps the bodies.
+        """
+        head, _, tail = path.partition(".")
+        parts = dict(self.parts)
+        old = parts.get(head)
+        if tail:
+            if old is None:
+                raise unknown_name("part", path, (where for where, _ in self.walk()))
+            inner = old.element if isinstance(old, Tie) else old
+            inside = _with_inner(inner, tail, new)
+            parts[head] = replace(old, element=inside) if isinstance(old, Tie) else inside
+        elif isinstance(old, Tie) and isinstance(new, Element):
+            parts[head] = replace(old, element=new)
+        else:
+            parts[head] = new
+        return replace(self, parts=tuple(parts.items()))
+
+    def element(self, path: str) -> Element:
+        """Return the element at a path; for a tie, the element that it ties.
+
+        Parameters
+        ----------
+        path
+            For instance ``"spring"`` or ``"spring.rubber"``.
+        """
+        part = self[path]
+        found = part.element if isinstance(part, Tie) else part
+        if not isinstance(found, Element):
+            raise ArrangementError(f"part '{path}'", f"is a {type(found).__name__}, not an element")
+        return found
+
+    def without_part(self, name: str) -> Assembly:
+        """Return a copy without a part at the top.
+
+        Parameters
+        ----------
+        name
+            Name of the part.
+        """
+        if name not in dict(self.parts):
+            raise unknown_name("part", name, dict(self.parts))
+        return replace(self, parts=tuple((n, p) for n, p in self.parts if n != name))
+
+    def __str__(self) -> str:
+        from .drawing import draw
+
+        return draw(self)
+
+
+def _with_inner(root: Part, path: str, new: Part) -> Part:
+    owner, _, name = path.rpartition(".")
+    holder = root
+    for step in filter(None, owner.split(".")):
+        holder = holder.children()[step]
+    return replaced(root, owner, holder.with_children({**holder.children(), name: new}))
+
+
+def _check_tie(name: str, part: Tie, bodies: Mapping[str, Body]) -> None:
+    for end in part.between:
+        if end not in bodies:
+            raise unknown_name(f"'{name}': body", end, bodies)
+    ends = [bodies[end] for end in part.between]
+    for end, body in zip(part.between, ends, strict=True):
+        if body.domain != part.element.domain:
+            raise ArrangementError(
+                f"part '{name}'",
+                f"relates {part.element.domain.motion} and {part.element.domain.effort}, "
+                f"but '{end}' has a {body.domain.motion}",
+                next_step="put a cam or pulley (through) in between",
+            )
+    if all(isinstance(body, Fixed) for body in ends) or len(set(part.between)) < len(part.between):
+        raise ArrangementError(
+            f"part '{name}'", "both ends rest on the same or on fixed bodies, so it can never move",
+            next_step="tie one end to a body that moves",
+        )
+
+
+def assembly(name: str, *, description: str = "", **parts: Any) -> Assembly:
+    """Make an assembly of named parts.
+
+    Parameters
+    ----------
+    name
+        Short name of the system.
+    description
+        One sentence.
+    **parts
+        Bodies, ties and sensors by name.
+    """
+    return Assembly(name, tuple(parts.items()), description)

@@ -1,0 +1,38 @@
+"""The circuit of an assembly as text."""
+
+from __future__ import annotations
+
+from .assembly import Assembly, Tie
+from .part import Part
+from .sensors import Sensor
+
+
+def draw(assembly: Assembly) -> str:
+    """Return the assembly as a tree of parts with their laws and numbers.
+
+    Parameters
+    ----------
+    assembly
+        What to draw.
+    """
+    lines = [f"{assembly.name}: {assembly.description}".rstrip(": ")]
+    for name, part in assembly.parts:
+        if isinstance(part, Tie):
+            ends = " ── ".join((part.between[0], f"[{name}]", *(part.between[1:] or ("frame",))))
+            lines.append(f"  {ends}   {part.element.title()}")
+            lines += _branches(part.element, "    ")
+        elif isinstance(part, Sensor):
+            lines.append(f"  {name} ◁ {part.of}   {part.title()}")
+        else:
+            lines.append(f"  ({name})   {part.title()}")
+    return "\n".join(lines)
+
+
+def _branches(part: Part, indent: str) -> list[str]:
+    children = list(part.children().items())
+    lines = []
+    for number, (name, child) in enumerate(children):
+        last = number == len(children) - 1
+        lines.append(f"{indent}{'└─' if last else '├─'} {name}: {child.title()}")
+        lines += _branches(child, indent + ("   " if last else "│  "))
+    return lines

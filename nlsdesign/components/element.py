@@ -1,0 +1,318 @@
+"""The algebra of one-port elements: what every element is, in parallel and in series.
+
+An element relates a motion (strain, extension, angle) to an effort (stress, force, torque). One predicate
+decides the causality: ``needs_rate`` says whether the effort depends directly on the rate of the motion.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
+
+import casadi as ca
+
+from ..errors import ArrangementError
+from ..symbolic import Expression, depends, solve_monotone, symbol
+from .part import Part
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Names and units of the pair of quantities that an element relates.
+
+    Parameters
+    ----------
+    motion, motion_unit
+        Strain in 1, extension in m, or angle in rad.
+    rate, rate_unit
+        Its derivative.
+    effort, effort_unit
+        Stress in Pa, force in N, or torque in N·m.
+    """
+
+    motion: str
+    motion_unit: str
+    rate: str
+    rate_unit: str
+    effort: str
+    effort_unit: str
+
+
+MATERIAL = Domain("strain", "1", "strain_rate", "1/s", "stress", "Pa")
+TRANSLATION = Domain("extension", "m", "rate", "m/s", "force", "N")
+ROTATION = Domain("angle", "rad", "speed", "rad/s", "torque", "N*m")
+
+
+class Scope(Protocol):
+    """What an element sees of the model that is being written: its own names, nothing else."""
+
+    path: str
+
+    def child(self, name: str) -> Scope:
+        """Return the scope of a part inside."""
+        ...
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of one of the part's own numbers."""
+        ...
+
+    def row(self, name: str) -> list[Expression]:
+        """Return the symbols of one of the part's own rows of numbers."""
+        ...
+
+    def input(self, name: str, unit: str, description: str) -> Expression:
+        """Declare an input."""
+        ...
+
+    def state(self, name: str, unit: str, description: str) -> Expression:
+        """Declare a state; its derivative is given by :meth:`derive`."""
+        ...
+
+    def derive(self, state: Expression, derivative: Expression) -> None:
+        """Give the derivative of a state."""
+        ...
+
+    def signal(self, name: str, value: Expression, unit: str, description: str) -> None:
+        """Give a name to an expression."""
+        ...
+
+    def define(self, unknown: Expression, solution: Expression) -> None:
+        """Give the solution of an unknown that stands in expressions given before."""
+        ...
+
+    def check(self, name: str, residual: Expression) -> None:
+        """Record a residual that must vanish."""
+        ...
+
+    def total_rate(self, value: Expression, moving: Mapping[Expression, Expression]) -> Expression:
+        """Return the time derivative of an expression of states and the given moving symbols."""
+        ...
+
+    def rate_is_used(self, rate: Expression) -> bool:
+        """Tell whether anything given so far contains this symbol."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Element(Part):
+    """A one-port element; final classes say their law in :meth:`effort`."""
+
+    @property
+    @abstractmethod
+    def domain(self) -> Domain:
+        """The pair of quantities that the element relates."""
+
+    @property
+    @abstractmethod
+    def needs_rate(self) -> bool:
+        """Whether the effort depends directly on the rate of the motion."""
+
+    @abstractmethod
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the effort at a motion and its rate.
+
+        Parameters
+        ----------
+        scope
+            Gives parameters, takes states, signals and unknowns.
+        motion, rate
+            Scalars in the units of the domain.
+        """
+
+
+def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+    """Return the effort of an element and give names to its motion and effort.
+
+    Parameters
+    ----------
+    element, scope, motion, rate
+        As for :meth:`Element.effort`.
+    """
+    effort = element.effort(scope, motion, rate)
+    domain = element.domain
+    scope.signal(domain.motion, motion, domain.motion_unit, f"{domain.motion} of {scope.path}")
+    scope.signal(domain.effort, effort, domain.effort_unit, f"{domain.effort} of {scope.path}")
+    return effort
+
+
+@dataclass(frozen=True, kw_only=True)
+class Combination(Element):
+    """Several elements of one domain by name.
+
+    Parameters
+    ----------
+    members
+        Pairs of name and element.
+    """
+
+    members: tuple[tuple[str, Element], ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        kind = type(self).__name__
+        if not self.members:
+            raise ArrangementError(kind, "needs at least one element", next_step="name elements, for instance spring=...")
+        for name, member in self.members:
+            if not isinstance(member, Element):
+                raise ArrangementError(f"{kind} member '{name}'", f"is a {type(member).__name__}, not an element")
+            if member.domain != self._inner:
+                raise ArrangementError(
+                    f"{kind} member '{name}'",
+                    f"relates {member.domain.motion} and {member.domain.effort}, the others "
+                    f"{self._inner.motion} and {self._inner.effort}",
+                    next_step="put a cam or pulley (through) or a specimen between the two",
+                )
+
+    @property
+    def _inner(self) -> Domain:
+        return self.members[0][1].domain
+
+    @property
+    def domain(self) -> Domain:
+        """The domain of the members."""
+        return self._inner
+
+    def children(self) -> Mapping[str, Part]:
+        """Return the members by name."""
+        return dict(self.members)
+
+    def with_children(self, children: Mapping[str, Part]) -> Self:
+        """Return a copy with other members."""
+        return replace(self, members=tuple(children.items()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parallel(Combination):
+    """Elements that share the motion; their efforts add."""
+
+    @property
+    def needs_rate(self) -> bool:
+        """True if any member needs the rate."""
+        return any(member.needs_rate for _, member in self.members)
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the sum of the efforts."""
+        efforts = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
+        return sum(efforts[1:], start=efforts[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series(Combination):
+    """Elements that share the effort; their motions add.
+
+    Members that need the rate keep their own motion as a state, whose rate follows from the common
+    effort. What is left of the motion belongs to the others; where these are several, their shares are
+    algebraic unknowns of a monotone equation. If all members need the rate, so does the series.
+    """
+
+    @property
+    def needs_rate(self) -> bool:
+        """True if all members need the rate."""
+        return all(member.needs_rate for _, member in self.members)
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the common effort."""
+        if self.needs_rate:
+            return _flowing(list(self.members), scope, motion, rate)
+        slow = [(n, m) for n, m in self.members if m.needs_rate]
+        stiff = [(n, m) for n, m in self.members if not m.needs_rate]
+        states = {name: _own_motion(member, scope.child(name)) for name, member in slow}
+        rates = {name: symbol(f"{scope.path}.{name}.own_rate") for name, _ in slow}
+        left = motion - sum(states.values(), start=ca.SX(0))
+        left_rate = rate - sum(rates.values(), start=ca.SX(0))
+        common = _shared(stiff, scope, left, left_rate)
+        for name, member in slow:
+            inside = scope.child(name)
+            own = observed_effort(member, inside, states[name], rates[name])
+            inside.derive(states[name], rates[name])
+            scope.define(rates[name], _root(own - common, rates[name], inside))
+        return common
+
+
+def _own_motion(member: Element, scope: Scope) -> Expression:
+    domain = member.domain
+    return scope.state(domain.motion, domain.motion_unit, f"{domain.motion} of {scope.path}")
+
+
+def _root(residual: Expression, unknown: Expression, scope: Scope, guess: Expression | None = None) -> Expression:
+    """Return the root of a monotone residual; where it was iterated, the remainder is recorded as a check."""
+    solution = solve_monotone(
+        lambda z: ca.substitute(residual, unknown, z), unknown, ca.SX(0) if guess is None else guess
+    )
+    if depends(ca.jacobian(residual, unknown), unknown):
+        scope.check(unknown.name(), ca.substitute(residual, unknown, solution))
+    return solution
+
+
+def _flowing(
+    members: list[tuple[str, Element]], scope: Scope, motion: Expression, rate: Expression
+) -> Expression:
+    """Return the effort of a series in which every member needs the rate.
+
+    The first member keeps its motion as a state, the rest takes what is left; equal effort gives the
+    split of the rate.
+    """
+    name, first = members[0]
+    inside = scope.child(name)
+    if len(members) == 1:
+        return observed_effort(first, inside, motion, rate)
+    own = _own_motion(first, inside)
+    own_rate = symbol(f"{inside.path}.own_rate")
+    one = observed_effort(first, inside, own, own_rate)
+    other = _flowing(members[1:], scope, motion - own, rate - own_rate)
+    solution = _root(one - other, own_rate, inside)
+    inside.derive(own, own_rate)
+    scope.define(own_rate, solution)
+    return ca.substitute(one, own_rate, solution)
+
+
+def _shared(
+    members: list[tuple[str, Element]], scope: Scope, motion: Expression, rate: Expression
+) -> Expression:
+    """Return the effort of members in series none of which needs the rate.
+
+    The share of the first member is an algebraic unknown z of f₁(z) = f₂(e − z); its rate, where a law
+    inside asks for it, follows from the time derivative of the same equation.
+    """
+    name, first = members[0]
+    inside = scope.child(name)
+    if len(members) == 1:
+        return observed_effort(first, inside, motion, rate)
+    whole, whole_rate = symbol(f"{scope.path}.whole"), symbol(f"{scope.path}.whole_rate")
+    share, share_rate = symbol(f"{inside.path}.share"), symbol(f"{inside.path}.share_rate")
+    one = observed_effort(first, inside, share, share_rate)
+    other = _shared(members[1:], scope, whole - share, whole_rate - share_rate)
+    residual = one - other
+    solution = _root(residual, share, inside, whole / 2)
+    if scope.rate_is_used(share_rate):
+        moving = {share: share_rate, whole: whole_rate}
+        drift = scope.total_rate(residual, moving)
+        scope.define(share_rate, _root(drift, share_rate, inside))
+    scope.define(share, solution)
+    scope.define(whole, motion)
+    scope.define(whole_rate, rate)
+    return ca.substitute(one, ca.vertcat(share, whole), ca.vertcat(ca.substitute(solution, whole, motion), motion))
+
+
+def parallel(**members: Element) -> Parallel:
+    """Put elements in parallel: same motion, efforts add.
+
+    Parameters
+    ----------
+    **members
+        Elements by name.
+    """
+    return Parallel(members=tuple(members.items()))
+
+
+def series(**members: Element) -> Series:
+    """Put elements in series: same effort, motions add.
+
+    Parameters
+    ----------
+    **members
+        Elements by name.
+    """
+    return Series(members=tuple(members.items()))

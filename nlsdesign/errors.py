@@ -1,0 +1,126 @@
+"""Errors that name the thing, the rule, the nearest valid name and the next step."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+def nearest(name: str, valid: Iterable[str]) -> str | None:
+    """Return the valid name closest to ``name``, or ``None`` when nothing is close.
+
+    Parameters
+    ----------
+    name
+        The name as it was given.
+    valid
+        The names that would have been accepted.
+    """
+    candidates = list(valid)
+    found = difflib.get_close_matches(name, candidates, n=1, cutoff=0.5)
+    if found:
+        return found[0]
+    last = name.rsplit(".", 1)[-1]
+    tails = {candidate.rsplit(".", 1)[-1]: candidate for candidate in candidates}
+    found = difflib.get_close_matches(last, list(tails), n=1, cutoff=0.6)
+    return tails[found[0]] if found else None
+
+
+class NlsError(Exception):
+    """Base of every error that a user can cause and mend.
+
+    Parameters
+    ----------
+    thing
+        What is wrong: file, line, column, field, part or signal.
+    rule
+        The rule that it breaks.
+    did_you_mean
+        The nearest valid name, if there is one.
+    next_step
+        What the user can do about it.
+    """
+
+    def __init__(
+        self, thing: str, rule: str, *, did_you_mean: str | None = None, next_step: str | None = None
+    ) -> None:
+        self.thing = thing
+        self.rule = rule
+        self.did_you_mean = did_you_mean
+        self.next_step = next_step
+        super().__init__(self._message())
+
+    def _message(self) -> str:
+        text = f"{self.thing}: {self.rule}"
+        if self.did_you_mean:
+            text += f"; did you mean '{self.did_you_mean}'?"
+        if self.next_step:
+            text += f" -> {self.next_step}"
+        return text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.thing, self.rule, self.did_you_mean, self.next_step)
+
+
+def _rebuild(
+    kind: type[NlsError], thing: str, rule: str, did_you_mean: str | None, next_step: str | None
+) -> NlsError:
+    return kind(thing, rule, did_you_mean=did_you_mean, next_step=next_step)
+
+
+class UnitError(NlsError):
+    """A unit is missing, unknown, or of the wrong dimension."""
+
+
+class ValueRangeError(NlsError):
+    """A number lies outside what the law or the field can hold."""
+
+
+class UnknownNameError(NlsError):
+    """A field, part, signal, component or study of that name does not exist."""
+
+
+class DeckError(NlsError):
+    """A deck cannot be read as it stands."""
+
+
+class ArrangementError(NlsError):
+    """Parts are connected in a way that has no (unique) solution."""
+
+
+class InfeasibleError(NlsError):
+    """Limits contradict each other or the target."""
+
+
+class MeasurementError(NlsError):
+    """A record cannot be used as it stands."""
+
+
+class ConvergenceError(NlsError):
+    """A solver stopped without a solution; no number is returned."""
+
+
+class ExportError(NlsError):
+    """Generated code could not be written, compiled or loaded."""
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
+    """Return the error for a name that does not exist, with the nearest that does.
+
+    Parameters
+    ----------
+    kind
+        What was looked up, for instance ``"parameter"``.
+    name
+        The name as given.
+    valid
+        All names that exist.
+    """
+    names = sorted(valid)
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return UnknownNameError(
+        f"{kind} '{name}'",
+        "no such name",
+        did_you_mean=nearest(name, names),
+        next_step=f"use one of: {shown}" if names else None,
+    )

@@ -1,0 +1,76 @@
+"""Where the folders stand that travel with the package, and which release this is.
+
+The rule: in a wheel the top-level folders ``models`` and ``studies`` are packed into ``nlsdesign/_bundled/``,
+so that they do not spread over site-packages. In a checkout (also an editable install) there is no
+``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is asked for as well,
+because next to an *installed* package a folder named ``models`` belongs to somebody else.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import tomllib
+from pathlib import Path
+from typing import Final, Literal
+
+from .errors import UnknownNameError
+
+_PACKAGE: Final = Path(__file__).resolve().parent
+
+
+def folder(name: Literal["models", "studies"], *, package: Path = _PACKAGE) -> Path:
+    """Return the folder of that name that travels with the package.
+
+    Parameters
+    ----------
+    name
+        ``"models"`` or ``"studies"``.
+    package
+        Folder of the package ``nlsdesign``; another one only in tests.
+
+    Returns
+    -------
+    Path
+        Absolute path of an existing folder.
+
+    Raises
+    ------
+    UnknownNameError
+        If the folder is neither in the package nor beside it in a checkout.
+    """
+    bundled = package / "_bundled" / name
+    if bundled.is_dir():
+        return bundled
+    beside = package.parent / name
+    if _checkout_version(package) is not None and beside.is_dir():
+        return beside
+    raise UnknownNameError(
+        f"folder '{name}'",
+        f"it travels with nlsdesign, but is neither {bundled} nor, in a checkout, {beside}",
+        next_step="install nlsdesign again, or run it from a complete checkout",
+    )
+
+
+def version(*, package: Path = _PACKAGE) -> str:
+    """Return the version, which is written down in ``pyproject.toml`` and nowhere else.
+
+    Parameters
+    ----------
+    package
+        Folder of the package ``nlsdesign``; another one only in tests.
+
+    Returns
+    -------
+    str
+        The version of the checkout that is running, or else of the installed distribution.
+    """
+    return _checkout_version(package) or importlib.metadata.version("nlsdesign")
+
+
+def _checkout_version(package: Path) -> str | None:
+    """Return the version in the checkout's ``pyproject.toml``, ``None`` when there is no checkout."""
+    try:
+        project = tomllib.loads((package.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    except (OSError, KeyError):
+        return None
+    return str(project["version"]) if project.get("name") == "nlsdesign" else None

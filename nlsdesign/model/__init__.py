@@ -1,0 +1,6 @@
+"""The waist: from an assembly to a frozen, flat, named model, and views of it."""
+
+from .flat import FlatModel, Symbols, Table, Variable
+from .flatten import flatten
+
+__all__ = ["FlatModel", "Symbols", "Table", "Variable", "flatten"]

@@ -1,0 +1,273 @@
+"""The waist of the house: a frozen, flat, named model of ordinary differential (or difference) equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ValueRangeError, unknown_name
+from ..quantity import Quantity, same_dimension
+from ..symbolic import Expression
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A named number of the model: state, input, parameter, output or signal. All in SI.
+
+    Parameters
+    ----------
+    name
+        Hierarchical name, the same in deck, C struct, FMU, CSV and plot.
+    unit
+        SI unit as text.
+    description
+        What it is, in words.
+    start
+        Start value of a state or input; value of a parameter.
+    nominal
+        Typical size, for scaling.
+    minimum, maximum
+        Range in which the laws are stated to hold.
+    source, spread
+        Where a parameter's number comes from and its one-sided relative spread.
+    """
+
+    name: str
+    unit: str
+    description: str
+    start: float = 0.0
+    nominal: float = 1.0
+    minimum: float = -float("inf")
+    maximum: float = float("inf")
+    source: str = ""
+    spread: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Numbers over a uniform grid of one argument, read by linear interpolation and held at the ends.
+
+    Parameters
+    ----------
+    argument
+        Name of the input or state that is looked up.
+    lower, step
+        First grid point and distance of the grid points.
+    columns
+        The quantities that are looked up.
+    values
+        Array of shape (grid points, columns).
+    """
+
+    argument: str
+    lower: float
+    step: float
+    columns: tuple[Variable, ...]
+    values: NDArray[np.float64]
+
+    def look_up(self, at: float) -> NDArray[np.float64]:
+        """Return all columns at one argument.
+
+        Parameters
+        ----------
+        at
+            Value of the argument.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (columns,).
+        """
+        last = self.values.shape[0] - 1
+        position = min(max((at - self.lower) / self.step, 0.0), float(last))
+        left = min(int(position), last - 1)
+        share = position - left
+        result: NDArray[np.float64] = self.values[left] + share * (self.values[left + 1] - self.values[left])
+        return result
+
+
+class Symbols(NamedTuple):
+    """Symbols and expressions of a flat model, columns of SX.
+
+    ``derivative`` is the next state where the model has a sample time. ``table`` holds the looked-up
+    columns of all tables in order.
+    """
+
+    time: Expression
+    state: Expression
+    input: Expression
+    parameter: Expression
+    table: Expression
+    derivative: Expression
+    output: Expression
+    signal: Expression
+    residual: Expression
+
+
+@dataclass(frozen=True, eq=False)
+class FlatModel:
+    """Equations dx/dt = f(t, x, u, p), y = g(t, x, u, p) with the names of everything in them.
+
+    Parameters
+    ----------
+    name, description
+        Name of the model and one sentence.
+    states, inputs, parameters, outputs, signals
+        Names, units and numbers, in the order of the vectors. Outputs are the interface; signals are
+        everything else that has a name.
+    equations
+        ``casadi.Function`` (t, x, u, p, w) -> (f, y, s, r): derivative or next state, outputs, signals,
+        and residuals of implicit equations, which vanish where these were solved.
+    sample_time
+        ``None`` for continuous time; otherwise f is the state one sample later.
+    tables
+        Looked-up numbers w; empty for a continuous model.
+    """
+
+    name: str
+    description: str
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    signals: tuple[Variable, ...]
+    equations: ca.Function
+    sample_time: float | None = None
+    tables: tuple[Table, ...] = ()
+
+    def symbols(self) -> Symbols:
+        """Return fresh symbols and the expressions in them."""
+        t, w = ca.SX.sym("time"), ca.SX.sym("w", self.equations.size1_in(4))
+        x = ca.vertcat(*[ca.SX.sym(v.name) for v in self.states])
+        u = ca.vertcat(*[ca.SX.sym(v.name) for v in self.inputs])
+        p = ca.vertcat(*[ca.SX.sym(v.name) for v in self.parameters])
+        return Symbols(t, ca.SX(x), ca.SX(u), ca.SX(p), w, *self.equations.call([t, x, u, p, w]))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameter values in SI by name."""
+        return {v.name: v.start for v in self.parameters}
+
+    def start(self, of: Sequence[Variable]) -> NDArray[np.float64]:
+        """Return the start values of a group of variables as a vector.
+
+        Parameters
+        ----------
+        of
+            For instance ``model.states``.
+        """
+        return np.array([v.start for v in of], dtype=float)
+
+    def variable(self, name: str) -> Variable:
+        """Return the variable of that name.
+
+        Parameters
+        ----------
+        name
+            Name of any state, input, parameter, output or signal.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest name that exists.
+        """
+        everything = self.states + self.inputs + self.parameters + self.outputs + self.signals
+        for each in everything:
+            if each.name == name:
+                return each
+        raise unknown_name("variable", name, (v.name for v in everything))
+
+    def with_values(self, values: Mapping[str, float | Quantity]) -> FlatModel:
+        """Return a copy with other parameter values, or start values of states and inputs.
+
+        Parameters
+        ----------
+        values
+            Numbers in SI, or quantities, by name.
+
+        Raises
+        ------
+        UnknownNameError
+            If a name is neither parameter, state nor input.
+        ValueRangeError
+            If a number is outside the stated range.
+        """
+        names = {v.name for group in (self.parameters, self.states, self.inputs) for v in group}
+        for name in values:
+            if name not in names:
+                raise unknown_name("parameter, state or input", name, names)
+
+        def changed(group: tuple[Variable, ...]) -> tuple[Variable, ...]:
+            return tuple(_with_start(v, values[v.name]) if v.name in values else v for v in group)
+
+        return replace(
+            self,
+            parameters=changed(self.parameters),
+            states=changed(self.states),
+            inputs=changed(self.inputs),
+        )
+
+    def evaluate(
+        self, state: Sequence[float], inputs: Sequence[float] = (), *, time: float = 0.0
+    ) -> dict[str, float]:
+        """Return every output, signal and state derivative at one point; ``der(name)`` for the latter.
+
+        Parameters
+        ----------
+        state
+            Shape (states,).
+        inputs
+            Shape (inputs,); the start values if it is left out.
+        time
+            Time in s.
+        """
+        u = list(inputs) if len(inputs) else self.start(self.inputs)
+        f, y, s, _ = self.equations(time, state, u, self.start(self.parameters), self.look_up(state, u))
+        rate = "der({})" if self.sample_time is None else "next({})"
+        result = {rate.format(v.name): float(f[i]) for i, v in enumerate(self.states)}
+        result |= {v.name: float(s[i]) for i, v in enumerate(self.signals)}
+        return result | {v.name: float(y[i]) for i, v in enumerate(self.outputs)}
+
+    def look_up(self, state: Sequence[float], inputs: Sequence[float]) -> NDArray[np.float64]:
+        """Return the columns of all tables at one state and input.
+
+        Parameters
+        ----------
+        state, inputs
+            Shapes (states,) and (inputs,).
+        """
+        at = {v.name: float(state[i]) for i, v in enumerate(self.states)}
+        at |= {v.name: float(inputs[i]) for i, v in enumerate(self.inputs)}
+        found = [table.look_up(at[table.argument]) for table in self.tables]
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def __str__(self) -> str:
+        kind = "continuous" if self.sample_time is None else f"every {self.sample_time:g} s"
+        lines = [f"FlatModel {self.name} ({kind}): {self.description}"]
+        for title in ("states", "inputs", "outputs", "parameters"):
+            group: tuple[Variable, ...] = getattr(self, title)
+            lines.append(f"  {title} ({len(group)})")
+            lines += [f"    {v.name} = {v.start:.6g} {v.unit}  {v.description}" for v in group]
+        return "\n".join(lines)
+
+
+def _with_start(variable: Variable, given: float | Quantity) -> Variable:
+    value = given.number if isinstance(given, Quantity) else float(given)
+    if isinstance(given, Quantity) and not same_dimension(given.unit, variable.unit):
+        raise ValueRangeError(
+            f"{variable.name} = {given}", f"the unit must measure what '{variable.unit}' measures"
+        )
+    if not variable.minimum <= value <= variable.maximum:
+        raise ValueRangeError(
+            f"{variable.name} = {value:g} {variable.unit}",
+            f"must lie in [{variable.minimum:g}, {variable.maximum:g}] {variable.unit}",
+        )
+    source, spread = (
+        (given.source, given.spread) if isinstance(given, Quantity) else (variable.source, variable.spread)
+    )
+    return replace(variable, start=value, source=source, spread=spread)

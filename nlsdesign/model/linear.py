@@ -1,0 +1,137 @@
+"""Linearisation of the flat model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError, ValueRangeError
+from .flat import FlatModel
+
+Matrix = NDArray[np.float64]
+
+
+class LinearModel(NamedTuple):
+    """Matrices of ẋ = A x + B u, y = C x + D u around a point, with the names of the rows.
+
+    Shapes (n, n), (n, m), (r, n), (r, m).
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    sample_time: float | None
+
+    def to_control(self) -> control.StateSpace:
+        """Return the model as ``control.StateSpace`` with the same names."""
+        step = 0 if self.sample_time is None else self.sample_time
+        return control.StateSpace(
+            self.A, self.B, self.C, self.D, step,
+            states=[_label(n) for n in self.states],
+            inputs=[_label(n) for n in self.inputs],
+            outputs=[_label(n) for n in self.outputs],
+        )  # fmt: skip
+
+
+def _label(name: str) -> str:
+    # python-control reserves the dot for subsystems.
+    return name.replace(".", "_")
+
+
+def jacobian_function(model: FlatModel) -> ca.Function:
+    """Return (t, x, u, p, w) -> (A, B, C, D) of a flat model.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    """
+    s = model.symbols()
+    return ca.Function(
+        "linear",
+        [s.time, s.state, s.input, s.parameter, s.table],
+        [
+            ca.jacobian(s.derivative, s.state),
+            ca.jacobian(s.derivative, s.input),
+            ca.jacobian(s.output, s.state),
+            ca.jacobian(s.output, s.input),
+        ],
+    )
+
+
+def linearise(model: FlatModel, state: Sequence[float], inputs: Sequence[float] = ()) -> LinearModel:
+    """Return the exact linearisation at a point.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    state, inputs
+        The point, shapes (states,) and (inputs,); inputs rest at their start values by default.
+
+    Raises
+    ------
+    ValueRangeError
+        If the laws have no finite slope there, as at a sharp corner.
+    """
+    u = np.asarray(inputs if len(inputs) else model.start(model.inputs), dtype=float)
+    x = np.asarray(state, dtype=float)
+    found = jacobian_function(model)(0.0, x, u, model.start(model.parameters), model.look_up(list(x), list(u)))
+    a, b, c, d = (np.array(m, dtype=float) for m in found)
+    if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
+        raise ValueRangeError(
+            f"linearisation of {model.name} at {x.tolist()}",
+            "the slope is not finite there",
+            next_step="move away from the corner or use the smooth form of the law",
+        )
+    names = tuple(tuple(v.name for v in group) for group in (model.states, model.inputs, model.outputs))
+    return LinearModel(a, b, c, d, names[0], names[1], names[2], model.sample_time)
+
+
+def rest_state(
+    model: FlatModel, held: dict[str, float], inputs: Sequence[float] = (), *, tolerance: float = 1e-9
+) -> NDArray[np.float64]:
+    """Return the state in which all states but the held ones rest.
+
+    Parameters
+    ----------
+    model
+        Continuous model.
+    held
+        States that are prescribed, such as the cam angle and the speed of a servoed motor.
+    inputs
+        Shape (inputs,).
+    tolerance
+        Largest remaining derivative relative to the nominal size of its state, in 1/s.
+
+    Raises
+    ------
+    ConvergenceError
+        If no such state is found.
+    """
+    u = np.asarray(inputs if len(inputs) else model.start(model.inputs), dtype=float)
+    x = model.start(model.states)
+    for i, v in enumerate(model.states):
+        x[i] = held.get(v.name, x[i])
+    free = [i for i, v in enumerate(model.states) if v.name not in held]
+    p, jac = model.start(model.parameters), jacobian_function(model)
+    for _ in range(100):
+        w = model.look_up(list(x), list(u))
+        rate = np.array(model.equations(0.0, x, u, p, w)[0]).ravel()[free]
+        if np.all(np.abs(rate) <= tolerance * np.array([model.states[i].nominal for i in free])):
+            return x
+        slope = np.array(jac(0.0, x, u, p, w)[0])[np.ix_(free, free)]
+        x[free] -= np.linalg.lstsq(slope, rate, rcond=None)[0]
+    raise ConvergenceError(
+        f"rest state of {model.name}", f"not found while holding {held}",
+        next_step="hold another state, or start nearer",
+    )

@@ -1,0 +1,288 @@
+"""Numbers with unit, source and spread; units are converted here and nowhere else."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+from .errors import UnitError, ValueRangeError, nearest
+
+BASE = ("kg", "m", "s", "A", "K", "rad")
+
+_DEGREE = math.pi / 180.0
+# symbol -> (factor to SI, exponents of kg, m, s, A, K, rad)
+_ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
+    "1": (1.0, (0, 0, 0, 0, 0, 0)),
+    "%": (0.01, (0, 0, 0, 0, 0, 0)),
+    "kg": (1.0, (1, 0, 0, 0, 0, 0)),
+    "g": (1e-3, (1, 0, 0, 0, 0, 0)),
+    "m": (1.0, (0, 1, 0, 0, 0, 0)),
+    "s": (1.0, (0, 0, 1, 0, 0, 0)),
+    "min": (60.0, (0, 0, 1, 0, 0, 0)),
+    "h": (3600.0, (0, 0, 1, 0, 0, 0)),
+    "A": (1.0, (0, 0, 0, 1, 0, 0)),
+    "K": (1.0, (0, 0, 0, 0, 1, 0)),
+    "rad": (1.0, (0, 0, 0, 0, 0, 1)),
+    "deg": (_DEGREE, (0, 0, 0, 0, 0, 1)),
+    "°": (_DEGREE, (0, 0, 0, 0, 0, 1)),
+    "rev": (2.0 * math.pi, (0, 0, 0, 0, 0, 1)),
+    "rpm": (2.0 * math.pi / 60.0, (0, 0, -1, 0, 0, 1)),
+    "Hz": (1.0, (0, 0, -1, 0, 0, 0)),
+    "N": (1.0, (1, 1, -2, 0, 0, 0)),
+    "Pa": (1.0, (1, -1, -2, 0, 0, 0)),
+    "J": (1.0, (1, 2, -2, 0, 0, 0)),
+    "W": (1.0, (1, 2, -3, 0, 0, 0)),
+    "V": (1.0, (1, 2, -3, -1, 0, 0)),
+    "Ohm": (1.0, (1, 2, -3, -2, 0, 0)),
+    "Ω": (1.0, (1, 2, -3, -2, 0, 0)),
+    "H": (1.0, (1, 2, -2, -2, 0, 0)),
+}
+_PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "u": 1e-6, "n": 1e-9}
+_PREFIXED = {"g", "m", "s", "A", "N", "Pa", "J", "W", "V", "Hz", "rad", "Ohm", "Ω", "H", "K"}
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as a factor to SI and exponents of the base units.
+
+    Parameters
+    ----------
+    text
+        The unit as written.
+    factor
+        Value in SI = value in this unit × factor.
+    exponents
+        Exponents of kg, m, s, A, K, rad, in this order.
+    """
+
+    text: str
+    factor: float
+    exponents: tuple[int, ...]
+
+    @property
+    def mechanical(self) -> tuple[int, ...]:
+        """Exponents without the radian, which cancels against arc lengths."""
+        return self.exponents[:-1]
+
+
+def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
+    if token in _ATOMS:
+        return _ATOMS[token]
+    head, tail = token[:1], token[1:]
+    if head in _PREFIXES and tail in _PREFIXED:
+        factor, exponents = _ATOMS[tail]
+        return _PREFIXES[head] * factor, exponents
+    names = list(_ATOMS) + [p + a for p in _PREFIXES for a in _PREFIXED]
+    raise UnitError(
+        f"unit '{unit}'",
+        f"'{token}' is not a known unit",
+        did_you_mean=nearest(token, names),
+        next_step="write products and quotients of SI units, for instance 'N*m/rad', 'MPa', 'kg*m^2'",
+    )
+
+
+@lru_cache(maxsize=512)
+def parse_unit(text: str) -> Unit:
+    """Read a unit such as ``"N*m/rad"``, ``"kg·m²"`` or ``"MPa"``.
+
+    Everything behind a ``/`` is one factor: ``"N*m*s/rad"`` has the radian below the line,
+    and ``"1/(N*s)"`` is written ``"1/N/s"``.
+
+    Parameters
+    ----------
+    text
+        Product and quotient of unit symbols with integer powers.
+
+    Raises
+    ------
+    UnitError
+        If a symbol is not known.
+    """
+    factor, exponents = 1.0, [0] * len(BASE)
+    pieces = re.split(r"([*·/])", text.strip().translate(_SUPERSCRIPTS).replace(" ", ""))
+    sign = 1
+    for piece in pieces:
+        if piece in ("*", "·"):
+            sign = 1
+            continue
+        if piece == "/":
+            sign = -1
+            continue
+        match = _POWER.match(piece)
+        if not match:
+            raise UnitError(f"unit '{text}'", f"'{piece}' cannot be read", next_step="write for instance 'N*m/rad'")
+        power = sign * int(match["power"] or 1)
+        one_factor, one = _atom(match["atom"], text)
+        factor *= one_factor**power
+        exponents = [total + power * each for total, each in zip(exponents, one, strict=True)]
+    return Unit(text, factor, tuple(exponents))
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number (or a row of numbers) in SI with its unit, source and relative spread.
+
+    Parameters
+    ----------
+    value
+        Value in SI; a tuple for a row of numbers.
+    unit
+        Unit in which it was given and is shown.
+    source
+        Citation, data-sheet page, bench file with date, or "assumed" with a reason.
+    spread
+        One-sided relative spread; 0.06 means ± 6 %.
+    """
+
+    value: float | tuple[float, ...]
+    unit: str = "1"
+    source: str = "not stated"
+    spread: float = 0.0
+    _parsed: Unit = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_parsed", parse_unit(self.unit))
+        if isinstance(self.value, tuple):
+            object.__setattr__(self, "value", tuple(float(item) for item in self.value))
+        else:
+            object.__setattr__(self, "value", float(self.value))
+        if not all(math.isfinite(item) for item in self.values):
+            raise ValueRangeError(f"{self.value} {self.unit}", "a quantity must be finite")
+        if not self.spread >= 0.0:
+            raise ValueRangeError(f"spread {self.spread}", "a relative spread is a number >= 0, 0.06 for 6 %")
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The numbers in SI as a tuple, also for a single one."""
+        return self.value if isinstance(self.value, tuple) else (self.value,)
+
+    @property
+    def number(self) -> float:
+        """The single number in SI.
+
+        Raises
+        ------
+        ValueRangeError
+            If the quantity is a row of numbers.
+        """
+        if isinstance(self.value, tuple):
+            raise ValueRangeError(f"{self.value} {self.unit}", "one number was expected, not a row")
+        return self.value
+
+    @property
+    def shown(self) -> float | tuple[float, ...]:
+        """The number(s) in the unit in which they were given."""
+        rounded = tuple(float(f"{item / self._parsed.factor:.15g}") for item in self.values)
+        return rounded if isinstance(self.value, tuple) else rounded[0]
+
+    @property
+    def assumed(self) -> bool:
+        """Whether the source is an assumption rather than evidence."""
+        return self.source.lower().startswith(("assumed", "not stated"))
+
+    def with_value(self, value: float | tuple[float, ...], source: str | None = None) -> Quantity:
+        """Return a changed copy.
+
+        Parameters
+        ----------
+        value
+            New value(s) in SI.
+        source
+            New source; the old one stays if it is not given.
+        """
+        return replace(self, value=value, source=self.source if source is None else source)
+
+    def __str__(self) -> str:
+        shown = self.shown
+        text = (
+            "(" + ", ".join(f"{item:.6g}" for item in shown) + ")"
+            if isinstance(shown, tuple)
+            else f"{shown:.6g}"
+        )
+        return f"{text} {self.unit}" if self.unit != "1" else text
+
+
+def quantity(
+    value: float | tuple[float, ...], unit: str, *, source: str = "not stated", spread: float = 0.0
+) -> Quantity:
+    """Return a quantity from a value in the given unit.
+
+    Parameters
+    ----------
+    value
+        Value(s) in ``unit``.
+    unit
+        For instance ``"MPa"``.
+    source
+        Where the number comes from.
+    spread
+        One-sided relative spread.
+
+    Examples
+    --------
+    >>> quantity(0.58, "MPa", source="Austin 2015, Table I").number
+    580000.0
+    """
+    factor = parse_unit(unit).factor
+    converted = tuple(item * factor for item in value) if isinstance(value, tuple) else value * factor
+    return Quantity(converted, unit, source, spread)
+
+
+def degrees(value: float) -> float:
+    """Return an angle in rad from degrees.
+
+    Parameters
+    ----------
+    value
+        Angle in degrees.
+    """
+    return value * _DEGREE
+
+
+def same_dimension(unit: str, other: str) -> bool:
+    """Tell whether two units measure the same thing; the radian counts as a dimension.
+
+    Parameters
+    ----------
+    unit, other
+        Units as text.
+    """
+    return parse_unit(unit).exponents == parse_unit(other).exponents
+
+
+def convert(value: float, from_unit: str, to_unit: str) -> float:
+    """Convert a value between units of the same dimension.
+
+    Parameters
+    ----------
+    value
+        Value in ``from_unit``.
+    from_unit, to_unit
+        Units as text.
+
+    Raises
+    ------
+    UnitError
+        If the dimensions differ.
+    """
+    if not same_dimension(from_unit, to_unit):
+        raise UnitError(f"'{from_unit}'", f"is not of the dimension of '{to_unit}'")
+    return value * parse_unit(from_unit).factor / parse_unit(to_unit).factor
+
+
+def sources(quantities: Mapping[str, Quantity]) -> dict[str, float]:
+    """Return the share of numbers per kind of evidence: ``assumed`` and ``sourced``.
+
+    Parameters
+    ----------
+    quantities
+        Numbers by name.
+    """
+    total = max(1, len(quantities))
+    assumed = sum(item.assumed for item in quantities.values())
+    return {"assumed": assumed / total, "sourced": (len(quantities) - assumed) / total}
