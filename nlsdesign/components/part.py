@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from abc import ABC
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -107,7 +108,7 @@ def parameter(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class Part(ABC):
     """Base of everything that is declared: its numbers are the fields made by :func:`parameter`."""
 
     def __post_init__(self) -> None:

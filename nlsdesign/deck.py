@@ -1,0 +1,184 @@
+"""Decks: TOML files in which every number has value, unit, source and spread, and every place has a line."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .errors import DeckError, UnitError, nearest, unknown_name
+from .locations import folder
+from .quantity import Quantity, parse_unit
+
+_HEADER = re.compile(r"^\s*\[+\s*([^\]]+?)\s*\]+")
+_KEY = re.compile(r"^(\s*)([A-Za-z0-9_\-]+)\s*=")
+NUMBER_FIELDS = ("value", "unit", "source", "spread")
+
+
+@dataclass(frozen=True)
+class Deck:
+    """The tables of a deck as they were read, with the place of each name.
+
+    Parameters
+    ----------
+    name, description
+        From the table ``[deck]``.
+    path
+        File, for messages.
+    tables
+        Everything else.
+    places
+        Line and column by full name.
+    """
+
+    name: str
+    description: str
+    path: Path
+    tables: Mapping[str, Any]
+    places: Mapping[str, tuple[int, int]]
+
+    def place(self, full_name: str) -> str:
+        """Return ``file:line:column: name``; the place of the nearest owner where the name has none.
+
+        Parameters
+        ----------
+        full_name
+            Names joined by dots.
+        """
+        known = full_name
+        while known and known not in self.places:
+            known = known.rpartition(".")[0]
+        line, column = self.places.get(known, (1, 1))
+        return f"{self.path.name}:{line}:{column}: {full_name}"
+
+    def number(self, full_name: str, raw: object) -> Quantity:
+        """Return a number of the deck as a quantity.
+
+        Parameters
+        ----------
+        full_name
+            For messages.
+        raw
+            The table ``{value, unit, source, spread}``.
+
+        Raises
+        ------
+        DeckError
+            If it is not such a table, a field is misspelt, or the value is not a number.
+        UnitError
+            If the unit is missing or unknown.
+        """
+        where = self.place(full_name)
+        if not isinstance(raw, dict):
+            raise DeckError(
+                where, f"is the bare value {raw!r}; a number needs a unit and a source",
+                next_step='write {value = ..., unit = "...", source = "...", spread = ...}',
+            )  # fmt: skip
+        for key in raw:
+            if key not in NUMBER_FIELDS:
+                raise DeckError(where, f"has an unknown field '{key}'", did_you_mean=nearest(key, NUMBER_FIELDS))
+        if "unit" not in raw:
+            raise UnitError(where, "has no unit", next_step="add for instance unit = \"mm\"; \"1\" for a pure number")
+        missing = [key for key in ("value", "source") if key not in raw]
+        if missing:
+            raise DeckError(where, f"has no {' and no '.join(missing)}", next_step=f"add {missing[0]} = ...")
+        return self._converted(where, raw)
+
+    def _converted(self, where: str, raw: dict[str, Any]) -> Quantity:
+        value, spread = raw["value"], raw.get("spread", 0.0)
+        items = value if isinstance(value, list) else [value]
+        if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in [*items, spread]):
+            raise DeckError(where, f"value {value!r} or spread {spread!r} is not a number")
+        try:
+            factor = parse_unit(str(raw["unit"])).factor
+        except UnitError as error:
+            raise UnitError(where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean,
+                            next_step=error.next_step) from None  # fmt: skip
+        scaled = tuple(v * factor for v in items)
+        return Quantity(scaled if isinstance(value, list) else scaled[0], raw["unit"], str(raw["source"]), float(spread))
+
+
+def deck_names() -> list[str]:
+    """Return the names of the decks that come with the project."""
+    return sorted(path.stem for path in (folder("models") / "decks").glob("*.toml"))
+
+
+def load_deck(name: str | Path) -> Deck:
+    """Read a deck by file name, or by the name of one that comes with the project.
+
+    Parameters
+    ----------
+    name
+        For instance ``"austin2015_as_printed"`` or ``"my/actuator.toml"``.
+
+    Raises
+    ------
+    DeckError
+        If the file cannot be read as TOML.
+    UnknownNameError
+        If there is neither such a file nor such a deck.
+    """
+    path = Path(name)
+    if path.suffix != ".toml":
+        path = folder("models") / "decks" / f"{name}.toml"
+        if not path.exists():
+            raise unknown_name("deck", str(name), deck_names())
+    if not path.exists():
+        raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
+                        next_step="give a .toml file or the name of a deck")  # fmt: skip
+    return read_deck(path.read_text(encoding="utf8"), path)
+
+
+def read_deck(text: str, path: Path) -> Deck:
+    """Read a deck from text.
+
+    Parameters
+    ----------
+    text
+        TOML.
+    path
+        Where it came from, for messages.
+    """
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DeckError(path.name, f"is not valid TOML: {error}") from None
+    head = tables.pop("deck", {})
+    return Deck(str(head.get("name", path.stem)), str(head.get("description", "")), path, tables, _places(text))
+
+
+def _places(text: str) -> dict[str, tuple[int, int]]:
+    places: dict[str, tuple[int, int]] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        header, key = _HEADER.match(line), _KEY.match(line)
+        if header:
+            table = header[1].replace(" ", "")
+            places.setdefault(table, (number, line.index("[") + 1))
+        elif key:
+            full = f"{table}.{key[2]}" if table else key[2]
+            places.setdefault(full, (number, len(key[1]) + 1))
+    return places
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all.
+
+    Parameters
+    ----------
+    path
+        File; its folder is made if needed.
+    text
+        Content.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(path.name + ".part")
+    try:
+        draft.write_text(text, encoding="utf8")
+        os.replace(draft, path)
+    finally:
+        draft.unlink(missing_ok=True)
