@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,30 @@ class Deck:
         line, column = self.places.get(known, (1, 1))
         return f"{self.path.name}:{line}:{column}: {full_name}"
 
+    def quantity(self, full_name: str) -> Quantity:
+        """Return the number of that name.
+
+        Parameters
+        ----------
+        full_name
+            For instance ``"spring.rubber.area"``.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest name in the deck.
+        """
+        found: Any = self.tables
+        for step in full_name.split("."):
+            if not isinstance(found, Mapping) or step not in found:
+                raise unknown_name(f"{self.path.name}: number", full_name, self.places)
+            found = found[step]
+        return self.number(full_name, found)
+
+    def numbers(self) -> list[str]:
+        """Return the full names of all numbers in the deck, in written order."""
+        return [name for name, table in _tables("", self.tables) if "value" in table]
+
     def number(self, full_name: str, raw: object) -> Quantity:
         """Return a number of the deck as a quantity.
 
@@ -100,6 +124,14 @@ class Deck:
                             next_step=error.next_step) from None  # fmt: skip
         scaled = tuple(v * factor for v in items)
         return Quantity(scaled if isinstance(value, list) else scaled[0], raw["unit"], str(raw["source"]), float(spread))
+
+
+def _tables(path: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for key, inner in table.items():
+        if isinstance(inner, Mapping):
+            full = f"{path}.{key}" if path else key
+            yield full, inner
+            yield from _tables(full, inner)
 
 
 def deck_names() -> list[str]:

@@ -60,7 +60,8 @@ class TwoSidedCam(Cam):
     The lever arm is h(θ) = H(q)·θ/√(θ² + w²) with q = √(θ² + w²) − w, and δ(θ) = ∫₀^q H. H is a uniform cubic
     B-spline with the control values ``lever_arm`` on [0, ``last_angle``], C²; w is the angle over which the
     cable changes sides. δ is even, h odd, and h ≡ dδ/dθ exactly. ``anchor_distance`` is the distance from
-    the centre to the fixed end of the cable; it shapes the contour, not the law.
+    the centre to the fixed end of the cable; it shapes the contour, not the law. Beyond the contour's end
+    the lever arm stays what it was there, as on a round run-out; no stop is modelled.
     """
 
     lever_arm: Quantity = parameter(
@@ -98,12 +99,16 @@ class TwoSidedCam(Cam):
     def extension(self, scope: Scope, angle: Expression) -> Expression:
         """Return δ(θ) = ∫₀^q H."""
         on_side, _ = self._side(scope, angle)
-        return uniform_spline_integral(scope.row("lever_arm"), 0.0, self._spacing(scope), on_side)
+        on_contour = ca.fmin(on_side, scope.parameter("last_angle"))
+        row, spacing = scope.row("lever_arm"), self._spacing(scope)
+        run_out = uniform_spline(row, 0.0, spacing, on_contour) * (on_side - on_contour)
+        return uniform_spline_integral(row, 0.0, spacing, on_contour) + run_out
 
     def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
         """Return h(θ) = dδ/dθ."""
         on_side, slope = self._side(scope, angle)
-        return uniform_spline(scope.row("lever_arm"), 0.0, self._spacing(scope), on_side) * slope
+        on_contour = ca.fmin(on_side, scope.parameter("last_angle"))
+        return uniform_spline(scope.row("lever_arm"), 0.0, self._spacing(scope), on_contour) * slope
 
 
 def control_values(

@@ -75,7 +75,7 @@ class CoulombFriction(Viscous):
     Source: Coulomb 1785; the smooth form e.g. in Armstrong-Hélouvry 1991.
     """
 
-    torque: Quantity = parameter("N*m", "friction torque", minimum=0.0, maximum=1e6)
+    sliding_torque: Quantity = parameter("N*m", "friction torque while sliding", minimum=0.0, maximum=1e6)
     creep_speed: Quantity = parameter(
         "rad/s", "speed at which 76 % of the friction torque acts", minimum=1e-6, maximum=10.0, default=0.02
     )
@@ -87,4 +87,4 @@ class CoulombFriction(Viscous):
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T = T_c·tanh(ω/ω_s)."""
-        return scope.parameter("torque") * smooth_sign(rate, scope.parameter("creep_speed"))
+        return scope.parameter("sliding_torque") * smooth_sign(rate, scope.parameter("creep_speed"))

@@ -208,11 +208,62 @@ def _table(path: str, part: Part, structure: list[str]) -> list[str]:
 
 def _number(given: Quantity) -> str:
     factor = parse_unit(given.unit).factor
-    items = [repr(v / factor) for v in given.values]
+    items = [_shortest(v, factor) for v in given.values]
     value = "[" + ", ".join(items) + "]" if isinstance(given.value, tuple) else items[0]
     text = f"{{value = {value}, unit = {_string(given.unit)}, source = {_string(given.source)}"
     return text + (f", spread = {given.spread!r}}}" if given.spread else "}")
 
 
+def _shortest(value: float, factor: float) -> str:
+    """Return the shortest decimal that reads back as the same number in SI."""
+    exact = value / factor
+    candidates = (repr(float(f"{exact:.{digits}g}")) for digits in (6, 12, 15))
+    return next((text for text in candidates if float(text) * factor == value), repr(exact))
+
+
 def _string(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'
+
+
+def numbers_of(deck: Deck, path: str) -> dict[str, Any]:
+    """Return the numbers that stand directly in one table of a deck, by field name.
+
+    Parameters
+    ----------
+    deck
+        As read.
+    path
+        Full name of the table, for instance ``"spring.rubber"``.
+
+    Raises
+    ------
+    NlsError
+        If a number is not written as one.
+    """
+    inside = [name for name in deck.numbers() if name.rpartition(".")[0] == path]
+    return {name.rpartition(".")[2]: deck.quantity(name) for name in inside}
+
+
+def require_same_numbers(assembly: Assembly, deck: Deck) -> Assembly:
+    """Return the assembly if it has used every number of the deck.
+
+    Parameters
+    ----------
+    assembly
+        Made from the deck by a function.
+    deck
+        Where the numbers came from.
+
+    Raises
+    ------
+    DeckError
+        If the deck declares a number that the assembly does not have.
+    """
+    for name in deck.numbers():
+        if name not in assembly.quantities():
+            raise DeckError(
+                deck.place(name), f"the model {assembly.name} does not have this number",
+                did_you_mean=nearest(name, assembly.quantities()),
+                next_step="use declare(deck), which takes any deck as it stands",
+            )  # fmt: skip
+    return assembly

@@ -262,6 +262,7 @@ def _model(
         "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
     )  # fmt: skip
+    _check_unique(ledger)
     if any(math.isnan(v) for v in _probe(equations)):
         raise ArrangementError(
             f"assembly '{assembly.name}'", "the equations are singular",
@@ -295,6 +296,15 @@ def _finished(
     done = iter(ca.vertsplit(everything))
     split = [[next(done) for _ in group] for group in groups]
     return dict(zip(ledger.derivatives, split[0], strict=True)), split[1], split[2], split[3]
+
+
+def _check_unique(ledger: Ledger) -> None:
+    seen: set[str] = set()
+    for group in (ledger.states, ledger.inputs, ledger.parameters, ledger.signals):
+        for name in group:
+            if name in seen:
+                raise ArrangementError(f"name '{name}'", "is used twice", next_step="rename the part or the number")
+            seen.add(name)
 
 
 def _probe(equations: ca.Function) -> list[float]:
