@@ -1,0 +1,1 @@
+"""Symbolic design workbench for series elastic actuators whose spring is a cam that stretches rubber."""

@@ -104,9 +104,13 @@ class Deck:
             )  # fmt: skip
         for key in raw:
             if key not in NUMBER_FIELDS:
-                raise DeckError(where, f"has an unknown field '{key}'", did_you_mean=nearest(key, NUMBER_FIELDS))
+                raise DeckError(
+                    where, f"has an unknown field '{key}'", did_you_mean=nearest(key, NUMBER_FIELDS)
+                )
         if "unit" not in raw:
-            raise UnitError(where, "has no unit", next_step="add for instance unit = \"mm\"; \"1\" for a pure number")
+            raise UnitError(
+                where, "has no unit", next_step='add for instance unit = "mm"; "1" for a pure number'
+            )
         missing = [key for key in ("value", "source") if key not in raw]
         if missing:
             raise DeckError(where, f"has no {' and no '.join(missing)}", next_step=f"add {missing[0]} = ...")
@@ -123,7 +127,9 @@ class Deck:
             raise UnitError(where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean,
                             next_step=error.next_step) from None  # fmt: skip
         scaled = tuple(v * factor for v in items)
-        return Quantity(scaled if isinstance(value, list) else scaled[0], raw["unit"], str(raw["source"]), float(spread))
+        return Quantity(
+            scaled if isinstance(value, list) else scaled[0], raw["unit"], str(raw["source"]), float(spread)
+        )
 
 
 def _tables(path: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -180,7 +186,9 @@ def read_deck(text: str, path: Path) -> Deck:
     except tomllib.TOMLDecodeError as error:
         raise DeckError(path.name, f"is not valid TOML: {error}") from None
     head = tables.pop("deck", {})
-    return Deck(str(head.get("name", path.stem)), str(head.get("description", "")), path, tables, _places(text))
+    return Deck(
+        str(head.get("name", path.stem)), str(head.get("description", "")), path, tables, _places(text)
+    )
 
 
 def _places(text: str) -> dict[str, tuple[int, int]]:

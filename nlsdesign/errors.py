@@ -58,6 +58,16 @@ class NlsError(Exception):
             text += f" -> {self.next_step}"
         return text
 
+    def at(self, place: str) -> NlsError:
+        """Return the same error with the place in front of the thing.
+
+        Parameters
+        ----------
+        place
+            For instance ``"deck.toml:12:1: spring.rubber.area"``.
+        """
+        return _rebuild(type(self), f"{place}: {self.thing}", self.rule, self.did_you_mean, self.next_step)
+
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), self.thing, self.rule, self.did_you_mean, self.next_step)
 

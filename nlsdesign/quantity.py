@@ -115,7 +115,9 @@ def parse_unit(text: str) -> Unit:
             continue
         match = _POWER.match(piece)
         if not match:
-            raise UnitError(f"unit '{text}'", f"'{piece}' cannot be read", next_step="write for instance 'N*m/rad'")
+            raise UnitError(
+                f"unit '{text}'", f"'{piece}' cannot be read", next_step="write for instance 'N*m/rad'"
+            )
         power = sign * int(match["power"] or 1)
         one_factor, one = _atom(match["atom"], text)
         factor *= one_factor**power

@@ -86,7 +86,9 @@ def _cubic_bump_integral(u: Expression) -> Expression:
     return ca.if_else(u < 0, tail, 1 - tail)
 
 
-def uniform_spline(coefficients: Sequence[Expression], lower: float, step: float, at: Expression) -> Expression:
+def uniform_spline(
+    coefficients: Sequence[Expression], lower: float, step: Expression | float, at: Expression
+) -> Expression:
     """Evaluate a uniform cubic B-spline with symbolic coefficients.
 
     Parameters
@@ -105,7 +107,7 @@ def uniform_spline(coefficients: Sequence[Expression], lower: float, step: float
 
 
 def uniform_spline_integral(
-    coefficients: Sequence[Expression], lower: float, step: float, at: Expression
+    coefficients: Sequence[Expression], lower: float, step: Expression | float, at: Expression
 ) -> Expression:
     """Evaluate the integral from ``lower`` of :func:`uniform_spline`, exactly.
 

@@ -1,14 +1,15 @@
 """Parts that can be declared; they never learn what they are used for."""
 
-from .assembly import Assembly, Tie, assembly, tie
+from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .cam import Cam, Pulley, TwoSidedCam, control_values
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
-from .sensors import DelayedForceSensor, Encoder, ForceSensor, Sensor
+from .sensors import CurrentSensor, DelayedForceSensor, Encoder, ForceSensor, Sensor
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
+from .tie import Tie, tie
 
 __all__ = [
     "MATERIAL",
@@ -18,6 +19,7 @@ __all__ = [
     "Body",
     "Cam",
     "CoulombFriction",
+    "CurrentSensor",
     "Dashpot",
     "DelayedForceSensor",
     "Domain",
@@ -34,8 +36,8 @@ __all__ = [
     "Mass",
     "Parallel",
     "Part",
-    "Pulley",
     "PullOnly",
+    "Pulley",
     "Sensor",
     "Series",
     "SmoothStrainStiffening",

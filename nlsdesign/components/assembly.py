@@ -4,57 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any
 
 from ..errors import ArrangementError, unknown_name
 from ..quantity import Quantity
 from .bodies import Body, Fixed
+from .drawing import draw
 from .element import Element
 from .part import Part, quantities, replaced, walk, with_values
 from .sensors import Sensor
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tie(Part):
-    """An element between two bodies; its motion is that of the first minus that of the second.
-
-    Parameters
-    ----------
-    element
-        What relates motion and effort.
-    between
-        Names of the two bodies; one name means: against the resting frame.
-    """
-
-    element: Element
-    between: tuple[str, ...]
-
-    def children(self) -> Mapping[str, Part]:
-        """Return the parts of the element: the tie adds no level to the names."""
-        return self.element.children()
-
-    def with_children(self, children: Mapping[str, Part]) -> Self:
-        """Return a copy with other parts in the element."""
-        return replace(self, element=self.element.with_children(children))
-
-    def parameters(self) -> dict[str, Quantity]:
-        """Return the numbers of the element."""
-        return self.element.parameters()
-
-
-def tie(element: Element, *between: str) -> Tie:
-    """Tie an element between two bodies, or between one body and the resting frame.
-
-    Parameters
-    ----------
-    element
-        For instance a spring.
-    *between
-        One or two names of bodies.
-    """
-    if not 1 <= len(between) <= 2:
-        raise ArrangementError("tie", "an element has one body at each end", next_step="name one or two bodies")
-    return Tie(element=element, between=between)
+from .tie import Tie
 
 
 @dataclass(frozen=True)
@@ -87,7 +46,9 @@ class Assembly:
                     next_step="tie an element to bodies with tie(element, 'motor', 'load')",
                 )
         if not bodies:
-            raise ArrangementError(f"assembly '{self.name}'", "has no body", next_step="add for instance load=Fixed()")
+            raise ArrangementError(
+                f"assembly '{self.name}'", "has no body", next_step="add for instance load=Fixed()"
+            )
 
     def __getitem__(self, path: str) -> Part:
         """Return the part at a path.
@@ -133,7 +94,7 @@ class Assembly:
             part = parts[head]
             inner = part.element if isinstance(part, Tie) else part
             changed = with_values(inner, {tail: value})
-            parts[head] = replace(part, element=changed) if isinstance(part, Tie) else changed
+            parts[head] = part.around(changed) if isinstance(part, Tie) else changed
         return replace(self, parts=tuple(parts.items()))
 
     def with_part(self, path: str, new: Part) -> Assembly:
@@ -154,9 +115,9 @@ class Assembly:
                 raise unknown_name("part", path, (where for where, _ in self.walk()))
             inner = old.element if isinstance(old, Tie) else old
             inside = _with_inner(inner, tail, new)
-            parts[head] = replace(old, element=inside) if isinstance(old, Tie) else inside
+            parts[head] = old.around(inside) if isinstance(old, Tie) else inside
         elif isinstance(old, Tie) and isinstance(new, Element):
-            parts[head] = replace(old, element=new)
+            parts[head] = old.around(new)
         else:
             parts[head] = new
         return replace(self, parts=tuple(parts.items()))
@@ -188,9 +149,7 @@ class Assembly:
         return replace(self, parts=tuple((n, p) for n, p in self.parts if n != name))
 
     def __str__(self) -> str:
-        from .drawing import draw
-
-        return draw(self)
+        return draw(f"{self.name}: {self.description}".rstrip(": "), self.parts)
 
 
 def _with_inner(root: Part, path: str, new: Part) -> Part:
@@ -216,7 +175,8 @@ def _check_tie(name: str, part: Tie, bodies: Mapping[str, Body]) -> None:
             )
     if all(isinstance(body, Fixed) for body in ends) or len(set(part.between)) < len(part.between):
         raise ArrangementError(
-            f"part '{name}'", "both ends rest on the same or on fixed bodies, so it can never move",
+            f"part '{name}'",
+            "both ends rest on the same or on fixed bodies, so it can never move",
             next_step="tie one end to a body that moves",
         )
 

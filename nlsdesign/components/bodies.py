@@ -68,7 +68,9 @@ class Free(Body):
         acceleration = (self.drive(scope) + effort) / self.inertia_of(scope)
         scope.derive(motion.motion, motion.rate)
         scope.derive(motion.rate, acceleration)
-        scope.signal("acceleration", acceleration, f"{self.domain.motion_unit}/s^2", f"acceleration of {scope.path}")
+        scope.signal(
+            "acceleration", acceleration, f"{self.domain.motion_unit}/s^2", f"acceleration of {scope.path}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +121,9 @@ class GearedMotor(Free):
     friction is an element of its own. Source: any text on electric drives.
     """
 
-    inertia: Quantity = parameter("kg*m^2", "moment of inertia at the gear's output", minimum=1e-12, maximum=1e6)
+    inertia: Quantity = parameter(
+        "kg*m^2", "moment of inertia at the gear's output", minimum=1e-12, maximum=1e6
+    )
     gear_ratio: Quantity = parameter("1", "motor turns per output turn", minimum=1e-3, maximum=1e4)
     torque_constant: Quantity = parameter("N*m/A", "motor torque per current", minimum=1e-6, maximum=1e3)
     current_limit: Quantity = parameter("A", "largest current", minimum=1e-6, maximum=1e4, default=20.0)

@@ -25,7 +25,10 @@ class Cam(Part):
     """Base of everything that turns an angle into an extension."""
 
     elements: Quantity = parameter(
-        "1", "number of equal elements that the cam stretches and that share the torque", minimum=1.0, maximum=100.0,
+        "1",
+        "number of equal elements that the cam stretches and that share the torque",
+        minimum=1.0,
+        maximum=100.0,
         default=1.0,
     )
 
@@ -136,7 +139,9 @@ def control_values(
         If the table does not start at zero or is not ascending.
     """
     if angles[0] != 0.0 or np.any(np.diff(angles) <= 0.0):
-        raise ValueRangeError("cam table", "angles must ascend from zero", next_step="sort the table by angle")
+        raise ValueRangeError(
+            "cam table", "angles must ascend from zero", next_step="sort the table by angle"
+        )
     dense = np.linspace(0.0, angles[-1], max(6 * count, len(angles)))
     values = make_interp_spline(angles, lever_arms, k=3)(dense)
     position = dense / angles[-1] * (count - 3)

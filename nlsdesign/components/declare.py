@@ -11,11 +11,12 @@ from .. import components
 from ..deck import Deck, write_text
 from ..errors import DeckError, NlsError, nearest
 from ..quantity import Quantity, parse_unit
-from .assembly import Assembly, Tie
+from .assembly import Assembly
 from .element import Combination, Element
 from .networks import Through
 from .part import Part
 from .sensors import Sensor
+from .tie import Tie
 
 _STRUCTURE = ("component", "between", "of")
 
@@ -24,7 +25,9 @@ def component_classes() -> dict[str, type[Part]]:
     """Return the components that a deck can name, by name."""
     everything = (getattr(components, name) for name in components.__all__)
     kinds = [c for c in everything if isinstance(c, type) and issubclass(c, Part)]
-    return {c.__name__: c for c in kinds if not getattr(c, "__abstractmethods__", None) and c not in (Part, Tie)}
+    return {
+        c.__name__: c for c in kinds if not getattr(c, "__abstractmethods__", None) and c not in (Part, Tie)
+    }
 
 
 class _Builder:
@@ -57,7 +60,9 @@ class _Builder:
     def _kind(self, path: str, table: Mapping[str, Any]) -> type[Part] | None:
         where, name = self.deck.place(f"{path}.component"), table.get("component")
         if not isinstance(name, str):
-            self.problems.append(DeckError(where, "is missing", next_step='add component = "..." to the table'))
+            self.problems.append(
+                DeckError(where, "is missing", next_step='add component = "..." to the table')
+            )
             return None
         if name not in self.classes:
             self.problems.append(
@@ -72,27 +77,31 @@ class _Builder:
             fields[key] = info.checked(key, self.deck.number(full, raw))
         except NlsError as error:
             located = error.thing.startswith(self.deck.path.name)
-            thing = error.thing if located else f"{self.deck.place(full)}: {error.thing}"
-            self.problems.append(type(error)(thing, error.rule, did_you_mean=error.did_you_mean,
-                                             next_step=error.next_step))  # fmt: skip
+            self.problems.append(error if located else error.at(self.deck.place(full)))
 
     def _unknown_field(self, full: str, key: str, kind: type[Part]) -> None:
         valid = [*kind.parameter_infos(), *_STRUCTURE]
+        step = f"fields are: {', '.join(kind.parameter_infos())}"
+        rule = f"{kind.__name__} has no field '{key}'"
         self.problems.append(
-            DeckError(self.deck.place(full), f"{kind.__name__} has no field '{key}'", did_you_mean=nearest(key, valid),
-                      next_step=f"fields are: {', '.join(kind.parameter_infos())}")
-        )  # fmt: skip
+            DeckError(self.deck.place(full), rule, did_you_mean=nearest(key, valid), next_step=step)
+        )
 
     def _made(
-        self, path: str, kind: type[Part], fields: dict[str, Any], children: dict[str, Part], table: Mapping[str, Any]
+        self,
+        path: str,
+        kind: type[Part],
+        fields: dict[str, Any],
+        children: dict[str, Part],
+        table: Mapping[str, Any],
     ) -> Part | None:
         needed = [f.name for f in dataclasses.fields(kind) if f.name in kind.parameter_infos()
                   and f.default is dataclasses.MISSING and f.name not in table]  # fmt: skip
         if needed:
-            self.problems.append(
-                DeckError(self.deck.place(path), f"{kind.__name__} needs '{needed[0]}'",
-                          next_step=f"add {needed[0]} = {{value, unit = \"{kind.parameter_infos()[needed[0]].unit}\", source}}")
-            )  # fmt: skip
+            unit = kind.parameter_infos()[needed[0]].unit
+            example = f'add {needed[0]} = {{value = ..., unit = "{unit}", source = "..."}}'
+            rule = f"{kind.__name__} needs '{needed[0]}'"
+            self.problems.append(DeckError(self.deck.place(path), rule, next_step=example))
         if self.problems:
             return None
         try:
@@ -107,8 +116,7 @@ class _Builder:
                 fields["of"] = str(table.get("of", ""))
             return kind(**fields)
         except NlsError as error:
-            self.problems.append(type(error)(f"{self.deck.place(path)}: {error.thing}", error.rule,
-                                             did_you_mean=error.did_you_mean, next_step=error.next_step))  # fmt: skip
+            self.problems.append(error.at(self.deck.place(path)))
             return None
 
 
@@ -163,8 +171,7 @@ def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
     try:
         return Assembly(deck.name, tuple(parts), deck.description), []
     except NlsError as error:
-        return None, [type(error)(f"{deck.path.name}: {error.thing}", error.rule, did_you_mean=error.did_you_mean,
-                                  next_step=error.next_step)]  # fmt: skip
+        return None, [error.at(deck.path.name)]
 
 
 def deck_text(assembly: Assembly) -> str:

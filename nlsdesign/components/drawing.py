@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from .assembly import Assembly, Tie
+from collections.abc import Sequence
+
 from .part import Part
 from .sensors import Sensor
+from .tie import Tie
 
 
-def draw(assembly: Assembly) -> str:
-    """Return the assembly as a tree of parts with their laws and numbers.
+def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
+    """Return named parts as a tree with their laws and numbers.
 
     Parameters
     ----------
-    assembly
-        What to draw.
+    title
+        First line.
+    parts
+        Pairs of name and body, tie or sensor.
     """
-    lines = [f"{assembly.name}: {assembly.description}".rstrip(": ")]
-    for name, part in assembly.parts:
+    lines = [title]
+    for name, part in parts:
         if isinstance(part, Tie):
             ends = " ── ".join((part.between[0], f"[{name}]", *(part.between[1:] or ("frame",))))
             lines.append(f"  {ends}   {part.element.title()}")

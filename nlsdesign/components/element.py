@@ -153,10 +153,14 @@ class Combination(Element):
         super().__post_init__()
         kind = type(self).__name__
         if not self.members:
-            raise ArrangementError(kind, "needs at least one element", next_step="name elements, for instance spring=...")
+            raise ArrangementError(
+                kind, "needs at least one element", next_step="name elements, for instance spring=..."
+            )
         for name, member in self.members:
             if not isinstance(member, Element):
-                raise ArrangementError(f"{kind} member '{name}'", f"is a {type(member).__name__}, not an element")
+                raise ArrangementError(
+                    f"{kind} member '{name}'", f"is a {type(member).__name__}, not an element"
+                )
             if member.domain != self._inner:
                 raise ArrangementError(
                     f"{kind} member '{name}'",
@@ -180,7 +184,8 @@ class Combination(Element):
 
     def with_children(self, children: Mapping[str, Part]) -> Self:
         """Return a copy with other members."""
-        return replace(self, members=tuple(children.items()))
+        # The kind of each member is checked where the copy is made.
+        return replace(self, members=tuple(children.items()))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,7 +241,9 @@ def _own_motion(member: Element, scope: Scope) -> Expression:
     return scope.state(domain.motion, domain.motion_unit, f"{domain.motion} of {scope.path}")
 
 
-def _root(residual: Expression, unknown: Expression, scope: Scope, guess: Expression | None = None) -> Expression:
+def _root(
+    residual: Expression, unknown: Expression, scope: Scope, guess: Expression | None = None
+) -> Expression:
     """Return the root of a monotone residual; where it was iterated, the remainder is recorded as a check."""
     solution = solve_monotone(
         lambda z: ca.substitute(residual, unknown, z), unknown, ca.SX(0) if guess is None else guess
@@ -293,7 +300,9 @@ def _shared(
     scope.define(share, solution)
     scope.define(whole, motion)
     scope.define(whole_rate, rate)
-    return ca.substitute(one, ca.vertcat(share, whole), ca.vertcat(ca.substitute(solution, whole, motion), motion))
+    return ca.substitute(
+        one, ca.vertcat(share, whole), ca.vertcat(ca.substitute(solution, whole, motion), motion)
+    )
 
 
 def parallel(**members: Element) -> Parallel:

@@ -46,7 +46,9 @@ class Specimen(Combination):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return F = A₀·Σσ(e/L₀)."""
         length = scope.parameter("rest_length")
-        stresses = [observed_effort(m, scope.child(n), motion / length, rate / length) for n, m in self.members]
+        stresses = [
+            observed_effort(m, scope.child(n), motion / length, rate / length) for n, m in self.members
+        ]
         scope.signal("strain", motion / length, "1", f"strain of {scope.path}")
         return scope.parameter("area") * sum(stresses[1:], start=stresses[0])
 
@@ -73,11 +75,13 @@ class Through(Element):
         super().__post_init__()
         name, element = self.behind
         if not isinstance(self.cam, Cam):
-            raise ArrangementError("through", f"the first thing must be a cam, not a {type(self.cam).__name__}")
+            raise ArrangementError(
+                "through", f"the first thing must be a cam, not a {type(self.cam).__name__}"
+            )
         if element.domain != TRANSLATION:
             raise ArrangementError(
                 f"through: '{name}'",
-                f"relates {element.domain.motion} and {element.domain.effort}; a cam needs extension and force",
+                f"relates {element.domain.motion} and {element.domain.effort}; a cam needs a force",
                 next_step="put a specimen around a material, or use a linear spring",
             )
 
@@ -122,7 +126,9 @@ class PullOnly(Combination):
     rod, not of a free piece: good for short slack times, see the known gaps.
     """
 
-    width: Quantity = parameter("N", "force over which the corner is rounded", minimum=1e-6, maximum=1e3, default=0.1)
+    width: Quantity = parameter(
+        "N", "force over which the corner is rounded", minimum=1e-6, maximum=1e3, default=0.1
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -159,7 +165,8 @@ def through(cam: Cam, *, pretension: Quantity | float = 0.0, **behind: Element) 
     """
     if len(behind) != 1:
         raise ArrangementError(
-            f"through: {len(behind)} elements", "exactly one stands behind a cam",
+            f"through: {len(behind)} elements",
+            "exactly one stands behind a cam",
             next_step="combine several with parallel(...) or series(...)",
         )
     from_name = next(iter(behind.items()))

@@ -75,7 +75,8 @@ class ParameterInfo:
                     parse_unit(slipped)
                 except UnitError:
                     continue
-                return f"was '{slipped}' meant? {value / parse_unit(given.unit).factor:g} {slipped} is in the range"
+                number = value / parse_unit(given.unit).factor
+                return f"was '{slipped}' meant? {number:g} {slipped} is in the range"
         return None
 
 
@@ -108,7 +109,7 @@ def parameter(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(ABC):
+class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
     """Base of everything that is declared: its numbers are the fields made by :func:`parameter`."""
 
     def __post_init__(self) -> None:

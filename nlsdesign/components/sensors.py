@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 
@@ -11,6 +12,14 @@ from ..quantity import Quantity
 from ..symbolic import Expression
 from .element import Scope
 from .part import Part, parameter
+
+
+class Numbers(Protocol):
+    """Gives the symbols of a part's own numbers."""
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of one number."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +37,23 @@ class Sensor(Part):
     @abstractmethod
     def read(self, scope: Scope, value: Expression) -> Expression:
         """Return the reading of a value, in the value's unit."""
+
+    @property
+    def late_by(self) -> str | None:
+        """Name of the parameter that says by how much the reading is late, if there is one."""
+        return None
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return the value behind a reading: the inverse of :meth:`read`, but for rounding, noise and delay.
+
+        Parameters
+        ----------
+        numbers
+            Gives the sensor's own parameters.
+        reading
+            What the sensor gave, ``late_by`` later.
+        """
+        return reading
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +80,26 @@ class ForceSensor(Sensor):
         """Return gain·F + bias."""
         return scope.parameter("gain") * value + scope.parameter("bias")
 
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return (reading − bias)/gain."""
+        return (reading - numbers.parameter("bias")) / numbers.parameter("gain")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurrentSensor(Sensor):
+    """Ammeter: reading = I + bias. Its gain is not told apart from the motor's torque constant."""
+
+    bias: Quantity = parameter("A", "bias", minimum=-1e4, maximum=1e4, default=0.0)
+    noise: Quantity = parameter("A", "standard deviation of the noise", maximum=1e4, default=0.0)
+
+    def read(self, scope: Scope, value: Expression) -> Expression:
+        """Return I + bias."""
+        return value + scope.parameter("bias")
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return reading − bias."""
+        return reading - numbers.parameter("bias")
+
 
 @dataclass(frozen=True, kw_only=True)
 class DelayedForceSensor(ForceSensor):
@@ -64,6 +110,11 @@ class DelayedForceSensor(ForceSensor):
     """
 
     delay: Quantity = parameter("s", "transport delay", minimum=1e-6, maximum=10.0)
+
+    @property
+    def late_by(self) -> str | None:
+        """The delay."""
+        return "delay"
 
     def read(self, scope: Scope, value: Expression) -> Expression:
         """Return the delayed reading."""

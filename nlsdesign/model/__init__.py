@@ -1,6 +1,7 @@
 """The waist: from an assembly to a frozen, flat, named model, and views of it."""
 
+from ..components.assembly import Assembly
 from .flat import FlatModel, Symbols, Table, Variable
 from .flatten import flatten
 
-__all__ = ["FlatModel", "Symbols", "Table", "Variable", "flatten"]
+__all__ = ["Assembly", "FlatModel", "Symbols", "Table", "Variable", "flatten"]

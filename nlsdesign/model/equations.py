@@ -87,8 +87,13 @@ class Equations:
     def latex(self) -> str:
         """Return an aligned LaTeX block of all equations."""
         left = r"{}^{{+}}" if self.discrete else r"\dot{{{}}}"
-        rows = [f"{left.format(_tex(n))} &= {sympy.latex(e, symbol_names=_names(e))}" for n, e in self.derivatives.items()]
-        rows += [f"{_tex(n)} &= {sympy.latex(e, symbol_names=_names(e))}" for n, e in self.definitions.items()]
+        rows = [
+            f"{left.format(_tex(n))} &= {sympy.latex(e, symbol_names=_names(e))}"
+            for n, e in self.derivatives.items()
+        ]
+        rows += [
+            f"{_tex(n)} &= {sympy.latex(e, symbol_names=_names(e))}" for n, e in self.definitions.items()
+        ]
         return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
 
     def _repr_latex_(self) -> str:
@@ -122,7 +127,10 @@ def equations(model: FlatModel) -> Equations:
         If a law uses an operation that has no SymPy counterpart here.
     """
     columns = [v for table in model.tables for v in table.columns]
-    inputs = [["time"], *([v.name for v in g] for g in (model.states, model.inputs, model.parameters, columns))]
+    inputs = [
+        ["time"],
+        *([v.name for v in g] for g in (model.states, model.inputs, model.parameters, columns)),
+    ]
     results = [[v.name for v in group] for group in (model.states, model.outputs, model.signals)]
     reader = _Reader(model.equations, inputs)
     reader.run(results)
@@ -176,7 +184,9 @@ class _Reader:
             return _UNARY[operation](*operands[:1])
         if operation in _BINARY:
             return _BINARY[operation](*operands)
-        raise ExportError(f"operation {operation}", "has no SymPy counterpart", next_step="add it in equations.py")
+        raise ExportError(
+            f"operation {operation}", "has no SymPy counterpart", next_step="add it in equations.py"
+        )
 
     def symbol(self, step: int) -> Any:
         """Return the value of an instruction, or its name where it has one."""

@@ -226,7 +226,7 @@ class FlatModel:
         time
             Time in s.
         """
-        u = list(inputs) if len(inputs) else self.start(self.inputs)
+        u = list(inputs) if len(inputs) else [v.start for v in self.inputs]
         f, y, s, _ = self.equations(time, state, u, self.start(self.parameters), self.look_up(state, u))
         rate = "der({})" if self.sample_time is None else "next({})"
         result = {rate.format(v.name): float(f[i]) for i, v in enumerate(self.states)}

@@ -11,11 +11,12 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import casadi as ca
 
-from ..components.assembly import Assembly, Tie
+from ..components.assembly import Assembly
 from ..components.bodies import Body, Motion
 from ..components.element import observed_effort
 from ..components.part import Part
 from ..components.sensors import Sensor
+from ..components.tie import Tie
 from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
@@ -77,30 +78,27 @@ class PartScope:
         """Return the scope of a part inside."""
         return PartScope(self._ledger, f"{self.path}.{name}")
 
-    def _full(self, name: str) -> str:
-        return f"{self.path}.{name}"
-
     def parameter(self, name: str) -> Expression:
         """Return the symbol of one of the part's own numbers."""
-        return self._ledger.parameters[self._full(name)][1]
+        return self._ledger.parameters[f"{self.path}.{name}"][1]
 
     def row(self, name: str) -> list[Expression]:
         """Return the symbols of one of the part's own rows of numbers."""
-        prefix = self._full(name)
+        prefix = f"{self.path}.{name}"
         if prefix in self._ledger.parameters:
             return [self._ledger.parameters[prefix][1]]
         return [e for n, (_, e) in self._ledger.parameters.items() if n.startswith(prefix + "[")]
 
     def input(self, name: str, unit: str, description: str) -> Expression:
         """Declare an input."""
-        full = self._full(name)
+        full = f"{self.path}.{name}"
         symbol = ca.SX.sym(full)
         self._ledger.inputs[full] = (Variable(full, unit, description), symbol)
         return symbol
 
     def state(self, name: str, unit: str, description: str) -> Expression:
         """Declare a state."""
-        full = self._full(name)
+        full = f"{self.path}.{name}"
         if full in self._ledger.states:
             raise ArrangementError(full, "two equations claim this state")
         symbol = ca.SX.sym(full)
@@ -113,7 +111,7 @@ class PartScope:
 
     def signal(self, name: str, value: Expression, unit: str, description: str) -> None:
         """Give a name to an expression, unless a state or input of that name says the same."""
-        full = self._full(name)
+        full = f"{self.path}.{name}"
         if full not in self._ledger.states and full not in self._ledger.inputs:
             self._ledger.signals[full] = (Variable(full, unit, description), ca.SX(value))
 
@@ -168,7 +166,8 @@ def flatten(
     Examples
     --------
     >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
-    >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=tie(TorsionSpring(stiffness=2.0), "wheel"))
+    >>> spring = tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring)
     >>> [v.name for v in flatten(swing).states]
     ['wheel.angle', 'wheel.speed']
     """
@@ -191,8 +190,8 @@ def _write_mechanics(assembly: Assembly, ledger: Ledger) -> None:
         effort = observed_effort(part.element, scope, one.motion - other.motion, one.rate - other.rate)
         for sign, body in zip((-1, 1), part.between, strict=False):
             sums[body] += sign * effort
-    for name, body in bodies.items():
-        body.balance(PartScope(ledger, name), motions[name], sums[name])
+    for name, turning in bodies.items():
+        turning.balance(PartScope(ledger, name), motions[name], sums[name])
 
 
 def _write_sensors(assembly: Assembly, ledger: Ledger) -> None:
@@ -203,7 +202,9 @@ def _write_sensors(assembly: Assembly, ledger: Ledger) -> None:
                 raise unknown_name(f"sensor '{name}' reads", part.of, known)
             unit = _variable_of(ledger, part.of).unit
             scope = PartScope(ledger, name)
-            scope.signal("reading", part.read(scope, known[part.of]), unit, f"reading of {name}, which sees {part.of}")
+            scope.signal(
+                "reading", part.read(scope, known[part.of]), unit, f"reading of {name}, which sees {part.of}"
+            )
 
 
 def _variable_of(ledger: Ledger, name: str) -> Variable:
@@ -219,7 +220,9 @@ def _default_outputs(assembly: Assembly) -> list[str]:
     return readings or ties
 
 
-def _needed_states(ledger: Ledger, derivatives: Mapping[str, Expression], roots: Iterable[Expression]) -> list[str]:
+def _needed_states(
+    ledger: Ledger, derivatives: Mapping[str, Expression], roots: Iterable[Expression]
+) -> list[str]:
     """Drop states that nothing depends on, such as the place of a dashpot between dashpots."""
     wanted = list(roots)
     needed: set[str] = set()
@@ -265,7 +268,8 @@ def _model(
     _check_unique(ledger)
     if any(math.isnan(v) for v in _probe(equations)):
         raise ArrangementError(
-            f"assembly '{assembly.name}'", "the equations are singular",
+            f"assembly '{assembly.name}'",
+            "the equations are singular",
             next_step="look for springs or dashpots of zero stiffness in series",
         )
     return FlatModel(
@@ -303,7 +307,9 @@ def _check_unique(ledger: Ledger) -> None:
     for group in (ledger.states, ledger.inputs, ledger.parameters, ledger.signals):
         for name in group:
             if name in seen:
-                raise ArrangementError(f"name '{name}'", "is used twice", next_step="rename the part or the number")
+                raise ArrangementError(
+                    f"name '{name}'", "is used twice", next_step="rename the part or the number"
+                )
             seen.add(name)
 
 

@@ -85,7 +85,9 @@ def linearise(model: FlatModel, state: Sequence[float], inputs: Sequence[float] 
     """
     u = np.asarray(inputs if len(inputs) else model.start(model.inputs), dtype=float)
     x = np.asarray(state, dtype=float)
-    found = jacobian_function(model)(0.0, x, u, model.start(model.parameters), model.look_up(list(x), list(u)))
+    found = jacobian_function(model)(
+        0.0, x, u, model.start(model.parameters), model.look_up(list(x), list(u))
+    )
     a, b, c, d = (np.array(m, dtype=float) for m in found)
     if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
         raise ValueRangeError(
@@ -132,6 +134,7 @@ def rest_state(
         slope = np.array(jac(0.0, x, u, p, w)[0])[np.ix_(free, free)]
         x[free] -= np.linalg.lstsq(slope, rate, rcond=None)[0]
     raise ConvergenceError(
-        f"rest state of {model.name}", f"not found while holding {held}",
+        f"rest state of {model.name}",
+        f"not found while holding {held}",
         next_step="hold another state, or start nearer",
     )

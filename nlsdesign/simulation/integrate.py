@@ -104,7 +104,9 @@ def _samples(variable: Variable, times: Array, drive: Drive) -> Array:
     else:
         row = np.broadcast_to(np.asarray(drive, dtype=float), times.shape).copy()
     if not np.all(np.isfinite(row)):
-        raise ValueRangeError(f"input '{variable.name}'", f"is not finite at t = {times[~np.isfinite(row)][0]:g} s")
+        raise ValueRangeError(
+            f"input '{variable.name}'", f"is not finite at t = {times[~np.isfinite(row)][0]:g} s"
+        )
     return row
 
 
@@ -130,7 +132,8 @@ def _integrated(
         found = solver(x0=x0 / np.array(scale).ravel(), p=model.start(model.parameters), u=driven)["xf"]
     except RuntimeError as error:
         raise ConvergenceError(
-            f"simulation of {model.name}", f"the integrator stopped: {str(error).strip().splitlines()[-1][:200]}",
+            f"simulation of {model.name}",
+            f"the integrator stopped: {str(error).strip().splitlines()[-1][:200]}",
             next_step="check the inputs for jumps beyond the range of the laws, or start nearer to rest",
         ) from error
     x: Array = np.hstack([x0[:, None], np.array(found) * np.array(scale)])
@@ -142,7 +145,9 @@ def _integrated(
 def _stepped(model: FlatModel, times: Array, u: Array, x0: Array) -> Array:
     samples = np.diff(times) / float(model.sample_time or 1.0)
     if np.any(np.abs(samples - 1.0) > 1e-6):
-        raise ValueRangeError("times", f"must lie {model.sample_time:g} s apart, the sample time of {model.name}")
+        raise ValueRangeError(
+            "times", f"must lie {model.sample_time:g} s apart, the sample time of {model.name}"
+        )
     p, x = model.start(model.parameters), np.zeros((len(x0), len(times)))
     x[:, 0] = x0
     for k in range(len(times) - 1):
@@ -152,9 +157,9 @@ def _stepped(model: FlatModel, times: Array, u: Array, x0: Array) -> Array:
 
 
 def _evaluated(model: FlatModel, times: Array, x: Array, u: Array) -> Trace:
-    w = np.array([model.look_up(list(x[:, k]), list(u[:, k])) for k in range(len(times))]).T if model.tables else (
-        np.zeros((0, len(times)))
-    )  # fmt: skip
+    w = np.zeros((0, len(times)))
+    if model.tables:
+        w = np.array([model.look_up(list(x[:, k]), list(u[:, k])) for k in range(len(times))]).T
     p = np.repeat(model.start(model.parameters)[:, None], len(times), axis=1)
     _, y, s, r = model.equations.map(len(times))(times[None, :], x, u, p, w)
     _check_residuals(model, times, np.array(r))
@@ -170,6 +175,7 @@ def _check_residuals(model: FlatModel, times: Array, residuals: Array) -> None:
     if residuals.size and not np.max(np.abs(residuals)) <= RESIDUAL_LIMIT:
         worst = int(np.nanargmax(np.max(np.abs(residuals), axis=0)))
         raise ConvergenceError(
-            f"simulation of {model.name}", f"an implicit equation was not solved at t = {times[worst]:g} s",
+            f"simulation of {model.name}",
+            f"an implicit equation was not solved at t = {times[worst]:g} s",
             next_step="check for an element in series whose effort saturates",
         )

@@ -42,7 +42,8 @@ class Trace:
         for signal, values in self.signals.items():
             if values.shape != self.time.shape:
                 raise MeasurementError(
-                    f"signal '{signal}' of '{self.name}'", f"has {values.shape} samples, time has {self.time.shape}"
+                    f"signal '{signal}' of '{self.name}'",
+                    f"has {values.shape} samples, time has {self.time.shape}",
                 )
 
     def __getitem__(self, name: str) -> Array:
@@ -83,7 +84,9 @@ class Trace:
         times
             Shape (m,), in s.
         """
-        return replace(self, time=times, signals={n: np.interp(times, self.time, v) for n, v in self.signals.items()})
+        return replace(
+            self, time=times, signals={n: np.interp(times, self.time, v) for n, v in self.signals.items()}
+        )
 
     def to_frame(self) -> Any:
         """Return a ``pandas.DataFrame`` indexed by time; needs pandas."""

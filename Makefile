@@ -1,0 +1,61 @@
+# Everything from a bare machine: `make study` and `make test` need only make and Python 3.11 or newer.
+# Commands and paths are relative to this folder, which may have spaces in its name.
+
+BIN := .venv/bin
+STUDY := austin2015
+OUT := out/$(STUDY)
+WORKERS := 2
+UV := uv==0.13.8
+
+# One thread for each worker: two workers on two cores are slower, not faster, when BLAS starts four threads.
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help study test lint bench environment lock clean distclean
+
+help:
+	@echo 'make study      run the study of the published actuator; the report goes to $(OUT)/report.html'
+	@echo '                (another one: make study STUDY=name; another folder: make study OUT=folder)'
+	@echo 'make test       style, types and all tests'
+	@echo 'make lint       style and types only'
+	@echo 'make bench      the benchmarks: ratios against named peers'
+	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'
+	@echo 'make clean      remove what study, test and build have written'
+	@echo 'make distclean  remove .venv too'
+	@echo 'All but lock and clean make .venv first where it is missing or out of date;'
+	@echo 'PYTHON=/path/to/python chooses the interpreter for it.'
+
+environment:
+	@PYTHON='$(PYTHON)' $(SHELL) requirements/environment.sh
+
+study: environment
+	@$(BIN)/nlsdesign study run '$(STUDY)' --out '$(OUT)'
+
+lint: environment
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy --strict nlsdesign models studies
+
+test: lint
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+bench: environment
+	$(BIN)/python -m benchmarks
+
+# Needs a network but no .venv, which a broken lock could not make. What is locked stays unless UPGRADE is given.
+lock:
+	'$(or $(PYTHON),python3)' -m venv .venv-lock
+	.venv-lock/bin/python -m pip install --quiet '$(UV)'
+	.venv-lock/bin/uv pip compile pyproject.toml \
+		--extra export --extra test --extra lint --group build \
+		--universal --python-version 3.11 --generate-hashes --only-binary :all: \
+		--custom-compile-command 'make lock' --quiet $(UPGRADE) \
+		--output-file requirements/locked.txt
+
+clean:
+	rm -rf out dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find nlsdesign models studies tests benchmarks -name __pycache__ -prune -exec rm -rf {} + 2>/dev/null || true
+
+distclean: clean
+	rm -rf .venv .venv-lock

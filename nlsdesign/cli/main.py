@@ -1,0 +1,42 @@
+"""Entry point: exit status 0 for done, 1 for a finding, 2 for bad input, 130 for an interruption."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from ..errors import NlsError
+from ..locations import version
+from .decks import deck
+from .studies import study
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(version(), prog_name="nlsdesign")
+def program() -> None:
+    """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
+
+
+for command in (deck, study):
+    program.add_command(command)
+
+
+def main() -> None:
+    """Run the command line; bad input ends with one message and exit status 2."""
+    try:
+        program(standalone_mode=False)
+    except click.exceptions.Exit as leaving:
+        sys.exit(leaving.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except click.exceptions.Abort:
+        click.echo("interrupted", err=True)
+        sys.exit(130)
+    except KeyboardInterrupt:
+        click.echo("interrupted", err=True)
+        sys.exit(130)
+    except NlsError as error:
+        click.echo(f"error: {error}", err=True)
+        sys.exit(2)

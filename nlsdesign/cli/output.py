@@ -1,0 +1,71 @@
+"""What commands print: a short table for people, JSON for scripts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+
+def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    title
+        Heading.
+    columns
+        Headings of the columns.
+    rows
+        Text of the cells.
+    """
+    table = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    # A table that is piped should not be squeezed into 80 columns.
+    width = None if Console().is_terminal else 160
+    Console(highlight=False, markup=False, width=width).print(table)
+
+
+def show_json(content: Mapping[str, Any]) -> None:
+    """Print a mapping as JSON.
+
+    Parameters
+    ----------
+    content
+        Numbers, texts and lists by name.
+    """
+    click.echo(json.dumps(content, indent=2, ensure_ascii=False, default=_plain))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return str(value)
+
+
+def out_option(default: str = "out") -> Any:
+    """Return the option ``--out``.
+
+    Parameters
+    ----------
+    default
+        Folder if none is given.
+    """
+    kind = click.Path(path_type=Path, file_okay=False)
+    told = "Folder for everything that is written."
+    return click.option("--out", type=kind, default=default, show_default=True, help=told)
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK",
+                           help="Deck file, or the name of one that comes with the project.")  # fmt: skip

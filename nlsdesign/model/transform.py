@@ -1,0 +1,324 @@
+"""Other views of the same flat model: another state, other outputs, cut open at a named signal.
+
+None of these changes what the model says. They exchange the coordinates in which it says it, so that an
+observer or an analysis can be written on the relaxing force, on the total force, or in the published form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import casadi as ca
+
+from ..errors import ArrangementError, unknown_name
+from ..symbolic import Expression, depends
+from .flat import FlatModel, Symbols, Variable
+
+
+def named(model: FlatModel, symbols: Symbols) -> dict[str, Expression]:
+    """Return the expression of every parameter, signal, output, input and state by name.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    symbols
+        What ``model.symbols()`` gave.
+    """
+    groups = (
+        (model.parameters, symbols.parameter),
+        (model.signals, symbols.signal),
+        (model.outputs, symbols.output),
+        (model.inputs, symbols.input),
+        (model.states, symbols.state),
+    )
+    return {v.name: column[i] for group, column in groups for i, v in enumerate(group)}
+
+
+def with_outputs(model: FlatModel, names: Sequence[str]) -> FlatModel:
+    """Return a copy that gives out other variables.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    names
+        States, inputs, signals or present outputs.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name does not exist, with the nearest that does.
+    """
+    s = model.symbols()
+    known = named(model, s)
+    outputs = tuple(model.variable(name) for name in names)
+    return _rebuilt(model, s._replace(output=_column([known[name] for name in names])), outputs=outputs)
+
+
+def with_signal(
+    model: FlatModel, variable: Variable, value: Callable[[Mapping[str, Expression]], Expression]
+) -> FlatModel:
+    """Return a copy with one more named signal.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    variable
+        Name, unit and description.
+    value
+        Takes the expressions of everything by name and returns that of the signal.
+
+    Raises
+    ------
+    ArrangementError
+        If the name is taken.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+    >>> from nlsdesign.model import Variable, flatten
+    >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=tie(TorsionSpring(stiffness=2.0), "wheel"))
+    >>> energy = Variable("spring.energy", "J", "energy stored in the spring")
+    >>> half = lambda n: n["spring.torque"] * n["wheel.angle"] / 2
+    >>> with_signal(flatten(swing), energy, half).evaluate([0.1, 0.0])["spring.energy"]
+    0.01
+    """
+    s = model.symbols()
+    known = named(model, s)
+    if variable.name in known:
+        raise ArrangementError(
+            f"signal '{variable.name}'", "the name is taken", next_step="choose another name"
+        )
+    changed = s._replace(signal=_column([s.signal, value(known)]))
+    return _rebuilt(model, changed, signals=(*model.signals, variable))
+
+
+def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
+    """Return the same model with a signal as state instead of one of its states.
+
+    With s = α + β·x, where α and β may depend on all other states, the derivative of the new state is
+    ∂s/∂t + Σ ∂s/∂xᵢ·ẋᵢ, and x = (s − α)/β goes on as a signal.
+
+    Parameters
+    ----------
+    model
+        Continuous.
+    old
+        Name of the state to replace, for instance ``"spring.rubber.relaxing.dashpot.strain"``.
+    signal
+        Name of a signal that is affine in it, for instance ``"spring.rubber.relaxing.stress"``.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name does not exist.
+    ArrangementError
+        If the model is discrete, or the signal cannot stand for the state: it is not affine in it, has no
+        slope in it at the start, or depends on an input, whose derivative is not known.
+    """
+    if old not in {v.name for v in model.states}:
+        raise unknown_name("state", old, (v.name for v in model.states))
+    if signal not in {v.name for v in model.signals}:
+        raise unknown_name("signal", signal, (v.name for v in model.signals))
+    s = model.symbols()
+    value, place = named(model, s)[signal], [v.name for v in model.states].index(old)
+    _check_replacement(model, s, value, (old, signal))
+    new = ca.SX.sym(signal)
+    slope = ca.jacobian(value, s.state[place])
+    solved = (new - ca.substitute(value, s.state[place], ca.SX(0))) / slope
+    rate = ca.jtimes(value, s.state, s.derivative) + ca.jacobian(value, s.time)
+    derivative = _exchanged(s.derivative, place, rate)
+    kept = [i for i, v in enumerate(model.signals) if v.name != signal]
+    row = _column([*(s.signal[i] for i in kept), s.state[place]])
+    columns = _substituted([derivative, s.output, row, s.residual], s.state[place], solved)
+    variable = replace(model.variable(signal), start=_at_start(model, signal))
+    changed = s._replace(
+        state=_exchanged(s.state, place, new),
+        derivative=columns[0], output=columns[1], signal=columns[2], residual=columns[3],
+    )  # fmt: skip
+    states = tuple(variable if i == place else v for i, v in enumerate(model.states))
+    signals = (*(model.signals[i] for i in kept), replace(model.states[place], start=0.0))
+    return _rebuilt(model, changed, states=states, signals=signals)
+
+
+def cut(model: FlatModel, names: Sequence[str]) -> FlatModel:
+    """Return the model cut open at named signals: each becomes an input, whatever it came from.
+
+    What lay only before the cut drops out of the equations behind it. It works on the graph of the
+    expressions: everything computed from the signal's node follows the new input.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    names
+        Signals, for instance ``["spring.rubber.extension"]``.
+
+    Raises
+    ------
+    UnknownNameError
+        If a signal does not exist.
+    ArrangementError
+        If the signal is just another name of a state, input or parameter.
+    """
+    s = model.symbols()
+    known = {v.name: s.signal[i] for i, v in enumerate(model.signals)}
+    found: dict[int, Expression] = {}
+    for name in names:
+        if name not in known:
+            raise unknown_name("signal", name, known)
+        if known[name].is_leaf():
+            raise ArrangementError(f"signal '{name}'", "is only another name of a state, input or constant")
+        found[known[name].element_hash()] = ca.SX.sym(name)
+    fresh = [found[known[name].element_hash()] for name in names]
+    kept = [i for i, v in enumerate(model.signals) if v.name not in names]
+    rest = _column([s.signal[i] for i in kept])
+    columns = _regrown([s.derivative, s.output, rest, s.residual], found)
+    changed = s._replace(
+        input=_column([s.input, *fresh]),
+        derivative=columns[0], output=columns[1], signal=columns[2], residual=columns[3],
+    )  # fmt: skip
+    opened = tuple(replace(model.variable(name), start=_at_start(model, name)) for name in names)
+    return _rebuilt(
+        model, changed, inputs=(*model.inputs, *opened), signals=tuple(model.signals[i] for i in kept)
+    )
+
+
+def without_idle_states(model: FlatModel, roots: Sequence[str]) -> FlatModel:
+    """Return the model without the states that neither these variables nor their derivatives depend on.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    roots
+        What must stay: states, outputs or signals. They become the outputs.
+    """
+    model = with_outputs(model, roots)
+    s = model.symbols()
+    needed: set[int] = set()
+    wanted = [s.output]
+    while wanted:
+        expression = wanted.pop()
+        for i in range(len(model.states)):
+            if i not in needed and depends(expression, s.state[i]):
+                needed.add(i)
+                wanted.append(s.derivative[i])
+    kept = sorted(needed)
+    dropped = _column([s.state[i] for i in range(len(model.states)) if i not in needed])
+    visible = [i for i in range(len(model.signals)) if not depends(s.signal[i], dropped)]
+    changed = s._replace(
+        state=_column([s.state[i] for i in kept]),
+        derivative=_column([s.derivative[i] for i in kept]),
+        signal=_column([s.signal[i] for i in visible]),
+        residual=_column([r for r in ca.vertsplit(s.residual) if not depends(r, dropped)]),
+    )
+    states, signals = tuple(model.states[i] for i in kept), tuple(model.signals[i] for i in visible)
+    return _rebuilt(model, changed, states=states, signals=signals)
+
+
+# --- inside ---------------------------------------------------------------------------------------
+
+
+def _rebuilt(
+    model: FlatModel,
+    s: Symbols,
+    *,
+    states: tuple[Variable, ...] | None = None,
+    inputs: tuple[Variable, ...] | None = None,
+    outputs: tuple[Variable, ...] | None = None,
+    signals: tuple[Variable, ...] | None = None,
+) -> FlatModel:
+    """Return the model with these expressions and names; groups that are not given stay."""
+    rows = [s.derivative, s.output, s.signal, s.residual]
+    shared = ca.cse(ca.vertcat(*rows)) if any(r.numel() for r in rows) else ca.SX(0, 1)
+    ends = [0]
+    for row in rows:
+        ends.append(ends[-1] + row.shape[0])
+    equations = ca.Function(
+        "equations", [s.time, s.state, s.input, s.parameter, s.table],
+        [shared[a:b] for a, b in zip(ends, ends[1:], strict=False)],
+        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+    )  # fmt: skip
+    return replace(
+        model,
+        equations=equations,
+        states=model.states if states is None else states,
+        inputs=model.inputs if inputs is None else inputs,
+        outputs=model.outputs if outputs is None else outputs,
+        signals=model.signals if signals is None else signals,
+    )
+
+
+def _column(items: Iterable[Expression]) -> Expression:
+    listed = [item for item in items if item.numel()]
+    return ca.SX(ca.densify(ca.vertcat(*listed))) if listed else ca.SX(0, 1)
+
+
+def _exchanged(column: Expression, place: int, item: Expression) -> Expression:
+    return _column([item if i == place else column[i] for i in range(column.shape[0])])
+
+
+def _substituted(columns: Sequence[Expression], old: Expression, new: Expression) -> list[Expression]:
+    """Substitute in all columns at once, so that they go on sharing their common parts."""
+    return [ca.SX(c) for c in ca.substitute(list(columns), [old], [new])]
+
+
+def _at_start(model: FlatModel, name: str) -> float:
+    return model.evaluate([v.start for v in model.states])[name]
+
+
+def _check_replacement(model: FlatModel, s: Symbols, value: Expression, names: tuple[str, str]) -> None:
+    old, signal = names
+    state = s.state[[v.name for v in model.states].index(old)]
+    slope = ca.jacobian(value, state)
+    thing = f"'{signal}' as state instead of '{old}'"
+    if model.sample_time is not None:
+        raise ArrangementError(thing, "a discrete model has no derivatives")
+    if depends(value, s.input):
+        raise ArrangementError(thing, "the signal depends on an input, whose derivative is not known")
+    if depends(slope, state):
+        raise ArrangementError(
+            thing, "the signal is not affine in the state", next_step="choose another signal"
+        )
+    point = ca.Function("slope", [s.time, s.state, s.parameter], [slope])
+    if float(point(0.0, model.start(model.states), model.start(model.parameters))) == 0.0:
+        raise ArrangementError(
+            thing, "the signal does not change with the state at the start",
+            next_step="choose a signal on the far side of the cam, such as a force or a stress",
+        )  # fmt: skip
+
+
+def _regrown(columns: Sequence[Expression], found: Mapping[int, Expression]) -> list[Expression]:
+    """Return the expressions with whole nodes of their graph replaced, by hash of the node."""
+    grown: dict[int, Expression] = dict(found)
+    for column in columns:
+        for i in range(column.shape[0]):
+            _grow(column[i], grown)
+    return [_column([grown[c[i].element_hash()] for i in range(c.shape[0])]) for c in columns]
+
+
+def _grow(root: Expression, grown: dict[int, Expression]) -> None:
+    """Add ``root`` and all nodes below it to ``grown``, without recursion: graphs are deep."""
+    waiting = [root]
+    while waiting:
+        node = waiting[-1]
+        key = node.element_hash()
+        below = [] if key in grown or node.is_leaf() else [node.dep(i) for i in range(node.n_dep())]
+        missing = [n for n in below if n.element_hash() not in grown]
+        if missing:
+            waiting += missing
+            continue
+        waiting.pop()
+        if key in grown:
+            continue
+        parts = [grown[n.element_hash()] for n in below]
+        if not parts:
+            grown[key] = node
+        elif len(parts) == 1:
+            grown[key] = ca.SX.unary(node.op(), parts[0])
+        else:
+            grown[key] = ca.SX.binary(node.op(), *parts)

@@ -1,0 +1,139 @@
+"""Reads the project's own source and documents: what is public, how big it is, what it points at."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+MOST_LINES_IN_FILE = 500
+MOST_LINES_IN_FUNCTION = 70
+MOST_ARGUMENTS = 7
+MOST_METHODS = 12
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A function, method or class that is public by its name and the names around it."""
+
+    name: str
+    node: Function | ast.ClassDef
+    line: int
+
+
+def parse(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_")
+
+
+def public_definitions(tree: ast.Module) -> Iterator[Definition]:
+    """Public functions and classes of a module, and the public methods of those classes."""
+    for node in tree.body:
+        if not isinstance(node, Function | ast.ClassDef) or is_private(node.name):
+            continue
+        yield Definition(node.name, node, node.lineno)
+        for inner in node.body if isinstance(node, ast.ClassDef) else ():
+            if isinstance(inner, Function) and not is_private(inner.name):
+                yield Definition(f"{node.name}.{inner.name}", inner, inner.lineno)
+
+
+def undocumented(file: Path) -> Iterator[str]:
+    """Public definitions without a docstring; the module itself counts."""
+    tree = parse(file)
+    if not ast.get_docstring(tree):
+        yield "line 1: the module has no docstring"
+    for found in public_definitions(tree):
+        if not ast.get_docstring(found.node) and not _speaks_for_another(found.node):
+            yield f"line {found.line}: {found.name} has no docstring"
+
+
+def untyped(file: Path) -> Iterator[str]:
+    """Arguments and results of public functions without annotation; constructors count."""
+    for found in public_definitions(parse(file)):
+        methods = found.node.body if isinstance(found.node, ast.ClassDef) else [found.node]
+        for node in methods:
+            if not isinstance(node, Function) or (node is not found.node and node.name != "__init__"):
+                continue
+            names = [argument.arg for argument in arguments(node) if argument.annotation is None]
+            if node.returns is None:
+                names.append("the result")
+            if names:
+                yield f"line {node.lineno}: {found.name} has no type for {', '.join(names)}"
+
+
+def misshapen(file: Path) -> Iterator[str]:
+    """Files, functions, argument lists and classes that have outgrown the limits above."""
+    lines = len(file.read_text(encoding="utf-8").splitlines())
+    if lines > MOST_LINES_IN_FILE:
+        yield f"the file has {lines} lines, limit {MOST_LINES_IN_FILE}"
+    for node in ast.walk(parse(file)):
+        if isinstance(node, Function):
+            length = (node.end_lineno or node.lineno) - node.lineno + 1
+            count = len(arguments(node))
+            if length > MOST_LINES_IN_FUNCTION:
+                yield f"line {node.lineno}: {node.name} has {length} lines, limit {MOST_LINES_IN_FUNCTION}"
+            if count > MOST_ARGUMENTS:
+                yield f"line {node.lineno}: {node.name} has {count} arguments, limit {MOST_ARGUMENTS}"
+        elif isinstance(node, ast.ClassDef):
+            # A property and its setter, or the overloads of one method, share one name and count once.
+            methods = {inner.name for inner in node.body if isinstance(inner, Function)}
+            if len(methods) > MOST_METHODS:
+                yield f"line {node.lineno}: {node.name} has {len(methods)} methods, limit {MOST_METHODS}"
+
+
+def arguments(node: Function) -> list[ast.arg]:
+    """All arguments but ``self`` and ``cls``."""
+    every = node.args
+    listed = [*every.posonlyargs, *every.args]
+    if listed and listed[0].arg in ("self", "cls"):
+        listed = listed[1:]
+    return [*listed, *every.kwonlyargs, *(one for one in (every.vararg, every.kwarg) if one)]
+
+
+def tests_in(file: Path) -> set[str]:
+    """Names of the tests in a file as pytest writes them: ``test_a`` or ``TestB::test_a``."""
+    found = set()
+    for node in parse(file).body:
+        if isinstance(node, Function):
+            found.add(node.name)
+        elif isinstance(node, ast.ClassDef):
+            found |= {f"{node.name}::{inner.name}" for inner in node.body if isinstance(inner, Function)}
+    return {name for name in found if name.rpartition("::")[2].startswith("test")}
+
+
+def broken_links(document: Path, root: Path) -> Iterator[str]:
+    """Relative links of a Markdown document whose file or heading does not exist in the project."""
+    text = document.read_text(encoding="utf-8")
+    text = re.sub(r"^(```|~~~).*?^\1", "", text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"`[^`\n]*`", "`code`", text)
+    links = re.findall(r"\]\(\s*<?([^)>\s]+)>?[^)]*\)", text)
+    links += re.findall(r"^\s*\[[^\]]+\]:\s*<?([^>\s]+)", text, flags=re.MULTILINE)
+    links += re.findall(r"(?:src|href)=[\"']([^\"']+)[\"']", text)
+    for link in links:
+        if re.match(r"[a-z][a-z0-9+.-]*:", link):
+            continue
+        name, _, heading = link.partition("#")
+        target = (document.parent / name).resolve() if name else document
+        if not target.exists() or not target.is_relative_to(root):
+            yield f"{link}: there is no such file in the project"
+        elif heading and target.suffix == ".md" and heading not in headings(target):
+            yield f"{link}: there is no such heading"
+
+
+def headings(document: Path) -> set[str]:
+    """The anchors that a Markdown viewer makes of the headings."""
+    found = re.findall(r"^#+\s+(.*?)\s*$", document.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in found}
+
+
+def _speaks_for_another(node: ast.AST) -> bool:
+    """Overloads and setters are documented where the function or property itself is."""
+    names = {ast.unparse(decorator) for decorator in getattr(node, "decorator_list", ())}
+    return any(name.rpartition(".")[2] in ("overload", "setter", "deleter") for name in names)

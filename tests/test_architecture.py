@@ -1,0 +1,273 @@
+"""The house as it is: who may import whom, drawn from the source; and proof that the drawing would notice."""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.import_graph import Import, cycles, imports, modules
+
+# Open to every room.
+BASE = {"errors", "quantity", "symbolic", "locations", "progress"}
+# What the floors above the waist stand on: they see the flat model and never the components it came from.
+WAIST = {"deck", "model"}
+SIMULATED = WAIST | {"simulation"}
+MIDDLE = {"design", "analysis", "observer", "control", "identification", "discrepancy", "export"}
+
+# room: the rooms it may import, besides itself and BASE
+MAY_IMPORT: dict[str, set[str]] = {
+    **{room: set() for room in BASE},
+    "deck": set(),
+    "components": {"deck"},
+    "model": {"deck", "components"},
+    "simulation": WAIST,
+    "design": SIMULATED,
+    "analysis": SIMULATED,
+    "observer": SIMULATED | {"analysis"},
+    "control": SIMULATED | {"analysis", "observer"},
+    "identification": SIMULATED,
+    "discrepancy": SIMULATED | {"identification"},
+    "export": SIMULATED,
+    "figures": SIMULATED | MIDDLE,
+    "report": SIMULATED | MIDDLE | {"figures"},
+    "cli": SIMULATED | MIDDLE | {"components", "figures", "report"},
+    "__main__": {"cli"},
+    "__init__": SIMULATED | MIDDLE | {"components", "figures", "report", "cli"},
+}
+
+# The drawing of a cam needs its geometry; adding a missing effect means declaring the assembly again.
+EXCEPTIONS = {
+    "design.limits": "components.cam",
+    "design.contour": "components.cam",
+    "discrepancy.effects": "components",
+    "discrepancy.diagnose": "components",
+}
+
+# library: the only places that may know it
+HOMES: dict[str, tuple[str, ...]] = {
+    "matplotlib": ("figures",),
+    "mpl_toolkits": ("figures",),
+    "fmpy": ("export",),
+    "control": ("model.linear", "analysis", "observer", "control"),
+    # In a wheel these are not at the top level: nlsdesign.locations.folder finds them.
+    "models": (),
+    "studies": (),
+    "tests": (),
+    "benchmarks": (),
+}
+
+
+def inside(name: str, place: str) -> bool:
+    return name == place or name.startswith(place + ".")
+
+
+def room_of(package: str, module: str) -> str:
+    return "__init__" if module == package else module.split(".")[1]
+
+
+def forbidden(package: Path) -> Iterator[str]:
+    """Each module outside the house and each import that the rules above do not allow."""
+    known = modules(package)
+    for module in known:
+        if room_of(package.name, module) not in MAY_IMPORT:
+            yield f"{module} is in no room of the house"
+    for found in imports(package):
+        reason = objection(package.name, found, known)
+        if reason:
+            yield f"{found}: {reason}"
+
+
+def objection(package: str, found: Import, known: dict[str, Path]) -> str | None:
+    """Why this import is not allowed, or None."""
+    source = found.source.removeprefix(package).lstrip(".")
+    target = found.target.removeprefix(package).lstrip(".")
+    if not inside(found.target, package):
+        homes = HOMES.get(found.target.partition(".")[0])
+        if homes is None or any(inside(source, home) for home in homes):
+            return None
+        return "only in " + ", ".join(homes) if homes else "nowhere in the package"
+    if found.target == package:
+        return "the root gathers the rooms, no room may import it"
+    if found.target not in known:
+        return "there is no such module"
+    here, there = room_of(package, found.source), room_of(package, found.target)
+    if here == there or there in BASE | MAY_IMPORT.get(here, set()):
+        return None
+    if any(inside(source, left) and inside(target, right) for left, right in EXCEPTIONS.items()):
+        return None
+    return f"{here} may not know {there}"
+
+
+def internal_cycles(package: Path) -> list[str]:
+    found = imports(package)
+    return cycles((edge.source, edge.target) for edge in found if inside(edge.target, package.name))
+
+
+def undeclared(package: Path, project: Path) -> Iterator[str]:
+    """Imports of libraries that an installation need not have."""
+    table = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
+    core, extra = names_in(table["dependencies"]), set()
+    for requirements in table["optional-dependencies"].values():
+        extra |= names_in(requirements)
+    for found in imports(package):
+        name = found.target.partition(".")[0]
+        if name == package.name or name in sys.stdlib_module_names or name in core:
+            continue
+        if name not in extra:
+            yield f"{found}, which pyproject.toml does not declare"
+        elif not found.lazy:
+            yield f"{found}, which is optional: import it inside the function that needs it"
+
+
+def expect_none(found: Iterable[str]) -> None:
+    listed = list(found)
+    assert not listed, "\n" + "\n".join(listed)
+
+
+def names_in(requirements: list[str]) -> set[str]:
+    return {re.match(r"[\w-]+", text).group().lower() for text in requirements}  # type: ignore[union-attr]
+
+
+# --- the house as it is ---------------------------------------------------------------------------
+
+
+def test_the_drawing_is_not_empty(root: Path) -> None:
+    drawn = {(found.source, found.target) for found in imports(root / "nlsdesign")}
+    assert ("nlsdesign.quantity", "nlsdesign.errors") in drawn
+    assert ("nlsdesign.model.flat", "nlsdesign.quantity") in drawn
+
+
+def test_no_forbidden_import(root: Path) -> None:
+    expect_none(forbidden(root / "nlsdesign"))
+
+
+def test_no_cycle_among_packages_or_modules(root: Path) -> None:
+    expect_none(internal_cycles(root / "nlsdesign"))
+
+
+def test_every_library_is_declared(root: Path) -> None:
+    expect_none(undeclared(root / "nlsdesign", root / "pyproject.toml"))
+
+
+# --- the drawing notices --------------------------------------------------------------------------
+
+
+def build(folder: Path, files: dict[str, str]) -> Path:
+    """Write a package with these modules; every folder becomes a package."""
+    package = folder / "nlsdesign"
+    for name, text in {"__init__": "", **files}.items():
+        file = (package / name).with_suffix(".py")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text + "\n", encoding="utf-8")
+        for parent in file.relative_to(package).parents:
+            (package / parent / "__init__.py").touch()
+    return package
+
+
+ALLOWED = {
+    "errors": "",
+    "components/cam": "from ..errors import X\nfrom . import spring",
+    "components/spring": "import casadi",
+    "model/linear": "import control\nfrom ..components.cam import Cam",
+    "analysis/sweep": "from control import StateSpace\nfrom ..model import linear",
+    "observer/gains": "from ..analysis.sweep import over",
+    "control/torque_loop": "import control.matlab\nfrom ..observer import gains",
+    "design/contour": "from ..components.cam import Cam",
+    "discrepancy/effects/friction": "from ...components import spring",
+    "export/fmu": "def check():\n    import fmpy.validation",
+    "figures/cam": "import matplotlib.pyplot as plt\nfrom ..design import contour",
+    "cli": "from . import errors\nfrom .figures import cam",
+    "__main__": "from .cli import main",
+    "__init__": "from .model.linear import x\nfrom . import errors",
+}
+
+
+def test_what_is_allowed_passes(tmp_path: Path) -> None:
+    package = build(tmp_path, ALLOWED)
+    assert list(forbidden(package)) == []
+    assert internal_cycles(package) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "text", "complaint"),
+    [
+        ("components/cam", "from ..model import flat", "components may not know model"),
+        ("components/cam", "def f():\n from ..model.flat import x", "line 2, imports nlsdesign.model.flat"),
+        ("components/cam", "if TYPE_CHECKING:\n from ..model import flat", "components may not know model"),
+        ("components/cam", "f = import_module('nlsdesign.model.flat')", "components may not know model"),
+        ("components/cam", "f = importlib.import_module('..model')", "components may not know model"),
+        ("deck", "from .components import cam", "deck may not know components"),
+        ("symbolic", "from .model import flat", "symbolic may not know model"),
+        ("simulation/run", "from ..components.cam import Cam", "simulation may not know components"),
+        ("design/solve", "from ..components.cam import Cam", "design may not know components"),
+        ("design/limits", "from ..components import Cam", "design may not know components"),
+        ("design/limits", "from ..analysis import sweep", "design may not know analysis"),
+        ("analysis/sweep", "from ..observer import gains", "analysis may not know observer"),
+        ("identification/fit", "from ..discrepancy import effects", "may not know discrepancy"),
+        ("discrepancy/locate", "from ..components import cam", "discrepancy may not know components"),
+        ("figures/cam", "from ..report import html", "figures may not know report"),
+        ("report/html", "from ..cli import main", "report may not know cli"),
+        ("model/flat", "import nlsdesign", "no room may import it"),
+        ("model/flat", "from .. import __version__", "no room may import it"),
+        ("model/flat", "import nlsdesign.model", "no room may import it"),
+        ("model/flat", "from ..erors import X", "there is no such module"),
+        ("helpers", "", "nlsdesign.helpers is in no room of the house"),
+        ("report/html", "import matplotlib.pyplot as plt", "only in figures"),
+        ("analysis/sweep", "def f():\n    import matplotlib", "only in figures"),
+        ("simulation/run", "import fmpy", "only in export"),
+        ("model/flat", "import control", "only in model.linear, analysis, observer, control"),
+        ("cli", "import studies.austin2015", "nowhere in the package"),
+    ],
+)
+def test_a_forbidden_import_is_caught(tmp_path: Path, module: str, text: str, complaint: str) -> None:
+    rooms = ["model/flat", "components/cam", "analysis/sweep", "observer/gains", "discrepancy/effects"]
+    empty = dict.fromkeys([*rooms, "cli", "report/html"], "")
+    assert list(forbidden(build(tmp_path / "before", empty))) == []
+    found = list(forbidden(build(tmp_path / "after", {**empty, module: text})))
+    assert len(found) >= 1
+    assert complaint in " ".join(found)
+
+
+@pytest.mark.parametrize(
+    ("files", "cycle"),
+    [
+        (
+            {"components/a": "from . import b", "components/b": "from . import a"},
+            {"components.a", "components.b"},
+        ),
+        (
+            {
+                "model/a": "from . import b",
+                "model/b": "from . import c",
+                "model/c": "def f():\n from . import a",
+            },
+            {"model.a", "model.b", "model.c"},
+        ),
+        # no module is in a circle, but the packages are
+        (
+            {"model/a": "", "model/b": "from ..deck import x", "deck": "from .model import a"},
+            {"model", "deck"},
+        ),
+        ({"model/a": "from . import value", "model/__init__": "from .a import x"}, {"model", "model.a"}),
+    ],
+)
+def test_a_cycle_is_caught(tmp_path: Path, files: dict[str, str], cycle: set[str]) -> None:
+    found = internal_cycles(build(tmp_path, files))
+    assert {f"nlsdesign.{name}" for name in cycle} in [set(one.split(" -> ")) for one in found]
+
+
+def test_an_undeclared_library_is_caught(tmp_path: Path) -> None:
+    project = tmp_path / "pyproject.toml"
+    project.write_text('[project]\ndependencies = ["NumPy>=2"]\noptional-dependencies = {e = ["zig"]}\n')
+    package = build(
+        tmp_path, {"deck": "import json, numpy.linalg\nimport torch\nimport zig\ndef f():\n    import zig"}
+    )
+    found = list(undeclared(package, project))
+    assert len(found) == 2
+    assert "line 2, imports torch, which pyproject.toml does not declare" in found[0]
+    assert "line 3, imports zig, which is optional" in found[1]

@@ -1,0 +1,236 @@
+"""What the project says of itself holds: docstrings, types, links, claims, sizes; the checks would notice."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests import source
+
+PRODUCT = ("nlsdesign", "models", "studies")
+TEXTS = (*PRODUCT, "tests", "docs", "benchmarks", "requirements", ".ci")
+DOCUMENTS = ("architecture.md", "conventions.md", "claims.md", "known_gaps.md")
+MOST_LINES_IN_STUDY = 120
+
+# Put together here so that this file does not contain what it looks for.
+MACHINE = re.compile(r"(?<![\w.~*-])/(?:" + "|".join(["work", "root"]) + r")/|\.\./" + "shared")
+SCRATCH = re.compile(r"(?<![\w.~*-])/" + r"tmp/")
+
+
+def python_files(root: Path, *folders: str) -> list[Path]:
+    found = [file for folder in folders for file in sorted((root / folder).rglob("*.py"))]
+    assert len(found) >= len(folders), f"no Python files in {folders}"
+    return found
+
+
+def public_files(root: Path) -> list[Path]:
+    """Modules of the package whose name, and the names of the packages around, are public."""
+    kept = {"__init__", "__main__"}
+    return [
+        file
+        for file in python_files(root, "nlsdesign")
+        if not any(
+            part.startswith("_") and part not in kept for part in file.relative_to(root).with_suffix("").parts
+        )
+    ]
+
+
+def documents(root: Path) -> list[Path]:
+    return [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+
+
+def text_files(root: Path) -> Iterator[tuple[str, str]]:
+    """Path within the project and content of every text that may be committed."""
+    inner = (file for folder in TEXTS for file in sorted((root / folder).rglob("*")))
+    top = (
+        file for file in sorted(root.iterdir()) if not file.name.startswith(".") or file.name == ".gitignore"
+    )
+    for file in (*top, *inner):
+        if file.is_file() and "__pycache__" not in file.parts:
+            content = file.read_bytes()
+            if b"\0" not in content:
+                yield file.relative_to(root).as_posix(), content.decode("utf-8", errors="replace")
+
+
+def unproven_claims(text: str, root: Path) -> Iterator[str]:
+    """Rows of the table ``| claim | test |`` that do not name a test that exists."""
+    rows = [line.strip() for line in text.splitlines() if line.strip().startswith("|")]
+    for row in rows[2:]:  # the first two are the head and the rule below it
+        claim, _, tests = row.strip("|").rpartition("|")
+        names = re.findall(r"([\w./-]+\.py)::([\w:]+)", tests)
+        if not names:
+            yield f"{claim.strip()}: names no test"
+        for file, test in names:
+            if not (root / file).is_file():
+                yield f"{claim.strip()}: there is no file {file}"
+            elif test not in source.tests_in(root / file):
+                yield f"{claim.strip()}: there is no test {test} in {file}"
+
+
+def machine_paths(name: str, text: str) -> Iterator[str]:
+    """Paths of somebody's machine; in tests a literal below the system's scratch folder may be an example."""
+    patterns = [MACHINE] if name.startswith("tests/") else [MACHINE, SCRATCH]
+    for number, line in enumerate(text.splitlines(), start=1):
+        if any(pattern.search(line) for pattern in patterns):
+            yield f"{name}, line {number}: {line.strip()[:100]}"
+
+
+def expect_none(root: Path, files: Iterable[Path], check: Callable[[Path], Iterable[str]]) -> None:
+    found = [f"{file.relative_to(root)}: {what}" for file in files for what in check(file)]
+    assert not found, "\n" + "\n".join(found)
+
+
+# --- the project as it is -------------------------------------------------------------------------
+
+
+def test_everything_public_has_a_docstring(root: Path) -> None:
+    expect_none(root, public_files(root), source.undocumented)
+
+
+def test_everything_public_is_typed(root: Path) -> None:
+    expect_none(root, public_files(root), source.untyped)
+
+
+def test_nothing_has_outgrown_its_shape(root: Path) -> None:
+    expect_none(root, python_files(root, *PRODUCT), source.misshapen)
+
+
+def test_studies_stay_short(root: Path) -> None:
+    lengths = {file.name: len(file.read_text("utf-8").splitlines()) for file in python_files(root, "studies")}
+    assert not {name: length for name, length in lengths.items() if length >= MOST_LINES_IN_STUDY}
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_the_document_is_there(root: Path, name: str) -> None:
+    assert (root / "docs" / name).read_text(encoding="utf-8").startswith("# ")
+
+
+def test_links_resolve(root: Path) -> None:
+    expect_none(root, documents(root), lambda file: source.broken_links(file, root))
+
+
+def test_each_claim_names_its_test(root: Path) -> None:
+    text = (root / "docs" / "claims.md").read_text(encoding="utf-8")
+    assert re.search(r"^\|\s*claim\s*\|\s*test\s*\|$", text, flags=re.MULTILINE | re.IGNORECASE)
+    assert text.count("\n|") >= 3, "the table of claims is empty"
+    expect_none(root, [root / "docs" / "claims.md"], lambda file: unproven_claims(text, root))
+
+
+def test_no_path_of_a_machine(root: Path) -> None:
+    texts = dict(text_files(root))
+    assert {"Makefile", "pyproject.toml", ".ci/run", "nlsdesign/errors.py"} <= set(texts)
+    found = [line for name, text in texts.items() for line in machine_paths(name, text)]
+    assert not found, "\n" + "\n".join(found)
+
+
+# --- the checks notice ----------------------------------------------------------------------------
+
+SAMPLE = '''
+"""Module."""
+def good(a: int, /, b: int, *c: int, d: int = 1, **e: int) -> None:
+    """Do."""
+def bad(a, *b, c: int, **d): ...
+def _private(a): ...
+class Law:
+    """Law."""
+    def __init__(self, a): ...
+    def force(self, x: float) -> float: ...
+    @overload
+    def rate(self, x: int) -> int: ...
+    @size.setter
+    def size(self, value: float) -> None: ...
+    def _hidden(self): ...
+class _Private:
+    def method(self, a): ...
+'''
+
+
+@pytest.fixture
+def sample(tmp_path: Path) -> Path:
+    file = tmp_path / "sample.py"
+    file.write_text(SAMPLE, encoding="utf-8")
+    return file
+
+
+def test_a_missing_docstring_is_caught(sample: Path) -> None:
+    assert list(source.undocumented(sample)) == [
+        "line 5: bad has no docstring",
+        "line 10: Law.force has no docstring",
+    ]
+    sample.write_text("x = 1", encoding="utf-8")
+    assert list(source.undocumented(sample)) == ["line 1: the module has no docstring"]
+
+
+def test_a_missing_type_is_caught(sample: Path) -> None:
+    assert list(source.untyped(sample)) == [
+        "line 5: bad has no type for a, b, d, the result",
+        "line 9: Law has no type for a, the result",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("fits", "outgrown", "complaint"),
+    [
+        ("x = 1\n" * 500, "x = 1\n" * 501, "the file has 501 lines"),
+        ("def f():\n" + "    x = 1\n" * 69, "def f():\n" + "    x = 1\n" * 70, "f has 71 lines"),
+        (
+            "class A:\n  def f(self, a, b, c, *, d, e, f, **g): ...",
+            "class A:\n  def f(self, a, b, c, *d, e, f, g, h): ...",
+            "f has 8 arguments",
+        ),
+        (
+            "class A:\n" + "".join(f"  def m{i}(self): ...\n" for i in range(12)) + "  def m0(self): ...",
+            "class A:\n" + "".join(f"  def m{i}(self): ...\n" for i in range(13)),
+            "A has 13 methods",
+        ),
+    ],
+)
+def test_an_outgrown_shape_is_caught(sample: Path, fits: str, outgrown: str, complaint: str) -> None:
+    sample.write_text(fits, encoding="utf-8")
+    assert list(source.misshapen(sample)) == []
+    sample.write_text(outgrown, encoding="utf-8")
+    assert complaint in " ".join(source.misshapen(sample))
+
+
+def test_a_broken_link_is_caught(tmp_path: Path) -> None:
+    (tmp_path / "there.md").write_text("# The cam, and its `law`\n", encoding="utf-8")
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# Page\n[a](there.md) ![b](gone.png) [c](there.md#the-cam-and-its-law) [d](there.md#nowhere)\n"
+        "[e](#page) [f](#gone) [g](https://example.org/x) `[h](code.md)` [i](../outside.md)\n"
+        "```\n[j](code.md)\n```\n\n[k]: lost.md\n<img src='lost.svg'>\n",
+        encoding="utf-8",
+    )
+    (tmp_path.parent / "outside.md").touch()
+    found = [what.partition(":")[0] for what in source.broken_links(page, tmp_path)]
+    assert found == ["gone.png", "there.md#nowhere", "#gone", "../outside.md", "lost.md", "lost.svg"]
+
+
+def test_an_unproven_claim_is_caught(tmp_path: Path) -> None:
+    (tmp_path / "test_a.py").write_text("def test_x(): ...\nclass TestB:\n    def test_y(self): ...\n")
+    table = (
+        "| claim | test |\n| --- | --- |\n| one | `test_a.py::test_x`, `test_a.py::TestB::test_y[1]` |\n"
+        "| two | test_a.py::test_z |\n| three | test_b.py::test_x |\n| four | tested by hand |\n"
+    )
+    assert list(unproven_claims(table, tmp_path)) == [
+        "two: there is no test test_z in test_a.py",
+        "three: there is no file test_b.py",
+        "four: names no test",
+    ]
+
+
+def test_a_path_of_a_machine_is_caught() -> None:
+    slash = "/"
+    bad = [
+        f"see {slash}work{slash}x",
+        f"'{slash}root{slash}.cache'",
+        f"..{slash}shared",
+        f"{slash}tmp{slash}x",
+    ]
+    good = ["framework/work/x", "https://example.org/root/x", "a/tmp/b", "./work/x", "shared/paper"]
+    assert list(machine_paths("docs/a.md", "\n".join(good))) == []
+    assert len(list(machine_paths("docs/a.md", "\n".join(bad)))) == 4
+    assert len(list(machine_paths("tests/unit/test_a.py", "\n".join(bad)))) == 3
