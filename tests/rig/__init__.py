@@ -1,0 +1,28 @@
+"""A bench rig simulated without any model code of the package: records with hidden effects.
+
+The bench turns the cam of a cam–rubber actuator by a servo, with the load side held fast, and records
+angle, current and force.  Its formulations are chosen to differ from those of a smooth symbolic model:
+friction, gear play and cable are set-valued laws advanced by impulses, hysteresis is a set of dry sliders,
+the step is fixed at 20 kHz.  Only numpy and the standard library are used.
+
+>>> records = make_records(ACTUATORS["arm"], {"coulomb_friction": 1.0}, seed=3)
+"""
+
+from .actuators import ACTUATORS, Actuator
+from .declaration import write_collection, write_declaration, write_records, write_set
+from .effects import EFFECTS, OUTSIDE_ANY_CATALOGUE, Hidden
+from .records import make_records, truth
+
+__all__ = [
+    "ACTUATORS",
+    "EFFECTS",
+    "OUTSIDE_ANY_CATALOGUE",
+    "Actuator",
+    "Hidden",
+    "make_records",
+    "truth",
+    "write_collection",
+    "write_declaration",
+    "write_records",
+    "write_set",
+]

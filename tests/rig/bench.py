@@ -1,0 +1,174 @@
+"""The bench: servo, motor side, cam side, friction and gear play, by non-smooth time stepping.
+
+    Jₘ dωₘ/dt = T I − b ωₘ + disturbance − ripple − friction − contact
+    J_c dω_c/dt = contact − h(θ_c) F           I = clip(k_P (θ* − θₘ) + k_D (θ̇* − ωₘ), ±I_max)
+
+Friction and contact are set-valued (Coulomb: any torque up to the level at standstill; unilateral stops).
+They are never written as functions of speed or penetration: each step advances momentum freely and then finds
+the impulse that satisfies the law at the end of the step (Moreau 1988, Unilateral contact and dry friction in
+finite freedom dynamics),
+
+    ω⁺ = prox(ω_free) = sign(ω_free) max(|ω_free| − level Δt/J, 0)
+
+with the step Δt, so a stuck drive has exactly zero speed.  Without play both sides are one inertia.
+Positions follow with the new speed (leapfrog).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import exp, sin
+
+import numpy as np
+
+from .actuators import Actuator, Cam, Drivetrain
+from .commands import STEP, Command
+from .effects import Hidden
+from .rubber import pull_of
+
+SERVO_BANDWIDTH = 75.0  # rad/s
+SERVO_DAMPING = 0.8
+CURRENT_LIMIT = 12.0  # A
+CAM_GRID = 5.0e-4  # rad
+CAM_END = 1.35  # rad; nothing turns as far as this
+SPOT_PLACE, SPOT_WIDTH = 0.25, 0.06  # rad, of the rubbing spot
+
+
+@dataclass(frozen=True)
+class Servo:
+    """PD servo on the angle of the motor side, tuned on the declared numbers."""
+
+    stiffness: float  # A/rad
+    damping: float  # A·s/rad
+    limit: float = CURRENT_LIMIT  # A
+
+    @classmethod
+    def for_actuator(cls, declared: Actuator) -> Servo:
+        """k_P = J Ω² / T, k_D = 2 ζ J Ω / T."""
+        gain = declared.drivetrain.inertia * SERVO_BANDWIDTH / declared.drivetrain.torque_per_ampere
+        return cls(stiffness=gain * SERVO_BANDWIDTH, damping=2.0 * SERVO_DAMPING * gain)
+
+
+@dataclass(frozen=True)
+class History:
+    """True signals at every step of the simulation, arrays of shape (n,)."""
+
+    time: np.ndarray  # s
+    motor_angle: np.ndarray  # rad
+    cam_angle: np.ndarray  # rad
+    motor_speed: np.ndarray  # rad/s, half a step before the angle
+    current: np.ndarray  # A
+    force: np.ndarray  # N, cable
+    extension: np.ndarray  # m, rubber
+
+
+def _cam_tables(cam: Cam) -> tuple[list[float], list[float]]:
+    """δ and h on the grid; δ is the exact integral of the linearly interpolated h."""
+    angles = np.arange(round(CAM_END / CAM_GRID) + 2) * CAM_GRID
+    lever_arm = np.asarray(cam.lever_arm(angles))
+    steps = 0.5 * CAM_GRID * (lever_arm[1:] + lever_arm[:-1])
+    return np.concatenate([[0.0], np.cumsum(steps)]).tolist(), lever_arm.tolist()
+
+
+def _friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | None:
+    """Level of dry friction (N·m) from speed, angle and spring torque; None where there is none."""
+    if not (hidden.friction or hidden.breakaway or hidden.load_friction or hidden.spot_friction):
+        return None
+    base, rise, slow = hidden.friction, hidden.breakaway, hidden.stribeck_speed
+    share, spot = hidden.load_friction, hidden.spot_friction
+
+    def level(speed: float, angle: float, load: float) -> float:
+        total = base + share * abs(load)
+        if rise:
+            total += rise * exp(-((speed / slow) ** 2))
+        if spot:
+            total += spot * exp(-(((angle - SPOT_PLACE) / SPOT_WIDTH) ** 2))
+        return total
+
+    return level
+
+
+def _prox(speed: float, threshold: float) -> float:
+    """Speed after dry friction that can change it by at most the threshold."""
+    if speed > threshold:
+        return speed - threshold
+    if speed < -threshold:
+        return speed + threshold
+    return 0.0
+
+
+def _gear_play(drive: Drivetrain, gap: float) -> Callable[..., tuple[float, float]]:
+    """Step of the speeds of motor side and cam side with a gap between stops at ±gap/2, perfectly plastic.
+
+    First free flight; where that would pass a stop, both sides take the speed difference `closing` that ends
+    at the stop, and conserve their momentum together.
+    """
+    cam_inertia = drive.cam_share * drive.inertia
+    motor_inertia = drive.inertia - cam_inertia
+    half = 0.5 * gap
+
+    def advance(
+        speed: float, cam_speed: float, lead: float, push: float, load: float, friction: float
+    ) -> tuple[float, float]:
+        free = _prox(speed + STEP * push / motor_inertia, friction / motor_inertia)
+        flight = cam_speed - STEP * load / cam_inertia
+        closing = min(max(free - flight, (-half - lead) / STEP), (half - lead) / STEP)
+        if closing == free - flight:
+            return free, flight
+        momentum = motor_inertia * speed + STEP * push + cam_inertia * (flight + closing)
+        together = _prox(momentum / drive.inertia, friction / drive.inertia)
+        return together, together - closing
+
+    return advance
+
+
+def _feeds(servo: Servo, hidden: Hidden, command: Command) -> Iterator[tuple[float, float]]:
+    """Part of the current that the command fixes (A), and disturbing torque (N·m), step by step."""
+    feed = servo.stiffness * command.angle + servo.damping * command.speed
+    turns = hidden.disturbance_frequency * command.time
+    push = hidden.disturbance * np.sin(2.0 * np.pi * turns + hidden.disturbance_phase)
+    return zip(feed.tolist(), push.tolist(), strict=True)
+
+
+def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) -> History:
+    """Run one record from rest."""
+    drive = built.drivetrain
+    per_ampere, viscosity, inertia = drive.torque_per_ampere, drive.viscosity, drive.inertia
+    k_p, k_d, limit = servo.stiffness, servo.damping, servo.limit
+    delta, lever = _cam_tables(built.cam)
+    pull = pull_of(built.rubber, hidden, STEP)
+    level = _friction_level(hidden)
+    play = _gear_play(drive, hidden.gap) if hidden.gap else None
+    ripple, order, phase = hidden.ripple, hidden.ripple_order, hidden.ripple_phase
+    offset, per_grid = hidden.cam_offset, 1.0 / CAM_GRID
+    motor = cam = speed = cam_speed = friction = 0.0
+    rows: list[tuple[float, ...]] = []
+
+    for wanted, push in _feeds(servo, hidden, command):
+        angle = cam - offset
+        place = abs(angle) * per_grid
+        j = int(place)
+        part = place - j
+        left = lever[j]
+        arm = left + part * (lever[j + 1] - left)
+        force, extension = pull(delta[j] + 0.5 * part * CAM_GRID * (left + arm))
+        load = arm * force if angle >= 0.0 else -arm * force
+        current = wanted - k_p * motor - k_d * speed
+        if not -limit <= current <= limit:
+            current = limit if current > 0.0 else -limit
+        rows.append((motor, cam, speed, current, force, extension))
+
+        push += per_ampere * current - viscosity * speed
+        if ripple:
+            push -= ripple * sin(order * motor + phase)
+        if level is not None:
+            friction = STEP * level(speed, motor, load)
+        if play is not None:
+            speed, cam_speed = play(speed, cam_speed, motor - cam, push, load, friction)
+            motor += STEP * speed
+            cam += STEP * cam_speed
+        else:
+            speed = _prox(speed + STEP * (push - load) / inertia, friction / inertia)
+            cam = motor = motor + STEP * speed
+    return History(command.time, *np.array(rows).T)
