@@ -1,0 +1,169 @@
+"""Figures as SVG: the same bytes for the same figure, with colours that follow the page."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from ..errors import ExportError, nearest
+from .style import STYLE, TONES, alternative_text
+
+_SVG = "{http://www.w3.org/2000/svg}"
+_LINK = "{http://www.w3.org/1999/xlink}href"
+_NUMBER = re.compile(r"-?\d+\.\d+")
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
+_POINTED = re.compile(r"#([\w-]+)")
+_GEOMETRY = ("d", "x", "y", "points", "width", "height")
+SUFFIXES = (".svg", ".png")
+
+_VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
+
+
+def svg_text(figure: Figure) -> str:
+    """Return a figure as a file of its own: light colours on white.
+
+    Parameters
+    ----------
+    figure
+        Any figure.
+    """
+    stream = io.StringIO()
+    with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}):
+        metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
+        figure.savefig(stream, format="svg", metadata=metadata)
+    return stream.getvalue()
+
+
+def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
+    """Return a figure as an SVG element to stand in an HTML page.
+
+    Colours of the palette become CSS variables such as ``var(--blue)``, identifiers start with the key (they
+    must be unique on the page), coordinates are rounded to a hundredth of a point, text stays text.
+
+    Parameters
+    ----------
+    figure
+        Any figure.
+    key
+        Word that no other figure of the page uses.
+    alternative
+        Words for those who cannot see it; those attached to the figure by default.
+    """
+    stream = io.StringIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    root = ET.fromstring(stream.getvalue())
+    _drop(root)
+    kept = {name for element in root.iter() for name in _pointed_at(element)}
+    kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
+    for element in root.iter():
+        _mend(element, key, kept)
+    for name in ("width", "height", "version"):
+        root.attrib.pop(name, None)
+    root.set("role", "img")
+    root.set("aria-label", alternative or alternative_text(figure))
+    ET.register_namespace("", _SVG[1:-1])
+    return ET.tostring(root, encoding="unicode")
+
+
+def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = ".svg") -> list[Path]:
+    """Write figures as files of their own; each appears whole or not at all.
+
+    Parameters
+    ----------
+    folder
+        Is made where it does not exist.
+    figures
+        By name of the file without suffix.
+    suffix
+        ``".svg"`` or ``".png"`` (200 dots per inch).
+
+    Raises
+    ------
+    ExportError
+        If the suffix is another, or a file cannot be written.
+    """
+    if suffix not in SUFFIXES:
+        raise ExportError(
+            f"figures as '{suffix}'", "is not a format of figures", did_you_mean=nearest(suffix, SUFFIXES),
+            next_step=f"use one of {', '.join(SUFFIXES)}",
+        )  # fmt: skip
+    return [
+        _written(Path(folder) / f"{name}{suffix}", _content(figure, suffix))
+        for name, figure in figures.items()
+    ]
+
+
+def _content(figure: Figure, suffix: str) -> bytes:
+    if suffix == ".svg":
+        return svg_text(figure).encode()
+    stream = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _written(path: Path, content: bytes) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, draft = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(content)
+            os.chmod(draft, 0o644)
+            os.replace(draft, path)
+        finally:
+            Path(draft).unlink(missing_ok=True)
+    except OSError as error:
+        raise ExportError(
+            str(path), f"cannot be written ({error.strerror})", next_step="name another folder"
+        ) from error
+    return path
+
+
+def _drop(root: ET.Element) -> None:
+    """Remove what would act on the whole page (a style for ``*``) or says nothing there (metadata)."""
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
+                parent.remove(child)
+
+
+def _pointed_at(element: ET.Element) -> set[str]:
+    links = [element.get(_LINK, ""), element.get("clip-path", ""), element.get("style", "")]
+    return {name for text in links for name in _POINTED.findall(text)}
+
+
+def _mend(element: ET.Element, key: str, kept: set[str]) -> None:
+    name = element.get("id")
+    if name is not None:
+        del element.attrib["id"]
+        if name in kept:
+            element.set("id", f"{key}-{name}")
+    if _LINK in element.attrib:
+        element.set("href", element.attrib.pop(_LINK).replace("#", f"#{key}-"))
+    if "clip-path" in element.attrib:
+        element.set("clip-path", element.get("clip-path", "").replace("url(#", f"url(#{key}-"))
+    if "style" in element.attrib:
+        style = element.get("style", "").replace("url(#", f"url(#{key}-")
+        element.set("style", _COLOUR.sub(lambda m: _VARIABLES.get(m[0].lower(), m[0]), style))
+    for attribute in ("fill", "stroke"):
+        # Attributes know no variables, styles do.
+        if element.get(attribute, "").lower() in _VARIABLES:
+            colour = _VARIABLES[element.attrib.pop(attribute).lower()]
+            element.set("style", f"{attribute}: {colour}; {element.get('style', '')}")
+    for attribute in _GEOMETRY:
+        if attribute in element.attrib:
+            element.set(attribute, _NUMBER.sub(_rounded, " ".join(element.get(attribute, "").split())))
+
+
+def _rounded(match: re.Match[str]) -> str:
+    return f"{float(match[0]):.2f}".rstrip("0").rstrip(".") or "0"

@@ -1,0 +1,185 @@
+"""Torque over the angle: against the target, and against what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ..design import Target
+from ..errors import ValueRangeError
+from ..identification.metrics import Agreement
+from .lines import thinned
+from .numbers import root_mean_square, significant
+from .style import BLUE, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled
+
+Floats = NDArray[np.float64]
+Curve = tuple[Floats, Floats]
+"""Angles in rad and torques in N·m, shape (n,) each."""
+
+
+@styled
+def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figure:
+    """Draw designs against the target with its tolerance band; below, how far they are off.
+
+    Parameters
+    ----------
+    target
+        Torque curve that is wanted.
+    designs
+        By label.
+    """
+    figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[2.2, 1])
+    grid = np.linspace(0.0, target.last_angle, 200)
+    degrees = np.degrees(grid)
+    low, high = target.band(grid)
+    half = float(high[-1] - target.torque(grid)[-1])
+    if half > 0.0:
+        label = f"tolerance ± {significant(1e3 * half, 3)} mN·m"
+        upper.fill_between(degrees, low, high, color=GRID.light, label=label)
+        lower.axhspan(-1e3 * half, 1e3 * half, color=GRID.light)
+    upper.plot(
+        degrees, target.torque(grid), color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target"
+    )
+    lower.axhline(0.0, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)))
+    found = []
+    for number, (label, (angle, torque)) in enumerate(designs.items()):
+        tone, dash, _ = look(number)
+        error = torque - target.torque(np.clip(angle, 0.0, target.last_angle))
+        rms = root_mean_square(error)
+        found.append(f"{label} {significant(1e3 * rms, 2)} mN·m")
+        upper.plot(np.degrees(angle), torque, color=tone, linestyle=dash, label=label)
+        lower.plot(
+            np.degrees(angle),
+            1e3 * error,
+            color=tone,
+            linestyle=dash,
+            label=f"{label}: rms {significant(1e3 * rms, 2)} mN·m",
+        )
+    _label(upper, "torque in N·m", "Torque of the spring")
+    _label(lower, "error in mN·m", "Design minus target")
+    lower.set_xlabel("angle in degrees")
+    return described(
+        figure,
+        f"Torque over the angle up to {degrees[-1]:.0f}° and {target.largest:.1f} N·m, designs against "
+        f"target, with the error below. Root mean square error: {'; '.join(found)}.",
+    )
+
+
+@styled
+def torque_against_measured(
+    models: Mapping[str, Curve], measured: Mapping[str, Curve], *, notes: Mapping[str, str] | None = None
+) -> Figure:
+    """Draw models against measured points; below, model minus measurement at those points.
+
+    Parameters
+    ----------
+    models, measured
+        By label. Angles of a model ascend; each model is compared with each measurement.
+    notes
+        What the legend says behind the label of a model, for instance its error in the paper's metric.
+    """
+    _need("measured points", measured)
+    figure, (upper, lower) = panels(2, height=4.8, sharex=True, height_ratios=[2.2, 1])
+    lower.axhline(0.0, color=MUTED.light, linewidth=0.8)
+    said = []
+    for number, (label, (angle, torque)) in enumerate(models.items()):
+        tone, dash, _ = look(number)
+        note = (notes or {}).get(label, "")
+        said.append(f"{label} ({note})" if note else label)
+        upper.plot(*thinned(np.degrees(angle), torque), color=tone, linestyle=dash, label=": ".join(
+            part for part in (label, note) if part))  # fmt: skip
+        for place, (at, points) in enumerate(measured.values()):
+            marker = look(place).marker
+            inside = (at >= angle[0]) & (at <= angle[-1])
+            error = np.interp(at[inside], angle, torque) - points[inside]
+            lower.plot(
+                np.degrees(at[inside]), error, color=tone, linestyle=dash, linewidth=0.8, marker=marker
+            )
+    for place, (label, (at, points)) in enumerate(measured.items()):
+        marker = look(place).marker
+        upper.plot(np.degrees(at), points, color=INK.light, linestyle="none", marker=marker, label=label,
+                   markerfacecolor="none", markeredgewidth=1.2, markersize=5.5)  # fmt: skip
+    _label(upper, "torque in N·m", "Torque of the spring", columns=2)
+    lower.set_ylabel("error in N·m")
+    lower.set_title("Model minus measurement")
+    lower.set_xlabel("angle in degrees")
+    upper.margins(x=0.02)
+    return described(
+        figure,
+        f"Torque over the angle: {' and '.join(measured)} against {' and '.join(said)}, and the gap.",
+    )
+
+
+@styled
+def torque_loops(loops: Mapping[str, tuple[Curve, Curve]]) -> Figure:
+    """Draw measured and simulated loops of torque over angle, one panel each.
+
+    The area of a loop is the energy lost per cycle; it stands in the title of its panel.
+
+    Parameters
+    ----------
+    loops
+        By title: measured, then simulated loop, in the order in which they were run through.
+    """
+    _need("loops", loops)
+    figure, axes = panels(1, len(loops), height=3.5, sharey=True)
+    words = []
+    for panel, (title, (measured, model)) in zip(axes, loops.items(), strict=True):
+        panel.plot(*_degrees(measured), color=INK.light, linewidth=1.1, label="measured")
+        panel.plot(*_degrees(model), color=BLUE.light, linestyle=DASHES[1], label="model")
+        areas = [significant(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
+        words.append(f"{title}: {areas[0]} mJ measured, {areas[1]} mJ in the model")
+        panel.set_title(f"{title}, lost per cycle: {areas[0]} mJ measured, {areas[1]} mJ model", fontsize=8.5)
+        panel.set_xlabel("angle in degrees")
+        panel.margins(x=0.03)
+    axes[0].set_ylabel("torque in N·m")
+    axes[0].legend(loc="upper left")
+    return described(
+        figure, f"Loops of torque over angle, measured and simulated. Energy lost: {'; '.join(words)}."
+    )
+
+
+def metric_note(agreement: Agreement, unit: str = "N·m") -> str:
+    """Return the paper's two metrics as a note for a legend: ``13.1 %, 0.083 N·m rms``.
+
+    Parameters
+    ----------
+    agreement
+        Of a model with a measurement.
+    unit
+        Of the measured quantity.
+    """
+    return f"{significant(agreement.relative)} %, {significant(agreement.rmse, 2)} {unit} rms"
+
+
+def loop_area(angle: Floats, torque: Floats) -> float:
+    """Return ∮τ dθ of a loop that is closed by a straight line, in J.
+
+    Positive where the loop is run through as a passive spring does it: the torque leads the angle.
+
+    Parameters
+    ----------
+    angle, torque
+        Shape (n,), in rad and N·m, in the order of time.
+    """
+    x, y = np.append(angle, angle[0]), np.append(torque, torque[0])
+    return float(np.sum(np.diff(x) * (y[1:] + y[:-1]) / 2))
+
+
+def _degrees(curve: Curve) -> tuple[Floats, Floats]:
+    return thinned(np.degrees(curve[0]), curve[1])
+
+
+def _label(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
+    axes.set_ylabel(ordinate)
+    axes.set_title(title)
+    legend(axes, columns=columns)
+
+
+def _need(what: str, given: Mapping[str, object]) -> None:
+    if not given:
+        raise ValueRangeError(what, "there are none to draw", next_step="leave this figure out")

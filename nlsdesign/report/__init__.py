@@ -1,0 +1,36 @@
+"""Reports: sections composed into one self-contained file of HTML."""
+
+from .cam import CamSection
+from .mathml import EquationsSection
+from .page import report_text, write_report
+from .sections import (
+    Chapter,
+    FigureSection,
+    FileSection,
+    KeyNumber,
+    NumbersSection,
+    Section,
+    TableSection,
+    TextSection,
+)
+from .tables import PublishedNumber, comparison_table, numbers_table
+from .verdict import VerdictSection
+
+__all__ = [
+    "CamSection",
+    "Chapter",
+    "EquationsSection",
+    "FigureSection",
+    "FileSection",
+    "KeyNumber",
+    "NumbersSection",
+    "PublishedNumber",
+    "Section",
+    "TableSection",
+    "TextSection",
+    "VerdictSection",
+    "comparison_table",
+    "numbers_table",
+    "report_text",
+    "write_report",
+]

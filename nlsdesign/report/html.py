@@ -1,0 +1,46 @@
+"""Text that is HTML already, and how plain text becomes it."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+
+_CODE = re.compile(r"`([^`\n]+)`")
+
+
+class Html(str):
+    """Text that is HTML already; templates escape every other text."""
+
+    __slots__ = ()
+
+    def __html__(self) -> str:
+        """Return the text as it is: this is what tells templates not to escape it."""
+        return str(self)
+
+
+def words(text: str) -> Html:
+    """Return plain text as HTML, escaped; names between backticks are set as code.
+
+    Parameters
+    ----------
+    text
+        Plain text.
+
+    Examples
+    --------
+    >>> words("`a.b` < 3")
+    '<code>a.b</code> &lt; 3'
+    """
+    return Html(_CODE.sub(r"<code>\1</code>", escape(text)))
+
+
+def prose(text: str) -> Html:
+    """Return paragraphs as HTML; empty lines separate them.
+
+    Parameters
+    ----------
+    text
+        Plain text, as for :func:`words`.
+    """
+    paragraphs = [part.strip() for part in re.split(r"\n\s*\n", text) if part.strip()]
+    return Html("\n".join(f"<p>{words(part)}</p>" for part in paragraphs))

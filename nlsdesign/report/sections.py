@@ -1,0 +1,294 @@
+"""What a report is made of: chapters, words, figures, tables, key numbers and lists of files."""
+
+from __future__ import annotations
+
+import os
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import quote
+
+from ..errors import ExportError, ValueRangeError
+from ..figures import Figure, alternative_text, inline_svg
+from ..figures.numbers import compact, significant
+from .html import Html
+
+Cell = str | int | float
+
+_NUMBER = re.compile(r"^[−-]?\d[\d.]*(·10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?( ?%)?$")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a section stands.
+
+    Parameters
+    ----------
+    key
+        Word that no other section of the page uses; identifiers start with it.
+    folder
+        Folder of the report, for relative links.
+    """
+
+    key: str
+    folder: Path
+
+    def inner(self, number: int) -> Place:
+        """Return the place of a section inside this one.
+
+        Parameters
+        ----------
+        number
+            Its number there.
+        """
+        return Place(f"{self.key}-{number}", self.folder)
+
+
+@dataclass(frozen=True, eq=False)
+class Section(ABC):
+    """A piece of a report with a heading.
+
+    Parameters
+    ----------
+    title
+        Heading; plain text.
+    """
+
+    title: str
+    template: ClassVar[str]
+
+    @abstractmethod
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return what the template of the section shows.
+
+        Parameters
+        ----------
+        place
+            Where the section stands.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Chapter(Section):
+    """A heading above the sections that follow it, with a few words.
+
+    Parameters
+    ----------
+    text
+        Paragraphs, separated by empty lines; names between backticks.
+    """
+
+    text: str = ""
+    template: ClassVar[str] = "chapter.html"
+
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return the words."""
+        return {"text": self.text}
+
+
+@dataclass(frozen=True, eq=False)
+class TextSection(Section):
+    """Words, and text whose columns matter, such as the drawing of an assembly.
+
+    Parameters
+    ----------
+    text
+        Paragraphs, separated by empty lines; names between backticks.
+    drawing
+        Shown letter by letter in a font of fixed width.
+    """
+
+    text: str = ""
+    drawing: str = ""
+    template: ClassVar[str] = "text.html"
+
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return words and drawing."""
+        return {"text": self.text, "drawing": self.drawing}
+
+
+@dataclass(frozen=True, eq=False)
+class FigureSection(Section):
+    """A figure with a caption: what is seen, what it means, what is assumed.
+
+    Parameters
+    ----------
+    figure
+        From :mod:`nlsdesign.figures` or any other matplotlib figure.
+    caption
+        What is seen.
+    means, assumed
+        What it means, and what was assumed.
+    alternative
+        Words for those who cannot see it; by default those that come with the figure.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are no such words.
+    """
+
+    figure: Figure
+    _: KW_ONLY
+    caption: str
+    means: str = ""
+    assumed: str = ""
+    alternative: str = ""
+    template: ClassVar[str] = "figure.html"
+
+    def __post_init__(self) -> None:
+        if not (self.alternative or alternative_text(self.figure)):
+            raise ValueRangeError(
+                f"figure '{self.title}'", "has no words for those who cannot see it",
+                next_step="give alternative=\"...\", or draw it with nlsdesign.figures",
+            )  # fmt: skip
+
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return the figure as inline SVG, and its words."""
+        svg = Html(inline_svg(self.figure, place.key, alternative=self.alternative))
+        return {"svg": svg, "caption": self.caption, "means": self.means, "assumed": self.assumed}
+
+
+@dataclass(frozen=True, eq=False)
+class TableSection(Section):
+    """A table.
+
+    Parameters
+    ----------
+    columns
+        Headings.
+    rows
+        Texts and numbers; numbers are shown with four digits. A column of numbers stands right.
+    caption
+        What it shows.
+    marked
+        Numbers of rows that stand out.
+    folded
+        Whether it is closed until the reader opens it; for long tables.
+
+    Raises
+    ------
+    ValueRangeError
+        If a row has not as many cells as there are columns.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    _: KW_ONLY
+    caption: str = ""
+    marked: frozenset[int] = frozenset()
+    folded: bool = False
+    template: ClassVar[str] = "table.html"
+
+    def __post_init__(self) -> None:
+        for number, row in enumerate(self.rows, start=1):
+            if len(row) != len(self.columns):
+                raise ValueRangeError(
+                    f"table '{self.title}', row {number}",
+                    f"has {len(row)} cells for {len(self.columns)} columns",
+                )
+
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return the cells as text, each with whether it is a number."""
+        texts = [[_shown(cell) for cell in row] for row in self.rows]
+        right = [_is_numeric([row[i] for row in texts]) for i in range(len(self.columns))]
+        rows = [
+            {"cells": list(zip(row, right, strict=True)), "marked": i in self.marked}
+            for i, row in enumerate(texts)
+        ]
+        head = list(zip(self.columns, right, strict=True))
+        return {"head": head, "rows": rows, "caption": self.caption, "folded": self.folded}
+
+
+def _shown(cell: Cell) -> str:
+    return compact(cell, 4) if isinstance(cell, float) else str(cell)
+
+
+def _is_numeric(texts: list[str]) -> bool:
+    return any(_NUMBER.match(text) for text in texts) and all(
+        _NUMBER.match(text) or text in ("", "–") for text in texts
+    )
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """One number that a reader should take home.
+
+    Parameters
+    ----------
+    label
+        What it is.
+    value
+        Number with unit, as text.
+    note
+        What it is to be compared with, or where it holds.
+    """
+
+    label: str
+    value: str
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class NumbersSection(Section):
+    """Key numbers in large letters.
+
+    Parameters
+    ----------
+    numbers
+        In the order of reading.
+    """
+
+    numbers: tuple[KeyNumber, ...]
+    template: ClassVar[str] = "numbers.html"
+
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return the numbers."""
+        return {"numbers": self.numbers}
+
+
+@dataclass(frozen=True, eq=False)
+class FileSection(Section):
+    """Files that were written beside the report, with links relative to it.
+
+    Parameters
+    ----------
+    files
+        What each is, by path; folders too.
+    caption
+        What to do with them.
+    """
+
+    files: Mapping[Path, str] = field(default_factory=dict)
+    _: KW_ONLY
+    caption: str = ""
+    template: ClassVar[str] = "files.html"
+
+    def content(self, place: Place) -> Mapping[str, Any]:
+        """Return name, link, size and description of each file.
+
+        Raises
+        ------
+        ExportError
+            If a file does not exist: a report has no dead links.
+        """
+        rows = []
+        for path, what in self.files.items():
+            if not path.exists():
+                raise ExportError(
+                    f"file '{path}' of the report", "does not exist", next_step="write it before the report"
+                )
+            shown = Path(os.path.relpath(path, place.folder)).as_posix() + ("/" if path.is_dir() else "")
+            size = "" if path.is_dir() else _size(path.stat().st_size)
+            rows.append({"name": shown, "link": quote(shown), "size": size, "what": what})
+        return {"rows": rows, "caption": self.caption}
+
+
+def _size(count: int) -> str:
+    for unit, factor in (("MB", 1e6), ("kB", 1e3)):
+        if count >= factor:
+            return f"{significant(count / factor, 2 if count / factor < 100 else 3)} {unit}"
+    return f"{count} B"

@@ -1,0 +1,129 @@
+"""Made-up but plausible results, small enough to draw in every test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from nlsdesign import figures
+from nlsdesign.analysis import Chart
+from nlsdesign.design import ExponentialTorque, contour_from_curvature
+from nlsdesign.model import Variable
+from nlsdesign.observer import ErrorStability
+from nlsdesign.quantity import degrees
+from nlsdesign.simulation import Trace
+
+TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0, tolerance=0.05)
+TIME = np.linspace(0.0, 1.0, 4001)
+
+
+def motion() -> figures.CamMotion:
+    """A convex cam whose radius of curvature falls from 9 to 4 mm, with a stiffening rubber."""
+    nodes = np.linspace(0.0, 1.3, 14)
+    contour = contour_from_curvature(
+        nodes, np.linspace(9e-3, 4e-3, 14), first_slope=5e-3, anchor_distance=25e-3
+    )
+    return figures.cam_motion(
+        contour, lambda e: 9e3 * e + 6e5 * e**2, elements=2.0, rest_length=12.5e-3, pretension=4e-3, count=41
+    )
+
+
+def chart(scale: float = 1.0, *, rank: float = 3.0) -> Chart:
+    """Not observable at zero."""
+    angle = np.radians(np.linspace(-50.0, 50.0, 41))
+    size = np.abs(np.sin(angle))
+    with np.errstate(divide="ignore"):
+        columns = {
+            "observability.rank": np.where(size > 0.0, rank, rank - 1.0),
+            "observability.condition": scale * 40.0 / size,
+            "deviation.model": 2e-3 * np.sqrt(size),
+            "deviation.best": 1.2e-3 * np.sqrt(size),
+            "decay": -8.0 * size,
+            "stiffness.slow": 8.0 * size,
+            "stiffness.fast": 9.0 * size,
+        }
+    names = tuple(Variable(name, "1", name) for name in columns)
+    return Chart(
+        Variable("motor.angle", "rad", "angle"), angle, names, np.array(list(columns.values())).T, {}
+    )
+
+
+def torque() -> np.ndarray:
+    return 2.0 * np.sin(2 * np.pi * 2.0 * TIME) ** 3
+
+
+def loop(lag: float) -> tuple[np.ndarray, np.ndarray]:
+    phase = np.linspace(0.0, 2 * np.pi, 3000, endpoint=False)
+    return 0.7 * np.sin(phase), 2.0 * np.sin(phase + lag)
+
+
+def closed_loop() -> figures.ClosedLoop:
+    signals = {
+        "reference": np.interp(TIME + 0.01, TIME, torque()),
+        "plant.spring.torque": torque(),
+        "observer.spring.torque": torque() + 0.02 * np.sin(80 * TIME),
+        "plant.motor.current": 9.0 * np.cos(12 * TIME),
+    }
+    return figures.closed_loop_of(
+        Trace(TIME, signals, dict.fromkeys(signals, "N*m")),
+        desired="reference",
+        true="plant.spring.torque",
+        estimated="observer.spring.torque",
+        current="plant.motor.current",
+        current_limit=12.0,
+    )
+
+
+def held_out() -> figures.HeldOut:
+    noise = 0.08 * np.random.default_rng(7).standard_normal(len(TIME))
+    force = 20.0 * torque()
+    return figures.HeldOut(TIME, force + noise, force + np.sign(force), 1.001 * force, "force", "N", 0.08)
+
+
+RECORDS = (
+    figures.RecordError("steps", 1.4, 0.15, 0.09, False),
+    figures.RecordError("multisine", 1.25, 0.13, 0.085, True),
+    figures.RecordError("slow sine", 0.9, 0.11, 0.08, False),
+)
+SHARES = (
+    figures.CandidateShare("second_relaxation", 0.31),
+    figures.CandidateShare("coulomb_friction", 0.97, True),
+    figures.CandidateShare("force_sensor_delay", -0.02),
+)
+STABILITY = ErrorStability(np.linspace(-0.9, 0.9, 31), np.full(31, 0.97), False, True)
+
+
+def against_target() -> figures.Figure:
+    angle = np.linspace(0.0, TARGET.last_angle, 90)
+    return figures.torque_against_target(TARGET, {"cam of the deck": (angle, TARGET.torque(angle) + 0.01)})
+
+
+def against_measured() -> figures.Figure:
+    angle, points = np.linspace(-0.8, 0.8, 161), np.radians(np.arange(-40.0, 45.0, 5.0))
+    return figures.torque_against_measured(
+        {"model": (angle, 4.3 * angle**3), "Hooke fit": (angle, 2.0 * angle)},
+        {"measured": (points, 4.4 * points**3)},
+        notes={"model": "13.1 %"},
+    )
+
+
+FIGURES: dict[str, Callable[[], figures.Figure]] = {
+    "cam_positions": lambda: figures.cam_positions(motion()),
+    "torque_curve": lambda: figures.torque_curve(motion(), at=30),
+    "torque_against_target": against_target,
+    "torque_against_measured": against_measured,
+    "torque_loops": lambda: figures.torque_loops({"25°": (loop(0.1), loop(0.12))}),
+    "observability": lambda: figures.observability_over_angle(
+        {"F_M": chart(), "published": chart(3.0, rank=4)}
+    ),
+    "stability": lambda: figures.stability_over_angle({"model": chart()}),
+    "observer_stability": lambda: figures.observer_stability({"F_M": STABILITY}, sample_time=1e-3),
+    "observer_error": lambda: figures.observer_error(TIME, torque(), {"F_M": torque() + 0.01}),
+    "closed_loop": lambda: figures.closed_loop(
+        closed_loop(), differences={"torque": 1e-8 * TIME}, bound=1e-6
+    ),
+    "gap_bars": lambda: figures.gap_bars(RECORDS, unit="N"),
+    "held_out_series": lambda: figures.held_out_series(held_out()),
+    "candidate_shares": lambda: figures.candidate_shares(SHARES),
+}
