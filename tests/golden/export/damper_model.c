@@ -1,0 +1,87 @@
+/* scheduled damper: Force of a damper whose viscosity depends on speed. Generated; do not edit. */
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define MODEL_TOKEN "{token}"
+#define MODEL_LARGEST DBL_MAX
+#define MODEL_CONTINUOUS 0
+#define MODEL_STATES 1
+#define MODEL_INPUTS 1
+#define MODEL_PARAMETERS 1
+#define MODEL_X 1
+#define MODEL_D 2
+#define MODEL_U 2
+#define MODEL_P 3
+#define MODEL_Y 4
+#define MODEL_S 5
+#define MODEL_EXTRA 6
+#define MODEL_VALUES 7
+#define MODEL_SAMPLE_TIME 0.01
+
+typedef struct {
+    const char *name;
+    double start, lowest, highest;
+} variable;
+
+/* By value reference. */
+static const variable model_variable[MODEL_VALUES] = {
+    {"time", 0.0, -1.7976931348623157e+308, 1.7976931348623157e+308},
+    {"piston.filtered", 0.0, -1.7976931348623157e+308, 1.7976931348623157e+308},
+    {"piston.speed", 0.0, -1.0, 1.0},
+    {"memory.gain", 0.75, 0.0, 10.0},
+    {"piston.force", 0.0, -1.7976931348623157e+308, 1.7976931348623157e+308},
+    {"force.squared", 0.0, -1.7976931348623157e+308, 1.7976931348623157e+308},
+    {"sample.time", 0.01, -1.7976931348623157e+308, 1.7976931348623157e+308},
+};
+
+#include "scheduled_damper.c"
+
+typedef scheduled_damper_state model_memory;
+
+static void model_tune(model_memory *memory, const double p[])
+{
+    scheduled_damper_parameters parameters;
+
+    scheduled_damper_defaults(&parameters);
+    parameters.memory.gain = p[0];
+    (void)scheduled_damper_set_parameters(memory, &parameters);
+    (void)p;
+}
+
+static void model_start(model_memory *memory, const double x[], const double p[])
+{
+    (void)scheduled_damper_init(memory, NULL);
+    memory->states.piston.filtered = x[0];
+    model_tune(memory, p);
+    (void)x;
+}
+
+/* One sample. The states that are shown are those that its outputs came from. */
+static int32_t model_sample(model_memory *memory, const double u[], double x[], double y[],
+                            double s[])
+{
+    const scheduled_damper_states before = memory->states;
+    scheduled_damper_inputs inputs = {0};
+    scheduled_damper_outputs outputs = {0};
+
+    inputs.piston.speed = u[0];
+    const uint32_t status = scheduled_damper_step(memory, &inputs, &outputs);
+    x[0] = before.piston.filtered;
+    y[0] = outputs.piston.force;
+    const double raw_0 = (memory->inputs.piston.speed + 1.0) * 1.0;
+    const double above_0 = raw_0 > 0.0 ? raw_0 : 0.0; /* NaN becomes the lower end */
+    const double place_0 = above_0 < 2.0 ? above_0 : 2.0;
+    const int32_t floor_0 = (int32_t)place_0;
+    const int32_t left_0 = floor_0 < 1 ? floor_0 : 1;
+    const double share_0 = place_0 - (double)left_0;
+    const double *const row_0 = table_0[left_0];
+    const double *const row_0_next = table_0[left_0 + 1];
+    const double w0 = row_0[0] + share_0 * (row_0_next[0] - row_0[0]);
+    const double a6 = w0 * memory->inputs.piston.speed + memory->parameters.memory.gain * before.piston.filtered;
+    s[0] = a6 * a6;
+    (void)before, (void)u, (void)x, (void)y, (void)s;
+    return (int32_t)status;
+}
+

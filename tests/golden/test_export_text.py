@@ -1,0 +1,83 @@
+"""Generated text, word by word; ``NLSDESIGN_UPDATE_GOLDEN=1`` writes it anew: then read the difference."""
+
+from __future__ import annotations
+
+import os
+import re
+from functools import cache
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nlsdesign.export.c_code import header_text, source_text
+from nlsdesign.export.c_text import real_type
+from nlsdesign.export.fmu import fmu_texts
+from nlsdesign.model.flat import FlatModel, Table, Variable
+from tests.hand_built import plant
+
+STORED = Path(__file__).with_name("export")
+UPDATE = os.environ.get("NLSDESIGN_UPDATE_GOLDEN") == "1"
+
+
+def damper() -> FlatModel:
+    """One state, one table of three points, one choice: every part of the generated text once."""
+    t, x, u, p, w = (ca.SX.sym(name) for name in "txupw")
+    force = w * u + p * x
+    return_stroke = ca.if_else(u < 0, ca.fmin(force, 2.0), ca.exp(-u) * force)
+    equations = ca.Function("e", [t, x, u, p, w], [0.5 * x + 0.25 * u, return_stroke, force**2, ca.SX(0, 1)])
+    table = Table(
+        "piston.speed", -1.0, 1.0, (Variable("viscosity", "N*s/m", "Viscosity"),), np.array([[3.0], [2], [4]])
+    )
+    return FlatModel(
+        "scheduled damper",
+        "Force of a damper whose viscosity depends on speed",
+        (Variable("piston.filtered", "m/s", "Filtered speed"),),
+        (Variable("piston.speed", "m/s", "Speed", 0.0, 1.0, -1.0, 1.0),),
+        (
+            Variable(
+                "memory.gain", "N*s/m", "Weight of the past", 0.75, 1.0, 0.0, 10.0, "bench 2024-05-01", 0.1
+            ),
+        ),
+        (Variable("piston.force", "N", "Force"),),
+        (Variable("force.squared", "N^2", "Square of the force"),),
+        equations,
+        0.01,
+        (table,),
+    )
+
+
+@cache
+def texts() -> dict[str, str]:
+    found = {
+        "scheduled_damper.h": header_text(damper(), "scheduled_damper", real_type("double")),
+        "scheduled_damper.c": source_text(damper(), "scheduled_damper", real_type("double")),
+        "scheduled_damper_float.c": source_text(damper(), "scheduled_damper", real_type("float")),
+    }
+    for model, word in ((damper(), "damper"), (plant(), "plant")):
+        for version in ("2.0", "3.0"):
+            unit = fmu_texts(model, version=version, step=0.01)
+            found[f"{word}_fmi{version[0]}.xml"] = unit["modelDescription.xml"].decode()
+        found[f"{word}_model.c"] = unit["sources/model.c"].decode()
+        found[f"{word}_index.html"] = unit["documentation/index.html"].decode()
+    return {name: without_versions(text) for name, text in found.items()}
+
+
+def without_versions(text: str) -> str:
+    """Leave out what changes with every release: versions, and the token, which is a hash of everything."""
+    text = re.sub(r"(nlsdesign|CasADi) \d+[\w.+]*", r"\1 (version)", text)
+    return re.sub(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", "{token}", text)
+
+
+@pytest.mark.parametrize("name", sorted(texts()))
+def test_the_generated_text_is_the_stored_one(name):
+    found, place = texts()[name], STORED / name
+    if UPDATE:
+        STORED.mkdir(exist_ok=True)
+        place.write_text(found, encoding="utf-8", newline="\n")
+    assert found == place.read_text(encoding="utf-8")
+
+
+def test_nothing_is_stored_that_is_no_longer_generated():
+    assert {path.name for path in STORED.iterdir()} == set(texts())

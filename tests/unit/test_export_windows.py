@@ -1,0 +1,59 @@
+"""The Windows library of an FMU runs: on Linux, through a small loader, with the same results."""
+
+from __future__ import annotations
+
+import ctypes
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+from nlsdesign.export.compile import compile_library, host_platform
+from nlsdesign.export.fmu import export_fmu
+from nlsdesign.export.fmu_variables import layout
+from tests.hand_built import observer, plant
+
+LOADER = Path(__file__).with_name("windows_loader.c")
+STEP, COUNT = 1e-3, 300
+
+
+@pytest.mark.parametrize(
+    ("model", "read"), [(plant(), "spring.torque"), (observer(), "spring.torque")], ids=["plant", "observer"]
+)
+def test_the_windows_library_gives_the_same_as_the_one_for_this_machine(model, read, tmp_path):
+    if host_platform() != "x86_64-linux":
+        pytest.skip("the loader maps x86-64 code on Linux")
+    unit = export_fmu(model, tmp_path / "one.fmu", platforms=["x86_64-linux", "x86_64-windows"])
+    references = {v.variable.name: v.reference for v in layout(model).reals}
+    written = model.inputs[0].name
+    given = 0.9 * np.sin(0.05 * np.arange(COUNT))
+
+    signal = np.array(
+        list(zip(STEP * np.arange(COUNT), given, strict=True)), dtype=[("time", float), (written, float)]
+    )
+    expected = fmpy.simulate_fmu(
+        str(unit), stop_time=COUNT * STEP, output_interval=STEP, input=signal, output=[read]
+    )[read][1:]
+
+    with zipfile.ZipFile(unit) as archive:
+        (name,) = [n for n in archive.namelist() if n.endswith(".dll")]
+        library = archive.read(name)
+    token = fmpy.read_model_description(str(unit)).guid.encode()
+    loader = ctypes.CDLL(str(compile_library([LOADER], tmp_path / "loader.so", flags=["-std=gnu99"])))
+    found = np.zeros(COUNT)
+    pointer = ctypes.POINTER(ctypes.c_double)
+    status = loader.run(
+        library,
+        token,
+        references[written],
+        np.ascontiguousarray(given).ctypes.data_as(pointer),
+        COUNT,
+        ctypes.c_double(STEP),
+        references[read],
+        found.ctypes.data_as(pointer),
+    )
+    assert status == 0
+    assert np.ptp(found) > 0.05
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.ptp(expected))
