@@ -40,6 +40,8 @@ class System:
         Signal by input.
     order
         Order of stepping; empty if all inputs are read before any instance steps.
+    late
+        Wire targets that read what their source showed before the step, whatever the order.
     """
 
     def __init__(
@@ -48,9 +50,11 @@ class System:
         wires: Mapping[str, str],
         inputs: Mapping[str, Signal],
         order: tuple[str, ...],
+        late: tuple[str, ...] = (),
     ) -> None:
         self._instances = instances
         self._order = order
+        self._late = frozenset(late)
         self._wires = {name: _of(name, wires) for name in instances}
         self._inputs = {
             name: {variable: _function(signal) for variable, signal in _of(name, inputs).items()}
@@ -61,6 +65,7 @@ class System:
             for name, instance in instances.items()
         }
         self._latest: dict[str, float] = {}
+        self._before: dict[str, float] = {}
 
     def delays(self) -> dict[str, int]:
         """Return by how many steps each wire target reads late, see the class that gives the result."""
@@ -71,6 +76,7 @@ class System:
                 sampled = self._instances[of].variables[output].variability == "discrete"
                 # What a sampled source shows at the end of its step it has computed at the beginning.
                 before = bool(self._order) and self._order.index(of) < self._order.index(name)
+                before = before and f"{name}.{variable}" not in self._late
                 late[f"{name}.{variable}"] = (1 if sampled else 0) - (1 if before else 0)
         return late
 
@@ -96,6 +102,7 @@ class System:
         self._initialise(stop)
         rows = [self._row(0.0)]
         for begin, end in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
+            self._before = dict(self._latest)
             if not self._order:
                 for name in self._instances:
                     self._apply(name, begin)
@@ -129,7 +136,11 @@ class System:
         self._latest |= {f"{name}.{variable}": value for variable, value in values.items()}
 
     def _apply(self, name: str, time: float) -> None:
-        values = {variable: self._latest[source] for variable, source in self._wires[name].items()}
+        seen = {
+            variable: self._before if f"{name}.{variable}" in self._late and self._before else self._latest
+            for variable in self._wires[name]
+        }
+        values = {variable: seen[variable][source] for variable, source in self._wires[name].items()}
         values |= {variable: float(signal(time)) for variable, signal in self._inputs[name].items()}
         self._instances[name].set(values)
 

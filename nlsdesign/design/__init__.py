@@ -1,0 +1,68 @@
+"""Design of cam, rubber and pretension for a target torque curve."""
+
+from .contour import CamFit, cam_from_profile, contour_of_cam
+from .drawing import fingerprint, write_drawings
+from .energy import Profile, energy_profile
+from .equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .geometry import Contour, contour_from_curvature, contour_from_lever_arm
+from .goals import Goal, LeastRubber, SmoothContour, TorqueError
+from .limits import (
+    AnchorDistance,
+    AreaRange,
+    Limit,
+    MaximumCableTension,
+    MaximumCamRadius,
+    MaximumStrain,
+    MaximumStress,
+    MaximumTorqueError,
+    MinimumRadiusOfCurvature,
+    PositiveStiffness,
+    PretensionRange,
+    RestLengthRange,
+)
+from .result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .solve import design_cam, torque_check, torque_sensitivity
+from .target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
+
+__all__ = [
+    "AnchorDistance",
+    "AreaRange",
+    "CamDesign",
+    "CamFit",
+    "Contour",
+    "ElasticLaw",
+    "ExponentialTorque",
+    "Goal",
+    "LeastRubber",
+    "Limit",
+    "LimitState",
+    "MaximumCableTension",
+    "MaximumCamRadius",
+    "MaximumStrain",
+    "MaximumStress",
+    "MaximumTorqueError",
+    "MinimumRadiusOfCurvature",
+    "PositiveStiffness",
+    "PowerTorque",
+    "PretensionRange",
+    "Profile",
+    "RestLengthRange",
+    "Sensitivity",
+    "SmoothContour",
+    "TabulatedTorque",
+    "Target",
+    "TorqueCheck",
+    "TorqueError",
+    "cam_from_profile",
+    "contour_from_curvature",
+    "contour_from_lever_arm",
+    "contour_of_cam",
+    "design_cam",
+    "elastic_law",
+    "energy_profile",
+    "equilibrium_torque",
+    "fingerprint",
+    "torque_check",
+    "torque_sensitivity",
+    "write_drawings",
+]

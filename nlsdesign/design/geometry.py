@@ -1,0 +1,251 @@
+"""Geometry of a cam whose cable runs through its centre to an anchor at a finite distance.
+
+With lever arm h(θ) and anchor distance D the normal of the cable, seen from the cam, has turned by
+
+    φ = θ + asin(h/D)   (ψ = −φ),        p(φ) = h   (support function),        ρ = p + p''.
+
+The contour point is p·n + p'·t with n = (sin φ, cos φ), t = (cos φ, −sin φ); it moves along t with speed ρ,
+so ρ ≥ 0 everywhere means convex. At φ = 0 the cable lies along the x axis and leaves the cam at x = p'(0).
+What is described is the lower right lip; the other three are its mirror images. All lengths are those of the
+cable's centre line: the cam itself lies deeper by the radius of the cable.
+
+Source: support function of a convex curve, any text on convex geometry.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
+
+from ..errors import ValueRangeError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Contour:
+    """One lip of a cam, as what the cable's centre line touches; arrays of shape (n,), in SI.
+
+    Parameters
+    ----------
+    directions
+        φ, ascending.
+    lever_arms, slopes
+        p and dp/dφ.
+    radii_of_curvature
+        ρ.
+    anchor_distance
+        D.
+    """
+
+    directions: Floats
+    lever_arms: Floats
+    slopes: Floats
+    radii_of_curvature: Floats
+    anchor_distance: float
+
+    @cached_property
+    def angles(self) -> Floats:
+        """Cam angle θ at which the cable touches each point."""
+        return self.directions - np.arcsin(self.lever_arms / self.anchor_distance)
+
+    @cached_property
+    def points(self) -> Floats:
+        """Points in the frame of the cam, shape (n, 2)."""
+        sine, cosine = np.sin(self.directions), np.cos(self.directions)
+        return np.column_stack(
+            [self.lever_arms * sine + self.slopes * cosine, self.lever_arms * cosine - self.slopes * sine]
+        )
+
+    @cached_property
+    def radii(self) -> Floats:
+        """Distance of the points from the centre."""
+        return np.hypot(self.lever_arms, self.slopes)
+
+    @cached_property
+    def free_lengths(self) -> Floats:
+        """Length of the cable between contact point and anchor; a cam that reaches the anchor has none."""
+        return np.sqrt(self.anchor_distance**2 - self.lever_arms**2) - self.slopes
+
+    @cached_property
+    def arc_lengths(self) -> Floats:
+        """Length of the contour from its first point."""
+        rho = self.radii_of_curvature
+        steps = (rho[1:] + rho[:-1]) / 2 * np.diff(self.directions)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def surface(self, cable_radius: float = 0.0) -> Floats:
+        """Return the points of the cam below a cable of that radius, in the frame of the cam.
+
+        Parameters
+        ----------
+        cable_radius
+            In m; zero gives the curve of the cable's centre line.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n, 2).
+
+        Raises
+        ------
+        ValueRangeError
+            If the contour is sharper than the cable is thick.
+        """
+        sharpest = float(self.radii_of_curvature.min())
+        if not 0.0 <= cable_radius <= sharpest:
+            raise ValueRangeError(
+                f"cable radius {1e3 * cable_radius:g} mm",
+                f"must not exceed the sharpest radius under the cable, {1e3 * sharpest:.4g} mm",
+                next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
+            )
+        normals = np.column_stack([np.sin(self.directions), np.cos(self.directions)])
+        return self.points - cable_radius * normals
+
+    def cable(self, angle: float) -> Floats:
+        """Return contact point and anchor in the resting frame, for the right-hand cable.
+
+        The left-hand cable is the same turned by half a turn.
+
+        Parameters
+        ----------
+        angle
+            Cam angle in rad, of either sign, within the contour.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (2, 2): contact point, then anchor.
+        """
+        if abs(angle) > self.angles[-1] * (1 + 1e-9) + 1e-12:
+            raise ValueRangeError(
+                f"angle {angle:g} rad", f"the contour ends at {self.angles[-1]:g} rad",
+                next_step="ask for a smaller angle",
+            )  # fmt: skip
+        contact = [np.interp(abs(angle), self.angles, column) for column in self.points.T]
+        touched = turn(np.array([contact]), abs(angle))[0]
+        # A negative angle uses the upper lip: everything mirrored at the x axis.
+        side = -1.0 if angle < 0.0 else 1.0
+        return np.array([touched * [1.0, side], [self.anchor_distance, 0.0]])
+
+    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Floats, Floats]:
+        """Return the two halves of the cam as closed polygons in the resting frame: lower, upper.
+
+        Between the ends of its two lips each half is closed by a straight line; so is the channel of the
+        cable between their beginnings.
+
+        Parameters
+        ----------
+        angle
+            Cam angle in rad.
+        cable_radius
+            In m.
+
+        Returns
+        -------
+        tuple of numpy.ndarray
+            Each of shape (2n + 1, 2); the last point is the first.
+        """
+        right = self.surface(cable_radius)
+        lower = np.vstack([right[::-1] * [-1.0, 1.0], right, right[-1:] * [-1.0, 1.0]])
+        return turn(lower, angle), turn(-lower, angle)
+
+
+def turn(points: Floats, angle: float) -> Floats:
+    """Turn points about the centre.
+
+    Parameters
+    ----------
+    points
+        Shape (n, 2).
+    angle
+        In rad, anticlockwise.
+    """
+    cosine, sine = np.cos(angle), np.sin(angle)
+    result: Floats = points @ np.array([[cosine, sine], [-sine, cosine]])
+    return result
+
+
+def contour_from_curvature(
+    nodes: ArrayLike,
+    radii_of_curvature: ArrayLike,
+    *,
+    first_slope: float,
+    anchor_distance: float,
+    refine: int = 8,
+) -> Contour:
+    """Return the contour of a radius of curvature that is linear between nodes; p'' + p = ρ solved exactly.
+
+    Parameters
+    ----------
+    nodes
+        φ from zero, shape (n,).
+    radii_of_curvature
+        ρ at the nodes, shape (n,), in m.
+    first_slope
+        p'(0): where the cable leaves the cam at angle zero, in m. p(0) is zero.
+    anchor_distance
+        D in m.
+    refine
+        Points per interval.
+    """
+    phi, rho = np.asarray(nodes, dtype=float), np.asarray(radii_of_curvature, dtype=float)
+    value, slope = 0.0, first_slope
+    rows = [(phi[0], value, slope, rho[0])]
+    for left, right, start, end in zip(phi[:-1], phi[1:], rho[:-1], rho[1:], strict=True):
+        growth = (end - start) / (right - left)
+        for step in np.linspace(0.0, right - left, refine + 1)[1:]:
+            cosine, sine = np.cos(step), np.sin(step)
+            p = start + growth * step + (value - start) * cosine + (slope - growth) * sine
+            rows.append(
+                (
+                    left + step,
+                    p,
+                    growth - (value - start) * sine + (slope - growth) * cosine,
+                    start + growth * step,
+                )
+            )
+        _, value, slope, _ = rows[-1]
+    table = np.array(rows).T
+    return Contour(table[0], table[1], table[2], table[3], anchor_distance)
+
+
+def contour_from_lever_arm(angles: ArrayLike, lever_arms: ArrayLike, *, anchor_distance: float) -> Contour:
+    """Return the contour that gives a lever arm, by derivatives of a quintic spline through it.
+
+    Parameters
+    ----------
+    angles
+        θ from zero, ascending, shape (n,), n ≥ 6.
+    lever_arms
+        h, shape (n,), in m.
+    anchor_distance
+        D in m.
+
+    Raises
+    ------
+    ValueRangeError
+        If the lever arm reaches to the anchor, or falls so fast that the cable would turn back.
+    """
+    theta, arm = np.asarray(angles, dtype=float), np.asarray(lever_arms, dtype=float)
+    if np.max(np.abs(arm)) >= anchor_distance:
+        raise ValueRangeError(
+            f"anchor_distance = {1e3 * anchor_distance:g} mm",
+            f"must exceed the largest lever arm, {1e3 * float(np.max(np.abs(arm))):.4g} mm",
+        )
+    spline = make_interp_spline(theta, arm, k=5)
+    first, second = spline(theta, 1), spline(theta, 2)
+    root = np.sqrt(anchor_distance**2 - arm**2)
+    speed = 1.0 + first / root
+    if np.any(speed <= 0.0):
+        raise ValueRangeError("lever arm", "falls so fast that the cable would turn back on the contour")
+    growth = second / root + arm * first**2 / root**3
+    slope = first / speed
+    slope_rate = (second - slope * growth) / speed
+    return Contour(
+        theta + np.arcsin(arm / anchor_distance), arm, slope, arm + slope_rate / speed, anchor_distance
+    )

@@ -1,0 +1,92 @@
+"""What a design should be good at; goals add up."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..symbolic import Expression
+from .candidate import Candidate
+
+_LENGTH = 0.01
+"""Typical radius of curvature in m; it only scales the roughness."""
+
+
+@dataclass(frozen=True)
+class Goal(ABC):
+    """Base of the goals."""
+
+    @abstractmethod
+    def cost(self, candidate: Candidate) -> Expression:
+        """Return a pure number; one per mille of the largest torque as rms error counts as 1.
+
+        Parameters
+        ----------
+        candidate
+            The design in symbols.
+        """
+
+
+@dataclass(frozen=True)
+class TorqueError(Goal):
+    """Mean over the angle of the squared torque error."""
+
+    def cost(self, candidate: Candidate) -> Expression:
+        """Return (rms error / 0.1 % of the largest torque)²."""
+        return candidate.mean_square_error / (1e-3 * candidate.target.largest) ** 2
+
+
+@dataclass(frozen=True)
+class SmoothContour(Goal):
+    """Mean of the squared slope of the radius of curvature over the cable's direction.
+
+    The default weight only decides between contours of equal torque: a slope of 10 mm/rad costs as much as
+    0.003 ‰ of the largest torque.
+
+    Parameters
+    ----------
+    weight
+        Cost of a slope of 10 mm/rad.
+    """
+
+    weight: float = 1e-5
+
+    def cost(self, candidate: Candidate) -> Expression:
+        """Return weight · mean((dρ/dφ)²) / (10 mm/rad)²."""
+        rho, phi = candidate.radii_of_curvature, candidate.directions
+        changes, steps = rho[1:] - rho[:-1], phi[1:] - phi[:-1]
+        span = phi[-1] - phi[0]
+        return self.weight * ca.sum1(changes**2 / steps) / span / _LENGTH**2
+
+
+@dataclass(frozen=True)
+class LeastRubber(Goal):
+    """Volume of rubber, relative to what the energy below the target needs at a strain energy of 0.6 MJ/m³.
+
+    Where area, rest length and pretension are free, many rubbers give the same torque; the default weight
+    lets the smallest of them win: all that volume costs as much as 0.03 ‰ of the largest torque.
+
+    Parameters
+    ----------
+    weight
+        Cost of that volume.
+    energy_density
+        In J/m³; it only scales.
+    """
+
+    weight: float = 1e-3
+    energy_density: float = 6e5
+
+    def cost(self, candidate: Candidate) -> Expression:
+        """Return weight · volume / typical volume."""
+        if not candidate.strains:
+            return ca.SX(0)
+        areas = list(candidate.of_rubber("area").values())
+        lengths = list(candidate.of_rubber("rest_length").values())
+        volume = candidate.elements * sum(
+            (a * x for a, x in zip(areas, lengths, strict=True)), start=ca.SX(0)
+        )
+        needed = float(candidate.target.energy(candidate.target.last_angle)) / self.energy_density
+        return self.weight * volume / needed

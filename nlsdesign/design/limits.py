@@ -1,0 +1,335 @@
+"""What a design must keep: each limit is an object with its number, and gives way in its own unit."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..errors import ValueRangeError
+from ..quantity import Quantity, parse_unit
+from ..symbolic import Expression
+from .candidate import Candidate
+from .numbers import in_si, plain
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """One side of a limit on one quantity: expression ≤ value (upper) or ≥ value.
+
+    Parameters
+    ----------
+    limit
+        Name of the limit.
+    of
+        What is bounded, in words.
+    expression
+        Column of any length, in SI.
+    value
+        Bound in SI.
+    upper
+        Which side.
+    unit
+        Unit in which it is shown.
+    scale
+        Typical size in SI.
+    """
+
+    limit: str
+    of: str
+    expression: Expression
+    value: float
+    upper: bool
+    unit: str
+    scale: float
+
+    def shown(self, value: float) -> str:
+        """Return a number in the unit of the limit as text.
+
+        Parameters
+        ----------
+        value
+            In SI.
+        """
+        text = f"{value / parse_unit(self.unit).factor:.4g}"
+        return text if self.unit == "1" else f"{text} {self.unit}"
+
+    def __str__(self) -> str:
+        return f"{self.limit}: {self.of} {'<=' if self.upper else '>='} {self.shown(self.value)}"
+
+
+@dataclass(frozen=True)
+class Limit(ABC):
+    """Base of the limits."""
+
+    @abstractmethod
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield what must hold.
+
+        Parameters
+        ----------
+        candidate
+            The design in symbols.
+        """
+
+    def _bound(
+        self,
+        of: str,
+        expression: Expression,
+        value: float,
+        *,
+        upper: bool,
+        unit: str,
+        scale: float | None = None,
+    ) -> Bound:
+        return Bound(
+            type(self).__name__, of, ca.SX(expression), value, upper, unit, scale or abs(value) or 1.0
+        )
+
+
+def _store(limit: Limit, name: str, unit: str, minimum: float, maximum: float) -> None:
+    value = in_si(
+        f"{type(limit).__name__}: {name}", getattr(limit, name), unit, minimum=minimum, maximum=maximum
+    )
+    object.__setattr__(limit, name, value)
+
+
+@dataclass(frozen=True)
+class MinimumRadiusOfCurvature(Limit):
+    """ρ ≥ radius everywhere: what a tool can cut and a cable can bend around.
+
+    Parameters
+    ----------
+    radius
+        In m.
+    """
+
+    radius: Quantity | float
+
+    def __post_init__(self) -> None:
+        _store(self, "radius", "m", 0.0, 0.5)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound over the contour."""
+        yield self._bound(
+            "radius of curvature", candidate.radii_of_curvature, plain(self.radius), upper=False, unit="mm"
+        )
+
+
+@dataclass(frozen=True)
+class MaximumCamRadius(Limit):
+    """Distance of the contour from the centre ≤ radius.
+
+    Parameters
+    ----------
+    radius
+        In m.
+    """
+
+    radius: Quantity | float
+
+    def __post_init__(self) -> None:
+        _store(self, "radius", "m", 1e-5, 0.5)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound over the contour."""
+        yield self._bound("cam radius", candidate.radii, plain(self.radius), upper=True, unit="mm")
+
+
+@dataclass(frozen=True)
+class MaximumStrain(Limit):
+    """Nominal strain of each piece of rubber ≤ strain; 1 means twice the rest length.
+
+    Parameters
+    ----------
+    strain
+        Pure number.
+    """
+
+    strain: Quantity | float
+
+    def __post_init__(self) -> None:
+        _store(self, "strain", "1", 1e-4, 10.0)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound for each piece of rubber."""
+        candidate.of_rubber("rest_length")
+        for path, strain in candidate.strains.items():
+            yield self._bound(f"strain of {path}", strain, plain(self.strain), upper=True, unit="1")
+
+
+@dataclass(frozen=True)
+class MaximumStress(Limit):
+    """Nominal stress in equilibrium ≤ stress / safety factor.
+
+    Parameters
+    ----------
+    stress
+        Strength as nominal stress in Pa.
+    safety_factor
+        At least 1.
+    """
+
+    stress: Quantity | float
+    safety_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        _store(self, "stress", "Pa", 1e3, 1e11)
+        _store(self, "safety_factor", "1", 1.0, 100.0)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound for each piece of rubber."""
+        candidate.of_rubber("area")
+        allowed = plain(self.stress) / self.safety_factor
+        for path, stress in candidate.stresses.items():
+            yield self._bound(f"stress of {path}", stress, allowed, upper=True, unit="MPa")
+
+
+@dataclass(frozen=True)
+class MaximumCableTension(Limit):
+    """Force of one cable ≤ tension.
+
+    Parameters
+    ----------
+    tension
+        In N.
+    """
+
+    tension: Quantity | float
+
+    def __post_init__(self) -> None:
+        _store(self, "tension", "N", 1e-3, 1e7)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound over the angle."""
+        yield self._bound("cable tension", candidate.forces, plain(self.tension), upper=True, unit="N")
+
+
+@dataclass(frozen=True)
+class PositiveStiffness(Limit):
+    """Tangent stiffness dτ/dθ ≥ minimum at every angle.
+
+    Parameters
+    ----------
+    minimum
+        In N·m/rad.
+    """
+
+    minimum: Quantity | float = 0.0
+
+    def __post_init__(self) -> None:
+        _store(self, "minimum", "N*m/rad", 0.0, 1e7)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound over the angle."""
+        scale = candidate.target.largest / candidate.target.last_angle
+        yield self._bound(
+            "tangent stiffness", candidate.tangent_stiffness, plain(self.minimum), upper=False,
+            unit="N*m/rad", scale=scale,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MaximumTorqueError(Limit):
+    """Rms torque error over the angle ≤ rms: makes the target itself a limit that can be in conflict.
+
+    Parameters
+    ----------
+    rms
+        In N·m.
+    """
+
+    rms: Quantity | float
+
+    def __post_init__(self) -> None:
+        _store(self, "rms", "N*m", 1e-5, 1e6)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield one bound."""
+        # The tiny addend keeps the root smooth where the error vanishes.
+        floor = (1e-3 * plain(self.rms)) ** 2
+        rms = ca.sqrt(candidate.mean_square_error + floor)
+        yield self._bound("rms torque error", rms, plain(self.rms), upper=True, unit="mN*m")
+
+
+@dataclass(frozen=True)
+class Range(Limit):
+    """Base of the limits that hold one parameter between two numbers.
+
+    Parameters
+    ----------
+    minimum, maximum
+        In SI.
+    """
+
+    minimum: Quantity | float
+    maximum: Quantity | float
+
+    def _checked(self, unit: str, lowest: float, highest: float) -> None:
+        _store(self, "minimum", unit, lowest, highest)
+        _store(self, "maximum", unit, lowest, highest)
+        if plain(self.minimum) > plain(self.maximum):
+            raise ValueRangeError(
+                f"{type(self).__name__}({plain(self.minimum):g}, {plain(self.maximum):g}) in {unit}",
+                "the minimum exceeds the maximum",
+                next_step="exchange the two",
+            )
+
+    def _both(self, of: str, expression: Expression, unit: str) -> Iterator[Bound]:
+        scale = plain(self.maximum) or 1e-3
+        yield self._bound(of, expression, plain(self.minimum), upper=False, unit=unit, scale=scale)
+        yield self._bound(of, expression, plain(self.maximum), upper=True, unit=unit, scale=scale)
+
+
+@dataclass(frozen=True)
+class PretensionRange(Range):
+    """Extension at angle zero between two lengths in m."""
+
+    def __post_init__(self) -> None:
+        self._checked("m", 0.0, 1.0)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield both sides."""
+        name = f"{candidate.spring}.pretension"
+        yield from self._both(name, candidate.parameters[name], "mm")
+
+
+@dataclass(frozen=True)
+class AreaRange(Range):
+    """Cross-section of each piece of rubber between two areas in m²."""
+
+    def __post_init__(self) -> None:
+        self._checked("m^2", 1e-8, 0.1)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield both sides for each piece."""
+        for name, value in candidate.of_rubber("area").items():
+            yield from self._both(name, value, "mm^2")
+
+
+@dataclass(frozen=True)
+class RestLengthRange(Range):
+    """Rest length of each piece of rubber between two lengths in m."""
+
+    def __post_init__(self) -> None:
+        self._checked("m", 1e-4, 1.0)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield both sides for each piece."""
+        for name, value in candidate.of_rubber("rest_length").items():
+            yield from self._both(name, value, "mm")
+
+
+@dataclass(frozen=True)
+class AnchorDistance(Range):
+    """Distance from the centre to the anchor of the cable between two lengths in m."""
+
+    def __post_init__(self) -> None:
+        self._checked("m", 1e-3, 1e6)
+
+    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+        """Yield both sides."""
+        name = f"{candidate.spring}.cam.anchor_distance"
+        yield from self._both(name, candidate.parameters[name], "mm")

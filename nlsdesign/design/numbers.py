@@ -1,0 +1,76 @@
+"""Numbers that a designer gives: bare in SI or with a unit, checked where they enter."""
+
+from __future__ import annotations
+
+from ..errors import UnitError, ValueRangeError
+from ..quantity import Quantity, degrees, same_dimension
+
+_SLIPS = {"m": (("mm", 1e-3), ("cm", 1e-2)), "m^2": (("mm^2", 1e-6), ("cm^2", 1e-4)), "Pa": (("MPa", 1e6),)}
+
+
+def in_si(
+    name: str, given: Quantity | float, unit: str, *, minimum: float = 0.0, maximum: float = float("inf")
+) -> float:
+    """Return a number in SI.
+
+    Parameters
+    ----------
+    name
+        What it is, for messages.
+    given
+        A quantity, or a bare number in SI.
+    unit
+        SI unit.
+    minimum, maximum
+        Inclusive range outside which a slip of units is more likely than a wish.
+
+    Raises
+    ------
+    UnitError
+        If the unit measures something else.
+    ValueRangeError
+        If the number lies outside the range, or is not a number.
+
+    Examples
+    --------
+    >>> from nlsdesign.quantity import quantity
+    >>> in_si("radius", quantity(3.0, "mm"), "m")
+    0.003
+    """
+    if isinstance(given, Quantity):
+        if not same_dimension(given.unit, unit):
+            raise UnitError(
+                f"{name} = {given}",
+                f"'{given.unit}' is no unit of it",
+                next_step=f"give it in a unit like '{unit}'",
+            )
+        value = given.number
+    else:
+        value = float(given)
+    if not minimum <= value <= maximum:
+        raise ValueRangeError(
+            f"{name} = {value:g} {unit}",
+            f"must lie in [{minimum:g}, {maximum:g}] {unit}",
+            next_step=_slip(value, unit, minimum, maximum),
+        )
+    return value
+
+
+def _slip(value: float, unit: str, minimum: float, maximum: float) -> str | None:
+    if unit == "rad" and minimum <= degrees(value) <= maximum:
+        return f"were degrees meant? degrees({value:g}) is in the range"
+    for name, factor in _SLIPS.get(unit, ()):
+        if minimum <= value * factor <= maximum:
+            return f"was '{name}' meant? quantity({value:g}, '{name}') is in the range"
+    return None
+
+
+def plain(given: Quantity | float) -> float:
+    """Return the number in SI of a field that :func:`in_si` has checked.
+
+    Parameters
+    ----------
+    given
+        A quantity or a number.
+    """
+    return given.number if isinstance(given, Quantity) else given

@@ -1,0 +1,286 @@
+"""Target curves: the torque that a spring should give over its angle, and the energy below it."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import overload
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator, PPoly
+
+from ..errors import ValueRangeError
+from ..quantity import Quantity
+from ..symbolic import Expression
+from .numbers import in_si, plain
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target(ABC):
+    """Base of the target curves; torque resists a positive angle, and the curve is odd.
+
+    Parameters
+    ----------
+    tolerance
+        Half width of the tolerance band in N·m; zero for no band.
+    """
+
+    tolerance: Quantity | float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tolerance", in_si("tolerance", self.tolerance, "N*m", maximum=1e6))
+
+    @property
+    @abstractmethod
+    def last_angle(self) -> float:
+        """Angle in rad up to which the curve is asked for."""
+
+    @abstractmethod
+    def torque_law(self, angle: Expression) -> Expression:
+        """Return the torque in N·m at an angle in rad, 0 ≤ angle."""
+
+    @abstractmethod
+    def energy_law(self, angle: Expression) -> Expression:
+        """Return ∫₀ torque in J."""
+
+    @overload
+    def torque(self, angle: Expression) -> Expression: ...
+    @overload
+    def torque(self, angle: ArrayLike) -> Floats: ...
+    def torque(self, angle: Expression | ArrayLike) -> Expression | Floats:
+        """Return the torque.
+
+        Parameters
+        ----------
+        angle
+            In rad, symbolic (scalar) or numbers of any shape, from zero to ``last_angle``.
+
+        Returns
+        -------
+        casadi.SX or numpy.ndarray
+            Of the same shape, in N·m.
+        """
+        return _over(self.torque_law, angle)
+
+    @overload
+    def energy(self, angle: Expression) -> Expression: ...
+    @overload
+    def energy(self, angle: ArrayLike) -> Floats: ...
+    def energy(self, angle: Expression | ArrayLike) -> Expression | Floats:
+        """Return the energy ∫₀ torque that the spring stores.
+
+        Parameters
+        ----------
+        angle
+            As for :meth:`torque`.
+
+        Returns
+        -------
+        casadi.SX or numpy.ndarray
+            Of the same shape, in J.
+        """
+        return _over(self.energy_law, angle)
+
+    @property
+    def initial_stiffness(self) -> float:
+        """Slope of the curve at angle zero in N·m/rad, as the one-sided limit."""
+        step = 1e-7 * self.last_angle
+        return float(self.torque(step) / step)
+
+    @property
+    def largest(self) -> float:
+        """Largest torque in N·m."""
+        return float(np.max(self.torque(np.linspace(0.0, self.last_angle, 201))))
+
+    def band(self, angle: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the lower and upper edge of the tolerance band.
+
+        Parameters
+        ----------
+        angle
+            Numbers of any shape in rad.
+        """
+        middle, half = self.torque(np.asarray(angle, dtype=float)), plain(self.tolerance)
+        return middle - half, middle + half
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExponentialTorque(Target):
+    """τ(θ) = τ_max·(e^{cθ} − 1)/(e^{cθ_max} − 1); gentle near zero, stiff at the end.
+
+    Source: Schepelmann, Geberth and Geyer, ICRA 2014, with c = 1, 5 N·m, 53°.
+
+    Parameters
+    ----------
+    maximum
+        Torque in N·m at the last angle.
+    angle
+        Last angle in rad.
+    shape
+        c; negative for a softening curve. Zero would be a straight line: see :class:`PowerTorque`.
+
+    Examples
+    --------
+    >>> from nlsdesign.quantity import degrees
+    >>> curve = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0)
+    >>> round(float(curve.torque(degrees(53.0))), 9), round(curve.initial_stiffness, 3)
+    (5.0, 3.285)
+    """
+
+    maximum: Quantity | float
+    angle: Quantity | float
+    shape: Quantity | float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "maximum", in_si("maximum", self.maximum, "N*m", minimum=1e-6, maximum=1e6))
+        object.__setattr__(self, "angle", in_si("angle", self.angle, "rad", minimum=1e-3, maximum=6.3))
+        object.__setattr__(self, "shape", in_si("shape", self.shape, "1", minimum=-50.0, maximum=50.0))
+        if abs(plain(self.shape)) < 1e-6:
+            raise ValueRangeError(
+                "shape = 0", "the curve would be a straight line",
+                next_step="use PowerTorque(coefficient=maximum/angle, exponent=1.0, angle=angle)",
+            )  # fmt: skip
+
+    @property
+    def last_angle(self) -> float:
+        """The last angle."""
+        return plain(self.angle)
+
+    def torque_law(self, angle: Expression) -> Expression:
+        """Return the torque."""
+        shape = plain(self.shape)
+        return plain(self.maximum) * ca.expm1(shape * angle) / math.expm1(shape * self.last_angle)
+
+    def energy_law(self, angle: Expression) -> Expression:
+        """Return the energy."""
+        shape = plain(self.shape)
+        grown = ca.expm1(shape * angle) / shape - angle
+        return plain(self.maximum) * grown / math.expm1(shape * self.last_angle)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PowerTorque(Target):
+    """τ(θ) = C·θⁿ, with n ≥ 1; n = 1 is a linear spring.
+
+    Parameters
+    ----------
+    coefficient
+        C in N·m/radⁿ, a bare number.
+    exponent
+        n.
+    angle
+        Last angle in rad.
+
+    Examples
+    --------
+    >>> float(PowerTorque(coefficient=2.0, exponent=2.0, angle=1.0).energy(0.5))
+    0.08333333333333333
+    """
+
+    coefficient: float
+    exponent: float
+    angle: Quantity | float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "coefficient", in_si("coefficient", self.coefficient, "1", minimum=1e-9))
+        object.__setattr__(self, "exponent", in_si("exponent", self.exponent, "1", minimum=1.0, maximum=20.0))
+        object.__setattr__(self, "angle", in_si("angle", self.angle, "rad", minimum=1e-3, maximum=6.3))
+
+    @property
+    def last_angle(self) -> float:
+        """The last angle."""
+        return plain(self.angle)
+
+    def torque_law(self, angle: Expression) -> Expression:
+        """Return the torque."""
+        return self.coefficient * angle**self.exponent
+
+    def energy_law(self, angle: Expression) -> Expression:
+        """Return the energy."""
+        return self.coefficient * angle ** (self.exponent + 1.0) / (self.exponent + 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TabulatedTorque(Target):
+    """A curve through given points, interpolated without new bumps, C¹.
+
+    Source: Fritsch and Butland 1984 (the monotone cubic of ``scipy.interpolate.PchipInterpolator``).
+
+    Parameters
+    ----------
+    angles
+        Ascending from zero, in rad.
+    torques
+        From zero, nowhere negative, in N·m.
+
+    Raises
+    ------
+    ValueRangeError
+        If the points are out of order, or the curve does not start at zero.
+    """
+
+    angles: tuple[float, ...]
+    torques: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "angles", tuple(float(item) for item in self.angles))
+        object.__setattr__(self, "torques", tuple(float(item) for item in self.torques))
+        points = (
+            np.array([self.angles, self.torques]) if len(self.angles) == len(self.torques) else np.zeros(0)
+        )
+        if points.size < 6 or not np.all(np.isfinite(points)):
+            raise ValueRangeError(
+                f"target table of {len(self.angles)} angles and {len(self.torques)} torques",
+                "needs at least three points, one finite torque for each angle",
+            )
+        steps = np.diff(points[0])
+        if points[0, 0] != 0.0 or np.any(steps <= 0.0) or points[0, -1] > 6.3:
+            row = 0 if points[0, 0] != 0.0 else int(np.argmax(steps <= 0.0)) + 1
+            raise ValueRangeError(
+                f"target table, row {row + 1}", "angles must ascend from zero, in rad",
+                next_step="sort the table by angle and convert degrees to rad",
+            )  # fmt: skip
+        if points[1, 0] != 0.0 or np.any(points[1] < 0.0):
+            raise ValueRangeError("target table", "torques must start at zero and be nowhere negative")
+
+    @property
+    def last_angle(self) -> float:
+        """The last angle of the table."""
+        return self.angles[-1]
+
+    def torque_law(self, angle: Expression) -> Expression:
+        """Return the interpolated torque."""
+        return _piecewise(PchipInterpolator(self.angles, self.torques), angle)
+
+    def energy_law(self, angle: Expression) -> Expression:
+        """Return the exact integral of the interpolation."""
+        return _piecewise(PchipInterpolator(self.angles, self.torques).antiderivative(), angle)
+
+
+def _piecewise(polynomial: PPoly, at: Expression) -> Expression:
+    """Return a piecewise polynomial as an expression."""
+    inner = [float(item) for item in polynomial.x[1:-1]]
+    local = at - ca.pw_const(at, inner, [float(item) for item in polynomial.x[:-1]])
+    result = ca.SX(0)
+    for row in polynomial.c:
+        result = result * local + ca.pw_const(at, inner, [float(item) for item in row])
+    return result
+
+
+def _over(law: Callable[[Expression], Expression], angle: Expression | ArrayLike) -> Expression | Floats:
+    if isinstance(angle, ca.SX):
+        return law(angle)
+    given = np.asarray(angle, dtype=float)
+    symbol = ca.SX.sym("angle")
+    function = ca.Function("law", [symbol], [law(symbol)])
+    result: Floats = np.array(function(given.reshape(1, -1)), dtype=float).reshape(given.shape)
+    return result
