@@ -8,9 +8,13 @@ because next to an *installed* package a folder named ``models`` belongs to some
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
+import importlib.util
+import sys
 import tomllib
 from pathlib import Path
+from types import ModuleType
 from typing import Final, Literal
 
 from .errors import UnknownNameError
@@ -49,6 +53,32 @@ def folder(name: Literal["models", "studies"], *, package: Path = _PACKAGE) -> P
         f"it travels with nlsdesign, but is neither {bundled} nor, in a checkout, {beside}",
         next_step="install nlsdesign again, or run it from a complete checkout",
     )
+
+
+def bundled(name: Literal["models", "studies"], module: str = "") -> ModuleType:
+    """Return a folder that travels with the package as a Python package, or one module in it.
+
+    It goes by the name ``nlsdesign_models`` or ``nlsdesign_studies``, so that it is found alike in a checkout
+    and in a wheel, and never collides with somebody else's ``models``.
+
+    Parameters
+    ----------
+    name
+        Folder.
+    module
+        Module inside; the package itself where none is given.
+    """
+    alias = f"nlsdesign_{name}"
+    if alias not in sys.modules:
+        start = folder(name) / "__init__.py"
+        spec = importlib.util.spec_from_file_location(
+            alias, start, submodule_search_locations=[str(folder(name))]
+        )
+        if spec is None or spec.loader is None:
+            raise UnknownNameError(str(start), "cannot be loaded as Python")
+        sys.modules[alias] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[alias])
+    return importlib.import_module(f"{alias}.{module}") if module else sys.modules[alias]
 
 
 def version(*, package: Path = _PACKAGE) -> str:

@@ -8,7 +8,10 @@ import click
 
 from ..errors import NlsError
 from ..locations import version
+from .analyse import analyse
 from .decks import deck
+from .design import design
+from .export import export, observer
 from .studies import study
 
 
@@ -18,7 +21,7 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-for command in (deck, study):
+for command in (deck, design, analyse, observer, export, study):
     program.add_command(command)
 
 

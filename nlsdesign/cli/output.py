@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 from rich.console import Console
 from rich.table import Table
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -53,7 +55,7 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def out_option(default: str = "out") -> Any:
+def out_option(default: str = "out") -> Callable[[F], F]:
     """Return the option ``--out``.
 
     Parameters

@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from ..errors import NlsError, unknown_name
-from ..locations import folder
+from ..locations import bundled, folder
 from ..progress import Steps
 from .output import json_option, show_json, show_table
 
@@ -68,9 +68,11 @@ def load_study(name: str) -> Any:
     """
     path = Path(name)
     if path.suffix != ".py":
-        path = folder("studies") / f"{name}.py"
+        if name not in study_names():
+            raise unknown_name("study", name, study_names())
+        return bundled("studies", name)
     if not path.exists():
-        raise unknown_name("study", name, study_names())
+        raise NlsError(str(path), "no such file", next_step="give the name of a study or a .py file")
     spec = importlib.util.spec_from_file_location(f"nlsdesign_study_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise NlsError(str(path), "cannot be loaded as Python")

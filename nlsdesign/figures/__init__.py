@@ -7,7 +7,7 @@ from .cam_frames import CamPicture, cam_picture, torque_curve
 from .gap import CandidateShare, HeldOut, RecordError, candidate_shares, gap_bars, held_out_series
 from .numbers import compact, shown_unit, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
-from .over_time import ClosedLoop, closed_loop, closed_loop_of, observer_error
+from .over_time import ClosedLoop, closed_loop, closed_loop_of, observer_error, over_time
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
@@ -38,6 +38,7 @@ __all__ = [
     "observability_over_angle",
     "observer_error",
     "observer_stability",
+    "over_time",
     "shown_unit",
     "significant",
     "stability_over_angle",

@@ -60,6 +60,34 @@ def observer_error(time: Floats, true: Floats, estimates: Mapping[str, Floats]) 
     )
 
 
+@styled
+def over_time(time: Floats, curves: Mapping[str, Floats], *, quantity: str, unit: str) -> Figure:
+    """Draw signals of one kind over time.
+
+    Parameters
+    ----------
+    time
+        Shape (n,), in s.
+    curves
+        Signals by name.
+    quantity, unit
+        What they are, for the axis and the words.
+    """
+    _same_length(time, curves)
+    figure, (axes,) = panels(1, height=2.8)
+    for number, (label, values) in enumerate(curves.items()):
+        tone, dash, _ = look(number)
+        axes.plot(*thinned(time, values), color=tone, linestyle=dash, label=label, linewidth=1.4)
+    _finish(axes, f"{quantity} in {unit}", quantity)
+    axes.set_xlabel("time in s")
+    sizes = "; ".join(
+        f"{n} from {significant(float(v.min()))} to {significant(float(v.max()))}" for n, v in curves.items()
+    )
+    return described(
+        figure, f"{quantity} over {significant(float(time[-1] - time[0]))} s in {unit}: {sizes}."
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
     """What a closed loop did; arrays of shape (n,), in SI.

@@ -1,0 +1,44 @@
+"""``nlsdesign analyse``: observability and stability over the cam angle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+
+from ..analysis import Observability, Stability, over_angle
+from ..components.declare import declare
+from ..deck import load_deck
+from ..model import flatten
+from .output import deck_option, json_option, out_option, show_json, show_table
+from .units import Number
+
+
+@click.command()
+@deck_option
+@click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
+@click.option("--count", type=int, default=26, show_default=True, help="Number of angles.")
+@click.option("--measured", default="motor.angle", show_default=True, help="What is measured.")
+@out_option("out/analysis")
+@json_option
+def analyse(deck_name: str, last: float, count: int, measured: str, out: Path, as_json: bool) -> None:
+    """Rank and condition of observability, poles and stiffness, from zero to the last angle."""
+    model = flatten(declare(load_deck(deck_name)), outputs=[measured, "spring.torque"])
+    views = [Observability(measured=(measured,)), Stability()]
+    chart = over_angle(model, views, angles=np.linspace(0.0, last, count), angle=measured)
+    out.mkdir(parents=True, exist_ok=True)
+    chart.write_csv(out / "over_angle.csv")
+    names = [v.name for v in chart.columns]
+    if as_json:
+        show_json(
+            {"angle": chart.at, **{name: chart[name] for name in names}, "file": out / "over_angle.csv"}
+        )
+        return
+    rows = [
+        [f"{np.degrees(at):.1f}", *(f"{v:.4g}" for v in row)]
+        for at, row in zip(chart.at, chart.values, strict=True)
+    ]
+    units = [f"{v.name} [{v.unit}]" for v in chart.columns]
+    show_table(f"{model.name} over {measured}", (f"{measured} [deg]", *units), rows)
+    click.echo(f"written: {out / 'over_angle.csv'}")

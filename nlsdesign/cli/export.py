@@ -1,0 +1,87 @@
+"""``nlsdesign observer`` and ``nlsdesign export``: observer, C code, FMUs, drawings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..components.assembly import Assembly
+from ..components.declare import declare
+from ..deck import load_deck
+from ..export import export_c, export_fmu
+from ..model import FlatModel, flatten
+from ..observer import design_observer
+from .output import deck_option, out_option
+from .units import Number
+
+_sample_time = click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
+
+
+def observer_of(assembly: Assembly, sample_time: float) -> FlatModel:
+    """Return the observer of the spring torque of an assembly.
+
+    Parameters
+    ----------
+    assembly
+        With parts ``motor`` and ``spring``.
+    sample_time
+        In s.
+    """
+    return design_observer(flatten(assembly), estimate="spring.torque", sample_time=sample_time)
+
+
+@click.command()
+@deck_option
+@_sample_time
+@out_option("out/observer")
+@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
+def observer(deck_name: str, sample_time: float, out: Path, real: str) -> None:
+    """Design the torque observer and write it as C with a self-test."""
+    model = observer_of(declare(load_deck(deck_name)), sample_time)
+    source = export_c(model, out, real=real, name="observer")
+    click.echo(str(model))
+    click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
+
+
+@click.group()
+def export() -> None:
+    """Write C code or FMUs."""
+
+
+@export.command("c")
+@deck_option
+@_sample_time
+@out_option("out/c")
+@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
+def export_observer(deck_name: str, sample_time: float, out: Path, real: str) -> None:
+    """Write the torque observer as C99."""
+    source = export_c(
+        observer_of(declare(load_deck(deck_name)), sample_time), out, real=real, name="observer"
+    )
+    click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
+
+
+@export.command("fmu")
+@deck_option
+@_sample_time
+@out_option("out/fmu")
+@click.option(
+    "--version", type=click.Choice(["2.0", "3.0"]), default="3.0", show_default=True, help="FMI version."
+)
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    help="For instance x86_64-windows; this machine by default; repeatable.",
+)
+def export_fmus(
+    deck_name: str, sample_time: float, out: Path, version: str, platforms: tuple[str, ...]
+) -> None:
+    """Write plant and observer as co-simulation FMUs."""
+    assembly = declare(load_deck(deck_name))
+    chosen = list(platforms) or None
+    plant = export_fmu(flatten(assembly), out / "plant.fmu", version=version, platforms=chosen)
+    watching = observer_of(assembly, sample_time)
+    estimate = export_fmu(watching, out / "observer.fmu", version=version, platforms=chosen)
+    click.echo(f"written: {plant}, {estimate}")

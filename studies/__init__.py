@@ -1,0 +1,1 @@
+"""Design studies: each has ``main(out, fast, steps)`` and claims its numbers in ``expected.toml``."""
