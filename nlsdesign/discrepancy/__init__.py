@@ -1,0 +1,18 @@
+"""What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
+
+from .diagnose import diagnose
+from .effects import ALL, Candidate, Effect, Unknown
+from .verdict import Course, NamedEffect, RecordGap, Verdict, write_verdict
+
+__all__ = [
+    "ALL",
+    "Candidate",
+    "Course",
+    "Effect",
+    "NamedEffect",
+    "RecordGap",
+    "Unknown",
+    "Verdict",
+    "diagnose",
+    "write_verdict",
+]

@@ -1,0 +1,186 @@
+"""Blocks: pieces of a model, cut at the measured signals, each driven by measurements alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+
+from ..errors import MeasurementError
+from ..identification.block import Block, Drive
+from ..model import Assembly, FlatModel, Variable, flatten
+from ..model.transform import cut, without_idle_states
+from ..symbolic import Expression
+
+READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
+"""Filter widths in samples. A balance holds a second derivative, whose noise asks for more."""
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A variable of the model whose value follows from a measurement."""
+
+    truth: str
+    signal: str
+    sensor: str | None
+
+
+class _SensorNumbers:
+    """The parameters of one sensor as symbols of a flat model."""
+
+    def __init__(self, model: FlatModel, parameter: Expression, owner: str) -> None:
+        self._symbols = {v.name: parameter[i] for i, v in enumerate(model.parameters)}
+        self._owner = owner
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of one number."""
+        return self._symbols[f"{self._owner}.{name}"]
+
+
+def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
+    """Cut the model of an assembly at measured signals.
+
+    Every measured force or torque gives a block that predicts it from the measured motion. Every measured
+    motion of a body that moves freely gives a block that balances the efforts on it, with measured efforts in
+    place of those that the model would predict.
+
+    Parameters
+    ----------
+    assembly
+        What is measured.
+    signals
+        Full names of measured signals; readings of sensors stand for what these read.
+
+    Raises
+    ------
+    MeasurementError
+        If nothing can be compared: no motion is measured, or no effort and no drive.
+    """
+    model = flatten(assembly)
+    known = [_known(assembly, s) for s in signals]
+    states, inputs = {v.name for v in model.states}, {v.name for v in model.inputs}
+    moving = [k for k in known if k.truth in states and _speed_of(k.truth) in states]
+    efforts = [k for k in known if k.truth not in states | inputs]
+    driven = [k for k in known if k.truth in inputs]
+    found = [_reading_block(assembly, model, effort, moving + driven) for effort in efforts if moving + driven]
+    opened = cut(model, [e.truth for e in efforts]) if efforts else model
+    found += [_balance_block(assembly, opened, body, moving + driven + efforts) for body in moving]
+    if not found:
+        raise MeasurementError(
+            "records", "measure no motion that drives the model, or nothing to compare it with",
+            next_step=f"measure for instance an angle and a force; measured are: {', '.join(signals)}",
+        )  # fmt: skip
+    return found
+
+
+def _known(assembly: Assembly, signal: str) -> _Known:
+    owner, _, last = signal.rpartition(".")
+    sensors = assembly.sensors()
+    return _Known(sensors[owner].of, signal, owner) if last == "reading" and owner in sensors else _Known(signal, signal, None)
+
+
+def _speed_of(motion: str) -> str:
+    return f"{motion.rpartition('.')[0]}.speed"
+
+
+def _reading_block(assembly: Assembly, model: FlatModel, effort: _Known, given: Sequence[_Known]) -> Block:
+    name = effort.truth.partition(".")[0]
+    return _driven(assembly, model, given, (name, effort.signal, effort.signal))
+
+
+def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Sequence[_Known]) -> Block:
+    name = body.truth.rpartition(".")[0]
+    return _driven(assembly, model, given, (name, f"{name}.unbalanced", None))
+
+
+def _driven(assembly: Assembly, model: FlatModel, given: Sequence[_Known], what: tuple[str, str, str | None]) -> Block:
+    """Return the block whose prescribed variables follow from readings."""
+    name, output, target = what
+    s = model.symbols()
+    states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
+    drives: dict[str, Drive] = {}
+    new: dict[str, tuple[Variable, Expression]] = {}
+    old, instead = [], []
+
+    def reading(known: _Known, order: int) -> Expression:
+        label = known.signal + (".rate", ".acceleration")[order - 1] if order else known.signal
+        if label not in new:
+            late = assembly.sensors()[known.sensor].late_by if known.sensor else None
+            drives[label] = Drive(known.signal, order, f"{known.sensor}.{late}" if late else None)
+            new[label] = Variable(label, "", f"measured {known.signal}"), ca.SX.sym(label)
+        return new[label][1]
+
+    def inferred(known: _Known, order: int) -> Expression:
+        value = reading(known, 0)
+        if known.sensor is not None:
+            numbers = _SensorNumbers(model, s.parameter, known.sensor)
+            value = assembly.sensors()[known.sensor].infer(numbers, value)
+        if order == 0:
+            return value
+        # A reading is a static function of what it reads, so rates follow by its slope.
+        return ca.jacobian(value, reading(known, 0)) * reading(known, order)
+
+    prescribed: list[str] = []
+    for known in given:
+        if known.truth in states:
+            pair = [known.truth, _speed_of(known.truth)]
+            old += [s.state[states.index(n)] for n in pair]
+            instead += [inferred(known, 0), inferred(known, 1)]
+            prescribed += pair
+        elif known.truth in inputs:
+            old.append(s.input[inputs.index(known.truth)])
+            instead.append(inferred(known, 0))
+            rate = _speed_of(known.truth)
+            if rate in inputs and rate not in [k.truth for k in given]:
+                old.append(s.input[inputs.index(rate)])
+                instead.append(inferred(known, 1))
+    if target is None:
+        body = next(k for k in given if k.truth.rpartition(".")[0] == name and k.truth in states)
+        result, variable = _unbalanced(model, s.derivative, s.parameter, name), Variable(output, _effort_unit(model, name), f"sum of all efforts on {name}")
+        result = _inertia(model, s.parameter, name) * inferred(body, 2) - result
+        drive = next((k for k in given if k.truth in inputs and k.truth.startswith(f"{name}.")), None)
+    else:
+        place = next(i for i, v in enumerate(model.signals) if v.name == target)
+        result, variable = s.signal[place], model.signals[place]
+    kept = [i for i, n in enumerate(states) if n not in prescribed]
+    derivative = ca.SX(ca.vertcat(*[s.derivative[i] for i in kept])) if kept else ca.SX(0, 1)
+    rows = ca.substitute([derivative, result], [ca.vertcat(*old)], [ca.vertcat(*instead)])
+    resting = [i for i, n in enumerate(inputs) if not any(n in (k.truth, _speed_of(k.truth)) for k in given)]
+    columns = [
+        s.time, ca.vertcat(*[s.state[i] for i in kept]),
+        ca.vertcat(*[e for _, e in new.values()], *[s.input[i] for i in resting]), s.parameter, s.table,
+    ]  # fmt: skip
+    if target is None and drive is not None:
+        rows[1] = _in_drive_units(rows[1], reading(drive, 0), s.parameter, model)
+    equations = ca.Function("equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], ca.SX(0, 1), ca.SX(0, 1)])
+    pruned = replace(
+        model, equations=equations, states=tuple(model.states[i] for i in kept), signals=(), outputs=(variable,),
+        inputs=(*[v for v, _ in new.values()], *[model.inputs[i] for i in resting]),
+    )  # fmt: skip
+    return Block(name, without_idle_states(pruned, [output]), drives, output, target, READING_WIDTH if target else BALANCE_WIDTH,
+                 None if target else f"{body.signal}.rate")
+
+
+def _inertia(model: FlatModel, parameter: Expression, body: str) -> Expression:
+    names = [v.name for v in model.parameters]
+    return next(parameter[names.index(f"{body}.{n}")] for n in ("inertia", "mass") if f"{body}.{n}" in names)
+
+
+def _effort_unit(model: FlatModel, body: str) -> str:
+    return "N*m" if f"{body}.inertia" in model.values else "N"
+
+
+def _unbalanced(model: FlatModel, derivative: Expression, parameter: Expression, body: str) -> Expression:
+    place = [v.name for v in model.states].index(f"{body}.speed")
+    return _inertia(model, parameter, body) * derivative[place]
+
+
+def _in_drive_units(balance: Expression, drive: Expression, parameter: Expression, model: FlatModel) -> Expression:
+    """Return the balance as the error of the measured drive, times the declared torque (or force) per drive.
+
+    A balance can be made small by making all its factors small; an error of a measured signal cannot.
+    """
+    slope = ca.substitute(ca.jacobian(balance, drive), drive, ca.SX(0))
+    declared = ca.substitute(slope, parameter, ca.DM(model.start(model.parameters)))
+    return balance * (declared / slope)

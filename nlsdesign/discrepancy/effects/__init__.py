@@ -1,0 +1,46 @@
+"""The catalogue of missing effects: functions that return an assembly with the effect in it."""
+
+from .cable import cable_compliance, cable_slack, cam_angle_offset
+from .candidate import Candidate, Effect, Unknown, wrapped
+from .friction import backlash, coulomb_friction, quadratic_drag, stribeck_friction, torque_ripple
+from .rubber import rate_independent_hysteresis, second_relaxation
+from .sensing import current_sensor_bias, force_sensor_bias, force_sensor_delay, force_sensor_gain
+
+ALL: tuple[Effect, ...] = (
+    coulomb_friction,
+    stribeck_friction,
+    quadratic_drag,
+    torque_ripple,
+    backlash,
+    current_sensor_bias,
+    cable_compliance,
+    cable_slack,
+    cam_angle_offset,
+    second_relaxation,
+    rate_independent_hysteresis,
+    force_sensor_delay,
+    force_sensor_bias,
+    force_sensor_gain,
+)
+
+__all__ = [
+    "ALL",
+    "Candidate",
+    "Effect",
+    "Unknown",
+    "backlash",
+    "cable_compliance",
+    "cable_slack",
+    "cam_angle_offset",
+    "coulomb_friction",
+    "current_sensor_bias",
+    "force_sensor_bias",
+    "force_sensor_delay",
+    "force_sensor_gain",
+    "quadratic_drag",
+    "rate_independent_hysteresis",
+    "second_relaxation",
+    "stribeck_friction",
+    "torque_ripple",
+    "wrapped",
+]

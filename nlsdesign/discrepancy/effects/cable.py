@@ -1,0 +1,121 @@
+"""Effects of cam and cable: compliance, slack, a turned cam."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...components import Assembly, InextensibleCable, PullOnly, Slack, StretchyCable, Tie, Turned
+from ...components.element import ROTATION, TRANSLATION, Element
+from ...components.networks import Through
+from ...quantity import Quantity
+from .candidate import SOURCE, Candidate, Unknown, wrapped
+
+
+def stretched(assembly: Assembly) -> list[str]:
+    """Return the paths of what a cam stretches: behind the cam, and inside a cable that only pulls.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for path, part in assembly.walk():
+        element = part.element if isinstance(part, Tie) else part
+        if isinstance(element, Through):
+            inner = f"{path}.{element.behind[0]}"
+            while isinstance(assembly[inner], PullOnly | InextensibleCable | Slack) and len(assembly[inner].children()) == 1:
+                inner = f"{inner}.{next(iter(assembly[inner].children()))}"
+            found.append(inner)
+    return found
+
+
+def _inside(assembly: Assembly, path: str, kind: type[Element]) -> bool:
+    owners = path.split(".")
+    parts = [assembly[".".join(owners[: i + 1])] for i in range(len(owners))]
+    return any(isinstance(p.element if isinstance(p, Tie) else p, kind) for p in parts)
+
+
+def cable_compliance(assembly: Assembly) -> Sequence[Candidate]:
+    """A cable that stretches, in series with what the cam stretches.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for path in stretched(assembly):
+        if _inside(assembly, path, StretchyCable) or assembly.element(path).needs_rate:
+            continue
+        stiffness = Quantity(1e5, "N/m", SOURCE)
+        edited = wrapped(
+            assembly, path, "elastic", lambda n, e, k=stiffness: StretchyCable(members=((n, e),), stiffness=k)
+        )
+        name = f"{path.rpartition('.')[0]}.elastic.stiffness"
+        found.append(
+            Candidate(
+                "cable_compliance", path, edited, (Unknown(name, (3e4, 3e5), 1e3, 1e7),),
+                "force that falls short the more, the larger it is, without loss", "Hooke 1678",
+            )
+        )  # fmt: skip
+    return found
+
+
+def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
+    """A cable that is too long, or rubber that has set.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for path in stretched(assembly):
+        if _inside(assembly, path, Slack) or assembly[path].domain != TRANSLATION:  # type: ignore[attr-defined]
+            continue
+        length = Quantity(1e-4, "m", SOURCE)
+        edited = wrapped(assembly, path, "slack", lambda n, e, s=length: Slack(members=((n, e),), length=s))
+        of = f"{path}.extension"
+        found.append(
+            Candidate(
+                "cable_slack", path, edited,
+                (Unknown(f"{path.rpartition('.')[0]}.slack.length", (0.02, 0.1), 1e-4, 0.8, of),),
+                "no force until a certain extension, the same at any speed", "geometry",
+            )
+        )  # fmt: skip
+    return found
+
+
+def cam_angle_offset(assembly: Assembly) -> Sequence[Candidate]:
+    """A cam that sits turned on its shaft.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for name, part in assembly.parts:
+        if not isinstance(part, Tie) or part.element.domain != ROTATION or not _holds_cam(assembly, name):
+            continue
+        if isinstance(part.element, Turned):
+            continue
+        edited = wrapped(
+            assembly, name, "turned", lambda n, e: Turned(members=((n, e),), offset=Quantity(0.0, "rad", SOURCE))
+        )
+        found.append(
+            Candidate(
+                "cam_angle_offset", name, edited, (Unknown(f"{name}.offset", (-0.02, 0.02), -0.5, 0.5),),
+                "more force on one side than at the same angle on the other", "geometry",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _holds_cam(assembly: Assembly, name: str) -> bool:
+    return any(
+        isinstance(p.element if isinstance(p, Tie) else p, Through)
+        for path, p in assembly.walk()
+        if path == name or path.startswith(name + ".")
+    )

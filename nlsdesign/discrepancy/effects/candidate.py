@@ -1,0 +1,123 @@
+"""What an effect of the catalogue is: an edit of an assembly, and the numbers that the edit leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from ...components import Assembly, Element
+from ...components.sensors import Sensor
+
+SOURCE = "fitted to bench records"
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that an effect brings along.
+
+    Parameters
+    ----------
+    name
+        Full name in the edited assembly.
+    starts
+        Where fits begin; several where the cost has several valleys.
+    lower, upper
+        Bounds. Where both are positive the number is fitted on a logarithmic scale.
+    of
+        Name of a signal of the declared model in whose largest value starts and bounds are counted; empty
+        where they are in SI.
+    """
+
+    name: str
+    starts: tuple[float, ...]
+    lower: float
+    upper: float
+    of: str = ""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one place of one assembly.
+
+    Parameters
+    ----------
+    effect
+        Identifier, for instance ``"coulomb_friction"``.
+    location
+        Path of the part that has the effect.
+    assembly
+        The assembly with the effect, its unknowns at some value.
+    unknowns
+        Numbers to fit.
+    signature
+        What it leaves in records, in words.
+    source
+        Where the law comes from.
+    """
+
+    effect: str
+    location: str
+    assembly: Assembly
+    unknowns: tuple[Unknown, ...]
+    signature: str
+    source: str
+
+
+Effect: TypeAlias = Callable[[Assembly], Sequence[Candidate]]
+"""A function from an assembly to the ways in which it can have the effect; none where it cannot."""
+
+
+def wrapped(assembly: Assembly, path: str, name: str, wrapper: Callable[[str, Element], Element]) -> Assembly:
+    """Return the assembly with an element inside a wrapper; sensors go on reading what they read.
+
+    Parameters
+    ----------
+    assembly
+        To be edited.
+    path
+        Path of the element, for instance ``"spring.rubber"``. A tie keeps its name and takes the wrapper; any
+        other wrapper takes its own name beside the former neighbours.
+    name
+        Name of the wrapper; for a tie, of the element inside.
+    wrapper
+        Makes the wrapper from the name and the element.
+    """
+    owner, _, last = path.rpartition(".")
+    old = assembly.element(path)
+    if not owner:
+        inner = f"{path}.{name}"
+        edited = assembly.with_part(path, wrapper(name, old))
+    else:
+        inner = f"{owner}.{name}.{last}"
+        holder = assembly[owner]
+        children = {
+            (name if key == last else key): (wrapper(last, old) if key == last else part)
+            for key, part in holder.children().items()
+        }
+        edited = assembly.with_part(owner, holder.with_children(children))
+    return _reading_on(edited, path, inner)
+
+
+def _reading_on(assembly: Assembly, old: str, new: str) -> Assembly:
+    parts = [
+        (n, replace(p, of=new + p.of[len(old) :]) if isinstance(p, Sensor) and p.of.startswith(old + ".") else p)
+        for n, p in assembly.parts
+    ]
+    return replace(assembly, parts=tuple(parts))
+
+
+def free_name(assembly: Assembly, name: str) -> str:
+    """Return a name that no part at the top has yet.
+
+    Parameters
+    ----------
+    assembly
+        To be edited.
+    name
+        The name wanted; a number is added where it is taken.
+    """
+    taken, number, found = {n for n, _ in assembly.parts}, 2, name
+    while found in taken:
+        found, number = f"{name}_{number}", number + 1
+    return found

@@ -1,0 +1,184 @@
+"""Effects of the drivetrain: friction, ripple, backlash."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ...components import (
+    Assembly,
+    Backlash,
+    CoulombFriction,
+    Element,
+    QuadraticDrag,
+    StribeckFriction,
+    Tie,
+    TorqueRipple,
+    tie,
+)
+from ...components.bodies import Free
+from ...components.element import ROTATION
+from ...quantity import Quantity
+from .candidate import SOURCE, Candidate, Unknown, free_name, wrapped
+
+
+def _turning(assembly: Assembly) -> list[tuple[str, str]]:
+    """Return each freely turning body with the name of a torque that is typical of it."""
+    ties = [(n, p) for n, p in assembly.parts if isinstance(p, Tie)]
+    bodies = [n for n, p in assembly.parts if isinstance(p, Free) and p.domain == ROTATION]
+    return [(b, next((f"{n}.torque" for n, p in ties if b in p.between), "")) for b in bodies]
+
+
+def _has(assembly: Assembly, body: str, kind: type[Element]) -> bool:
+    return any(isinstance(p, Tie) and body in p.between and isinstance(p.element, kind) for _, p in assembly.parts)
+
+
+def _number(value: float, unit: str) -> Quantity:
+    return Quantity(value, unit, SOURCE)
+
+
+def _tied(
+    assembly: Assembly, name: str, body: str, element: Element, unknowns: Callable[[str], tuple[Unknown, ...]]
+) -> tuple[Assembly, tuple[Unknown, ...]]:
+    part = free_name(assembly, name)
+    return assembly.with_part(part, tie(element, body)), unknowns(part)
+
+
+def coulomb_friction(assembly: Assembly) -> Sequence[Candidate]:
+    """Dry friction on a freely turning body.
+
+    Parameters
+    ----------
+    assembly
+        As declared; a body that has dry friction already is left out.
+    """
+    found = []
+    for body, torque in _turning(assembly):
+        if _has(assembly, body, CoulombFriction):
+            continue
+        element = CoulombFriction(sliding_torque=_number(0.01, "N*m"))
+        edited, unknowns = _tied(
+            assembly, "dry_friction", body, element,
+            lambda part, of=torque: (Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),),
+        )  # fmt: skip
+        found.append(
+            Candidate(
+                "coulomb_friction", body, edited, unknowns,
+                "a constant torque against the motion, that jumps where the speed changes sign",
+                "Coulomb 1785; Armstrong-Hélouvry 1991",
+            )
+        )  # fmt: skip
+    return found
+
+
+def stribeck_friction(assembly: Assembly) -> Sequence[Candidate]:
+    """Dry friction that falls with speed, on a freely turning body.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for body, torque in _turning(assembly):
+        if _has(assembly, body, CoulombFriction):
+            continue
+        element = StribeckFriction(
+            sliding_torque=_number(0.01, "N*m"), breakaway=_number(0.01, "N*m"), stribeck_speed=_number(0.2, "rad/s")
+        )
+        edited, unknowns = _tied(
+            assembly, "dry_friction", body, element,
+            lambda part, of=torque: (
+                Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),
+                Unknown(f"{part}.breakaway", (0.05,), 1e-4, 2.0, of),
+                Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0),
+            ),
+        )  # fmt: skip
+        found.append(
+            Candidate(
+                "stribeck_friction", body, edited, unknowns,
+                "a torque against the motion that is largest just off standstill",
+                "Stribeck 1902; Armstrong-Hélouvry 1991",
+            )
+        )  # fmt: skip
+    return found
+
+
+def quadratic_drag(assembly: Assembly) -> Sequence[Candidate]:
+    """Drag that grows with the square of the speed, on a freely turning body.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for body, _ in _turning(assembly):
+        if _has(assembly, body, QuadraticDrag):
+            continue
+        element = QuadraticDrag(drag=_number(1e-3, "N*m*s^2/rad^2"))
+        edited, unknowns = _tied(
+            assembly, "drag", body, element, lambda part: (Unknown(f"{part}.drag", (1e-3,), 1e-7, 10.0),)
+        )
+        found.append(
+            Candidate(
+                "quadratic_drag", body, edited, unknowns,
+                "a torque against the motion that grows with the square of the speed", "any text on fluids",
+            )
+        )  # fmt: skip
+    return found
+
+
+def torque_ripple(assembly: Assembly) -> Sequence[Candidate]:
+    """A torque locked to the angle of a freely turning body, such as cogging.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    orders = tuple(float(n) for n in range(4, 121, 2))
+    found = []
+    for body, torque in _turning(assembly):
+        element = TorqueRipple(sine=_number(0.0, "N*m"), cosine=_number(0.0, "N*m"), order=_number(1.0, "1"))
+        edited, unknowns = _tied(
+            assembly, "ripple", body, element,
+            lambda part, of=torque: (
+                Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, of),
+                Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, of),
+                Unknown(f"{part}.order", orders, 2.0, 150.0),
+            ),
+        )  # fmt: skip
+        found.append(
+            Candidate(
+                "torque_ripple", body, edited, unknowns,
+                "a torque that repeats over the angle, the same forward and backward, at any speed",
+                "Hanselman 2003",
+            )
+        )  # fmt: skip
+    return found
+
+
+def backlash(assembly: Assembly) -> Sequence[Candidate]:
+    """Play between a freely turning body and a spring tied to it.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for name, part in assembly.parts:
+        springy = isinstance(part, Tie) and part.element.domain == ROTATION and not part.element.needs_rate
+        if not springy or isinstance(assembly.element(name), Backlash):
+            continue
+        edited = wrapped(
+            assembly, name, "behind_play", lambda n, e: Backlash(members=((n, e),), gap=_number(0.01, "rad"))
+        )
+        found.append(
+            Candidate(
+                "backlash", name, edited, (Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),),
+                "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
+                "Nordin and Gutman 2002",
+            )
+        )  # fmt: skip
+    return found

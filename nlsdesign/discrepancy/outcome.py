@@ -1,0 +1,59 @@
+"""The gap before and after, per record and over time, in the unit of each block."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..identification.evidence import Evidence
+from .compare import Comparison, Hypothesis
+from .verdict import Course, RecordGap
+
+
+def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tuple[RecordGap, ...]:
+    """Return the error of every block on every record.
+
+    Parameters
+    ----------
+    before, after
+        Fitted to all samples.
+    comparison
+        Knows the records.
+    """
+    later = {_key(e): e for e in comparison.evidence(after)}
+    found = []
+    for each in comparison.evidence(before):
+        sigma = each.floor.sigma
+        then, now = each.residual(before.values)[0] * sigma, later[_key(each)].residual(after.values)[0] * sigma
+        unit = each.driven.block.model.outputs[0].unit
+        rms = [float(np.sqrt(np.mean(np.square(row)))) for row in (then, now, sigma)]
+        name = each.driven.block.name
+        found.append(RecordGap(name, each.record.name, each.record.role, *rms, len(sigma), unit))
+    return tuple(found)
+
+
+def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str) -> Course:
+    """Return a held-out record of a block over time; the one with the largest error before.
+
+    Parameters
+    ----------
+    before, after, comparison
+        As above.
+    block
+        Name.
+    """
+    mine = [e for e in comparison.evidence(before) if e.driven.block.name == block]
+    held = [e for e in mine if e.record.role == "held_out"] or mine
+    worst = max(held, key=lambda e: float(np.mean(np.square(e.residual(before.values)[0] * e.floor.sigma))))
+    later = {_key(e): e for e in comparison.evidence(after)}[_key(worst)]
+    target = worst.driven.block.target
+    trace = worst.record.trace
+    measured = trace[target] if target else np.zeros(len(trace))
+    output = worst.driven.block.model.outputs[0]
+    return Course(
+        worst.record.name, target or output.description, output.unit, trace.time, measured,
+        worst.predicted(before.values), later.predicted(after.values), float(np.mean(worst.floor.raw_sigma)),
+    )  # fmt: skip
+
+
+def _key(evidence: Evidence) -> tuple[str, str]:
+    return evidence.driven.block.name, evidence.record.name

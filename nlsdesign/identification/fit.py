@@ -1,0 +1,268 @@
+"""Fits of parameters to several records and blocks at once, by least squares with exact derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError
+from ..model import Variable
+from .descent import minimise
+from .evidence import Evidence
+from .residuals import autocorrelation
+
+Array = NDArray[np.float64]
+
+_EVALUATIONS = 40
+_REACH = 2.0
+_WEAK = 0.3
+"""A direction known no better than this (relative) is reported as not identified."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number to be fitted.
+
+    Parameters
+    ----------
+    name, unit
+        Full name and SI unit.
+    start
+        Where the fit begins.
+    centre, sigma
+        Declared value and standard deviation of the prior around it, in the fitted scale; an infinite sigma
+        means that nothing is known before.
+    lower, upper
+        Bounds in SI.
+    scale
+        ``log`` for positive numbers, whose spread is a factor; ``linear`` otherwise.
+    size
+        Typical size, for the linear scale.
+    """
+
+    name: str
+    unit: str
+    start: float
+    centre: float
+    sigma: float
+    lower: float
+    upper: float
+    scale: Literal["log", "linear"]
+    size: float = 1.0
+
+    def inward(self, value: float) -> float:
+        """Return a value in the fitted scale."""
+        return math.log(value) if self.scale == "log" else value / self.size
+
+    def outward(self, fitted: float) -> float:
+        """Return the value in SI."""
+        return math.exp(fitted) if self.scale == "log" else fitted * self.size
+
+    def slope(self, value: float) -> float:
+        """Return the derivative of the value in SI with respect to the fitted one."""
+        return value if self.scale == "log" else self.size
+
+
+def declared_parameter(variable: Variable, start: float | None = None) -> Parameter:
+    """Return a parameter of the model with the prior that its declared spread stands for.
+
+    A one-sided spread s is read as the uniform range from v/(1 + s) to v·(1 + s), whose standard deviation is
+    ln(1 + s)/√3 on the logarithmic scale. The bounds are twice as wide as the range.
+
+    Parameters
+    ----------
+    variable
+        Parameter of a flat model with a positive spread.
+    start
+        Where to begin; at the declared value by default.
+    """
+    value, width = variable.start, math.log1p(variable.spread)
+    begin = value if start is None else start
+    if value > 0.0:
+        factor = math.exp(_REACH * width)
+        return Parameter(
+            variable.name, variable.unit, begin, value, width / math.sqrt(3.0),
+            max(value / factor, variable.minimum), min(value * factor, variable.maximum), "log",
+        )  # fmt: skip
+    size = abs(value) or 1.0
+    reach = _REACH * variable.spread * size
+    return Parameter(
+        variable.name, variable.unit, begin, value, variable.spread / math.sqrt(3.0),
+        max(value - reach, variable.minimum), min(value + reach, variable.maximum), "linear", size,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Fitted numbers and how well they are known.
+
+    Parameters
+    ----------
+    parameters
+        In the order of the vectors.
+    values
+        In SI by name.
+    covariance
+        In the fitted scale; allows for coloured residuals.
+    cost
+        Half the sum of squares of residuals and priors.
+    misfit
+        Half the sum of squares of the residuals alone, per block and record.
+    converged
+        Whether the descent ended by itself.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: Mapping[str, float]
+    covariance: Array
+    cost: float
+    misfit: Mapping[tuple[str, str], float]
+    converged: bool
+
+    def standard_error(self, name: str) -> float:
+        """Return the standard error of a parameter in SI.
+
+        Parameters
+        ----------
+        name
+            Full name.
+        """
+        i = [p.name for p in self.parameters].index(name)
+        return float(np.sqrt(self.covariance[i, i])) * abs(self.parameters[i].slope(self.values[name]))
+
+    def correlation(self) -> Array:
+        """Return the correlation matrix of the parameters."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        result: Array = self.covariance / np.outer(deviation, deviation)
+        return result
+
+    def strain(self) -> dict[str, float]:
+        """Return how far each parameter has moved from its declared value, in standard deviations of the prior."""
+        return {
+            p.name: (p.inward(self.values[p.name]) - p.inward(p.centre)) / p.sigma
+            for p in self.parameters
+            if math.isfinite(p.sigma)
+        }
+
+    def unidentified(self) -> list[str]:
+        """Return in words what the records cannot tell: combinations of parameters that they leave open."""
+        spread, axes = np.linalg.eigh(self.covariance)
+        found = []
+        for deviation, axis in zip(np.sqrt(np.maximum(spread, 0.0)), axes.T, strict=True):
+            if deviation < _WEAK:
+                continue
+            order = np.argsort(-np.abs(axis))
+            named = [(self.parameters[i].name, axis[i]) for i in order if abs(axis[i]) > 0.3]
+            first = np.sign(named[0][1])
+            words = [f"{n} {'up' if a * first > 0 else 'down'}" for n, a in named]
+            found.append(f"{' with '.join(words)}: known to {100 * deviation:.0f} % only")
+        return found
+
+
+def fit(evidence: Sequence[Evidence], parameters: Sequence[Parameter], *, evaluations: int = _EVALUATIONS) -> Fit:
+    """Fit parameters to everything that the records say.
+
+    Parameters
+    ----------
+    evidence
+        Records seen by blocks.
+    parameters
+        What is free; each must be free in at least one block or have a prior.
+    evaluations
+        Bound on the number of evaluations.
+
+    Raises
+    ------
+    ConvergenceError
+        If the fit ends without a finite cost.
+    """
+    rows = _Rows(evidence, parameters)
+    low, high, start = _box(parameters)
+    found = minimise(rows, start, (low, high), evaluations=evaluations)
+    if not np.isfinite(found.cost):
+        raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
+    residual, slope = rows(found.x)
+    misfit, place = {}, len(parameters)
+    for each in evidence:
+        own = residual[place : place + len(each.floor.sigma)]
+        misfit[each.driven.block.name, each.record.name] = 0.5 * float(own @ own)
+        place += len(own)
+    covariance = _covariance(residual[len(parameters) :], slope, len(parameters))
+    return Fit(tuple(parameters), rows.values(found.x), covariance, found.cost, misfit, found.converged)
+
+
+def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
+    """Return the cost that the linearised problem would reach from a start, at the price of one evaluation.
+
+    Parameters
+    ----------
+    evidence, parameters
+        As for :func:`fit`.
+    """
+    low, high, start = _box(parameters)
+    residual, slope = _Rows(evidence, parameters)(start)
+    size = np.linalg.norm(slope, axis=0)
+    used = size > 0.0
+    step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
+    step = np.clip(start[used] + step, low[used], high[used]) - start[used]
+    return 0.5 * float(np.sum((residual + slope[:, used] @ step) ** 2))
+
+
+class _Rows:
+    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered."""
+
+    def __init__(self, evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> None:
+        self._evidence, self._parameters = evidence, parameters
+        self._names = [p.name for p in parameters]
+        self._prior = np.diag([1.0 / p.sigma for p in parameters])
+        self._centre = np.array([p.inward(p.centre) if math.isfinite(p.sigma) else 0.0 for p in parameters])
+        self._last: tuple[bytes, tuple[Array, Array]] | None = None
+
+    def values(self, x: Array) -> dict[str, float]:
+        return {p.name: p.outward(v) for p, v in zip(self._parameters, x, strict=True)}
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        if self._last is None or self._last[0] != x.tobytes():
+            self._last = x.tobytes(), self._evaluated(x)
+        return self._last[1]
+
+    def _evaluated(self, x: Array) -> tuple[Array, Array]:
+        values = self.values(x)
+        rows, slopes = [self._prior @ (x - self._centre)], [self._prior]
+        for each in self._evidence:
+            residual, slope = each.residual(values)
+            wide = np.zeros((len(residual), len(x)))
+            for k, name in enumerate(each.driven.free):
+                j = self._names.index(name)
+                wide[:, j] = slope[:, k] * self._parameters[j].slope(values[name])
+            rows.append(residual)
+            slopes.append(wide)
+        return np.concatenate(rows), np.vstack(slopes)
+
+
+def _box(parameters: Sequence[Parameter]) -> tuple[Array, Array, Array]:
+    low = np.array([p.inward(p.lower) if p.scale == "linear" or p.lower > 0.0 else -np.inf for p in parameters])
+    high = np.array([p.inward(p.upper) for p in parameters])
+    start = np.array([p.inward(p.start) for p in parameters])
+    inside: Array = np.clip(start, low + 1e-9, high - 1e-9)
+    return low, high, inside
+
+
+def _covariance(residual: Array, slope: Array, priors: int) -> Array:
+    """Return (JᵀJ)⁻¹ with the data's share of information reduced by the colour of the residuals."""
+    data = slope[priors:]
+    if len(residual) > 1:
+        rho = autocorrelation(residual, min(200, len(residual) - 1))[1:]
+        quiet = np.flatnonzero(rho < 2.0 / math.sqrt(len(residual)))
+        colour = 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho))
+        size = max(1.0, float(np.mean(residual**2)))
+    else:
+        colour, size = 1.0, 1.0
+    information = data.T @ data / (colour * size) + slope[:priors].T @ slope[:priors]
+    result: Array = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+    return result

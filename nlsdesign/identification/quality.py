@@ -1,0 +1,184 @@
+"""Checks of measured tables before anything is fitted to them; each names file, column and rows."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MeasurementError
+from .residuals import noise_of, quantum_of
+
+Array = NDArray[np.float64]
+
+_GAP = 1.5
+"""A step this much longer than the usual one is a gap."""
+_JITTER = 0.02
+"""Steps that differ by more than this share are interpolated to a uniform grid."""
+_CLIPPED_RUN = 5
+_LEAST_ROWS = 50
+_FIRST_ROW = 2
+"""Row of the first sample as a text editor counts: the heads are row 1."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that makes data suspect without making them unreadable.
+
+    Parameters
+    ----------
+    place
+        File, column and rows.
+    text
+        What is odd about it.
+    """
+
+    place: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.text}"
+
+
+def read_table(file: Path) -> tuple[list[str], Array]:
+    """Return the heads and the numbers of a CSV file.
+
+    Parameters
+    ----------
+    file
+        Comma-separated, one row of heads.
+
+    Raises
+    ------
+    MeasurementError
+        If a row is too short or too long, or a cell is not a number.
+    """
+    with file.open(newline="", encoding="utf8") as stream:
+        rows = [row for row in csv.reader(stream) if row]
+    if len(rows) < 1 + _LEAST_ROWS:
+        raise MeasurementError(file.name, f"has {max(len(rows) - 1, 0)} rows of numbers; at least {_LEAST_ROWS} are needed")
+    heads = [head.strip() for head in rows[0]]
+    try:
+        return heads, np.array(rows[1:], dtype=float)
+    except ValueError:
+        raise _bad_cell(file.name, heads, rows[1:]) from None
+
+
+def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> MeasurementError:
+    for number, row in enumerate(rows, start=_FIRST_ROW):
+        if len(row) != len(heads):
+            return MeasurementError(f"{file}: row {number}", f"has {len(row)} cells, the heads are {len(heads)}")
+        for head, cell in zip(heads, row, strict=True):
+            try:
+                float(cell)
+            except ValueError:
+                return MeasurementError(f"{file}: column '{head}', row {number}", f"'{cell}' is not a number")
+    return MeasurementError(file, "cannot be read as a table of numbers")
+
+
+def check_columns(file: str, columns: Mapping[str, Array]) -> None:
+    """Check that every number is finite.
+
+    Parameters
+    ----------
+    file
+        For messages.
+    columns
+        Numbers as they stand in the file, by head.
+
+    Raises
+    ------
+    MeasurementError
+        Naming the column and the first run of rows.
+    """
+    for head, values in columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise MeasurementError(
+                f"{file}: column '{head}', {_rows(_first_run(bad))}", f"is not a finite number ({len(bad)} in all)",
+                next_step="cut the record before or after these rows",
+            )  # fmt: skip
+
+
+def check_time(file: str, head: str, time: Array) -> str:
+    """Check that time ascends without gaps.
+
+    Parameters
+    ----------
+    file, head
+        For messages.
+    time
+        In s, shape (n,).
+
+    Returns
+    -------
+    str
+        Empty if the grid is uniform; otherwise what was done about it.
+
+    Raises
+    ------
+    MeasurementError
+        If time stands still, runs backwards or has a gap.
+    """
+    steps = np.diff(time)
+    back = np.flatnonzero(steps <= 0.0)
+    if len(back):
+        what = "runs backwards" if np.any(steps < 0.0) else "stands still"
+        raise MeasurementError(
+            f"{file}: column '{head}', {_rows(_first_run(back + 1))}",
+            f"time {what} ({time[back[0]]:g} s is followed by {time[back[0] + 1]:g} s)",
+            next_step="sort the record, or cut it where the clock was set back",
+        )
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > _GAP * usual)
+    if len(gaps):
+        raise MeasurementError(
+            f"{file}: column '{head}', {_rows(gaps[:1] + 1)}",
+            f"there is a gap of {steps[gaps[0]]:g} s where samples lie {usual:g} s apart ({len(gaps)} in all)",
+            next_step="split the record into one file before and one after the gap",
+        )
+    uneven = float(np.max(np.abs(steps - usual))) / usual
+    return "" if uneven <= _JITTER else f" (interpolated to a uniform grid, steps varied by {100 * uneven:.1f} %)"
+
+
+def suspicions(file: str, head: str, values: Array) -> list[Finding]:
+    """Return what looks like a dead or saturated channel.
+
+    Parameters
+    ----------
+    file, head
+        For messages.
+    values
+        As they stand in the file.
+    """
+    place = f"{file}: column '{head}'"
+    if np.ptp(values) == 0.0:
+        return [Finding(f"{place}, {_rows(np.arange(len(values)))}", f"is constant at {values[0]:g}")]
+    # A channel without noise may well rest on its largest value; one with noise cannot.
+    if noise_of(values) < 2.0 * quantum_of(values):
+        return []
+    for extreme, word in ((values.max(), "largest"), (values.min(), "smallest")):
+        run = _longest_run(values == extreme)
+        if len(run) >= _CLIPPED_RUN:
+            return [Finding(f"{place}, {_rows(run)}", f"rests on its {word} value {extreme:g}: clipped or saturated")]
+    return []
+
+
+def _first_run(indices: NDArray[np.intp]) -> NDArray[np.intp]:
+    ends = np.flatnonzero(np.diff(indices) > 1)
+    return indices[: int(ends[0]) + 1] if len(ends) else indices
+
+
+def _longest_run(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    places = np.flatnonzero(mask)
+    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    return max(runs, key=len)
+
+
+def _rows(indices: NDArray[np.intp]) -> str:
+    first, last = int(indices[0]) + _FIRST_ROW, int(indices[-1]) + _FIRST_ROW
+    return f"row {first}" if first == last else f"rows {first} to {last}"

@@ -1,0 +1,177 @@
+"""What a residual tells: its noise floor, how many independent numbers it holds, and its shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_MEDIAN_OF_NORMAL = 0.6744897501960817
+
+
+def noise_of(signal: Array) -> float:
+    """Estimate the standard deviation of the white noise in a sampled signal.
+
+    The fourth difference removes everything smooth; its median size is that of the noise. Source: the idea of
+    von Neumann et al. 1941, robust form e.g. in Gasser, Sroka and Jennen-Steinmetz 1986.
+
+    Parameters
+    ----------
+    signal
+        Shape (n,), sampled much faster than it moves.
+    """
+    differences = np.convolve(signal, _DIFFERENCE, mode="valid") / np.sqrt(np.sum(_DIFFERENCE**2))
+    return float(np.median(np.abs(differences)) / _MEDIAN_OF_NORMAL)
+
+
+def quantum_of(signal: Array) -> float:
+    """Return the size of one count: the smallest step between two values that occur.
+
+    Parameters
+    ----------
+    signal
+        Shape (n,).
+    """
+    steps = np.diff(np.unique(signal))
+    steps = steps[steps > 1e-9 * max(1e-300, float(np.ptp(signal)))]
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def autocorrelation(residual: Array, lags: int) -> Array:
+    """Return the autocorrelation at lags 0 to ``lags``.
+
+    Parameters
+    ----------
+    residual
+        Shape (n,).
+    lags
+        Largest lag, below n.
+    """
+    centred = residual - residual.mean()
+    size = 1 << int(np.ceil(np.log2(2 * len(centred))))
+    power = np.abs(np.fft.rfft(centred, size)) ** 2
+    found = np.fft.irfft(power, size)[: lags + 1]
+    result: Array = found / found[0] if found[0] > 0.0 else np.eye(1, lags + 1)[0]
+    return result
+
+
+def effective_size(residual: Array) -> float:
+    """Return how many independent samples a coloured residual is worth.
+
+    n/(1 + 2Σρₖ²), the size for the variance of a mean square (Bartlett 1946), summed while ρ is above its
+    own noise.
+
+    Parameters
+    ----------
+    residual
+        Shape (n,).
+    """
+    n = len(residual)
+    rho = autocorrelation(residual, min(n - 1, max(10, n // 4)))[1:]
+    quiet = np.flatnonzero(np.abs(rho) < 2.0 / np.sqrt(n))
+    kept = rho[: quiet[0]] if len(quiet) else rho
+    return float(n / (1.0 + 2.0 * np.sum(kept**2)))
+
+
+class Whiteness(NamedTuple):
+    """Ljung–Box statistic relative to its expectation, and the size the residual is worth."""
+
+    ratio: float
+    effective_size: float
+    samples: int
+
+
+def whiteness(residual: Array, lags: int = 20) -> Whiteness:
+    """Measure how far a residual is from white noise.
+
+    Parameters
+    ----------
+    residual
+        Shape (n,).
+    lags
+        Number of lags.
+
+    Returns
+    -------
+    Whiteness
+        A ratio near 1 is white; its standard deviation is √(2/lags).
+    """
+    n = len(residual)
+    rho = autocorrelation(residual, lags)[1:]
+    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
+    return Whiteness(float(statistic / lags), effective_size(residual), n)
+
+
+class Binned(NamedTuple):
+    """Mean residual over a quantity: centres of the bins, means, and their standard errors."""
+
+    centre: Array
+    mean: Array
+    error: Array
+
+
+def binned(residual: Array, over: Array, bins: int = 30) -> Binned:
+    """Return the mean residual over an angle, speed, force or time.
+
+    Parameters
+    ----------
+    residual, over
+        Shape (n,).
+    bins
+        Number of bins of equal width; empty ones are left out.
+    """
+    edges = np.linspace(float(over.min()), float(over.max()), bins + 1)
+    place = np.clip(np.digitize(over, edges) - 1, 0, bins - 1)
+    count = np.bincount(place, minlength=bins)
+    full = count > 1
+    mean = np.bincount(place, residual, bins)[full] / count[full]
+    square = np.bincount(place, residual**2, bins)[full] / count[full]
+    error = np.sqrt(np.maximum(square - mean**2, 0.0) / count[full])
+    return Binned((0.5 * (edges[1:] + edges[:-1]))[full], mean, error)
+
+
+def spectrum(residual: Array, step: float, bins: int = 60) -> Binned:
+    """Return the power of a residual over frequency in Hz.
+
+    Parameters
+    ----------
+    residual
+        Shape (n,).
+    step
+        Time between samples in s.
+    bins
+        Number of bands.
+    """
+    window = np.hanning(len(residual))
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / np.sum(window**2)
+    return binned(power, np.fft.rfftfreq(len(residual), step), bins)
+
+
+def shapes(residual: Array, signals: Mapping[str, Array], speed: Array | None, step: float) -> dict[str, Binned]:
+    """Return the residual over every measured signal, over frequency, and over the signals by direction.
+
+    Parameters
+    ----------
+    residual
+        Shape (n,).
+    signals
+        Measured signals by name, shape (n,).
+    speed
+        Rate of the motion, whose sign is the direction; ``None`` if there is none.
+    step
+        Time between samples in s.
+    """
+    found = {f"over {name}": binned(residual, values) for name, values in signals.items()}
+    found["over frequency"] = spectrum(residual, step)
+    found["over time"] = binned(residual, np.arange(len(residual)) * step)
+    if speed is not None:
+        found["over speed"] = binned(residual, speed)
+        for word, mask in (("forward", speed > 0.0), ("backward", speed < 0.0)):
+            if mask.sum() > 100:
+                found |= {f"over {n}, {word}": binned(residual[mask], v[mask]) for n, v in signals.items()}
+    return found
