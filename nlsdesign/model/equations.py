@@ -12,6 +12,8 @@ from typing import Any
 
 import casadi as ca
 import sympy
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from ..errors import ExportError
 from .flat import FlatModel
@@ -44,7 +46,6 @@ _UNARY: dict[int, Callable[[Any], Any]] = {
     ca.OP_FLOOR: sympy.floor,
     ca.OP_CEIL: sympy.ceiling,
     ca.OP_INV: lambda a: 1 / a,
-    ca.OP_NOT: lambda a: 1 - a,
 }
 _BINARY: dict[int, Callable[[Any, Any], Any]] = {
     ca.OP_ADD: lambda a, b: a + b,
@@ -56,14 +57,36 @@ _BINARY: dict[int, Callable[[Any, Any], Any]] = {
     ca.OP_FMIN: sympy.Min,
     ca.OP_FMAX: sympy.Max,
     ca.OP_ATAN2: sympy.atan2,
-    ca.OP_LT: lambda a, b: sympy.Piecewise((1, a < b), (0, True)),
-    ca.OP_LE: lambda a, b: sympy.Piecewise((1, a <= b), (0, True)),
-    ca.OP_EQ: lambda a, b: sympy.Piecewise((1, sympy.Eq(a, b)), (0, True)),
-    ca.OP_NE: lambda a, b: sympy.Piecewise((1, sympy.Ne(a, b)), (0, True)),
-    ca.OP_AND: lambda a, b: a * b,
-    ca.OP_OR: sympy.Max,
-    ca.OP_IF_ELSE_ZERO: lambda a, b: sympy.Piecewise((b, sympy.Ne(a, 0)), (0, True)),
+    ca.OP_LT: sympy.Lt,
+    ca.OP_LE: sympy.Le,
+    ca.OP_EQ: sympy.Eq,
+    ca.OP_NE: sympy.Ne,
 }
+# In CasADi a condition is the number 1 or 0, in SymPy a truth value.
+_LOGIC: dict[int, Callable[..., Any]] = {ca.OP_NOT: sympy.Not, ca.OP_AND: sympy.And, ca.OP_OR: sympy.Or}
+
+
+_TRUTH_VALUES = (Relational, BooleanFunction, BooleanAtom)
+
+
+def _number(value: Any) -> Any:
+    return (
+        sympy.Piecewise((1, value), (0, True), evaluate=False) if isinstance(value, _TRUTH_VALUES) else value
+    )
+
+
+def _truth(value: Any) -> Any:
+    return value if isinstance(value, _TRUTH_VALUES) else sympy.Ne(value, 0)
+
+
+def _value(operation: int, operands: list[Any]) -> Any:
+    if operation in _LOGIC:
+        return _LOGIC[operation](*map(_truth, operands))
+    if operation == ca.OP_IF_ELSE_ZERO:
+        # Not evaluated: SymPy would work out how conditions inside conditions may be merged.
+        pair = (_number(operands[1]), _truth(operands[0]))
+        return sympy.Piecewise(pair, (0, True), evaluate=False)
+    return (_UNARY.get(operation) or _BINARY[operation])(*map(_number, operands))
 
 
 @dataclass(frozen=True)
@@ -134,8 +157,29 @@ def equations(model: FlatModel) -> Equations:
     results = [[v.name for v in group] for group in (model.states, model.outputs, model.signals)]
     reader = _Reader(model.equations, inputs)
     reader.run(results)
-    derivatives = {name: reader.shown(reader.results[0, i]) for i, name in enumerate(results[0])}
+    derivatives = {n: reader.terms[reader.results[0, i]].shown for i, n in enumerate(results[0])}
     return Equations(derivatives, reader.definitions, model.sample_time is not None)
+
+
+@dataclass(frozen=True)
+class _Term:
+    """The value of an instruction, with the operations in it and what it depends on."""
+
+    value: Any
+    size: int
+    uses: frozenset[sympy.Symbol]
+
+    @property
+    def shown(self) -> Any:
+        """The value; where it is too long, a function of what it depends on, rows of numbers named once."""
+        if self.size <= LONGEST:
+            return _number(self.value)
+        names = {str(s.name).partition("[")[0] for s in self.uses}
+        return sympy.Function("f")(*[_symbol(name) for name in sorted(names)])
+
+
+def _symbol(name: str) -> sympy.Symbol:
+    return sympy.Symbol(name, real=True)
 
 
 class _Reader:
@@ -143,21 +187,28 @@ class _Reader:
 
     def __init__(self, function: ca.Function, inputs: list[list[str]]) -> None:
         self.function, self.inputs = function, inputs
-        self.values: list[Any] = []
+        self.terms: list[_Term] = []
         self.results: dict[tuple[int, int], int] = {}
-        self.named: dict[int, str] = {}
         self.definitions: dict[str, sympy.Expr] = {}
 
     def run(self, results: list[list[str]]) -> None:
         steps = self._steps()
+        names: dict[int, list[str]] = {}
         for (port, index), step in self.results.items():
-            if port in (1, 2) and steps[step][0] not in (ca.OP_INPUT, ca.OP_CONST):
-                self.named.setdefault(step, results[port][index])
+            if port in (1, 2) and results[port][index] not in names.setdefault(step, []):
+                names[step].append(results[port][index])
         for number, (operation, operands, extra) in enumerate(steps):
-            value = self._value(operation, [self.symbol(i) for i in operands], extra)
-            self.values.append(value)
-            if number in self.named:
-                self.definitions[self.named[number]] = self._short(value)
+            term = self._term(operation, [self.terms[i] for i in operands], extra)
+            self.terms.append(self._defined(term, names.get(number, []), operation))
+
+    def _defined(self, term: _Term, names: list[str], operation: int) -> _Term:
+        """Note the names of a value; from then on it goes by the first of them, inputs by their own."""
+        if names and operation not in (ca.OP_INPUT, ca.OP_CONST):
+            own = _symbol(names[0])
+            self.definitions[names.pop(0)] = term.shown
+            term = _Term(own, 0, frozenset([own]))
+        self.definitions |= {name: term.value for name in names if name != str(term.value)}
+        return term
 
     def _steps(self) -> list[tuple[int, list[int], Any]]:
         """Return the instructions with each operand as the number of the instruction that made it."""
@@ -175,28 +226,20 @@ class _Reader:
             held[out[0]] = len(steps) - 1
         return steps
 
-    def _value(self, operation: int, operands: list[Any], extra: Any) -> Any:
+    def _term(self, operation: int, operands: list[_Term], extra: Any) -> _Term:
         if operation == ca.OP_CONST:
-            return sympy.nsimplify(extra) if float(extra).is_integer() else sympy.Float(extra, 6)
+            whole = float(extra).is_integer()
+            return _Term(sympy.Integer(int(extra)) if whole else sympy.Float(extra), 0, frozenset())
         if operation == ca.OP_INPUT:
-            return sympy.Symbol(self.inputs[extra[0]][extra[1]], real=True)
-        if operation in _UNARY:
-            return _UNARY[operation](*operands[:1])
-        if operation in _BINARY:
-            return _BINARY[operation](*operands)
-        raise ExportError(
-            f"operation {operation}", "has no SymPy counterpart", next_step="add it in equations.py"
-        )
-
-    def symbol(self, step: int) -> Any:
-        """Return the value of an instruction, or its name where it has one."""
-        return sympy.Symbol(self.named[step], real=True) if step in self.named else self.values[step]
-
-    def shown(self, step: int) -> Any:
-        """Return the expression to show on the right-hand side."""
-        return self.symbol(step) if step in self.named else self._short(self.values[step])
-
-    def _short(self, value: Any) -> Any:
-        if value.count_ops() <= LONGEST:
-            return value
-        return sympy.Function("f")(*sorted(value.free_symbols, key=lambda s: str(s.name))[:6])
+            symbol = _symbol(self.inputs[extra[0]][extra[1]])
+            return _Term(symbol, 0, frozenset([symbol]))
+        if operation not in {*_UNARY, *_BINARY, *_LOGIC, ca.OP_IF_ELSE_ZERO}:
+            raise ExportError(
+                f"operation {operation}", "has no SymPy counterpart", next_step="add it in equations.py"
+            )
+        # CasADi names two operands also where there is one.
+        used = operands[:1] if operation in _UNARY or operation == ca.OP_NOT else operands
+        size = 1 + sum(term.size for term in used)
+        # What is too long to be shown is not even built: written out, shared parts multiply.
+        value = _value(operation, [term.value for term in used]) if size <= LONGEST else None
+        return _Term(value, size, frozenset().union(*[term.uses for term in used]))

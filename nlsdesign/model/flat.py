@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -10,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..errors import UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, same_dimension
 from ..symbolic import Expression
 
@@ -71,7 +72,7 @@ class Table:
     values: NDArray[np.float64]
 
     def look_up(self, at: float) -> NDArray[np.float64]:
-        """Return all columns at one argument.
+        """Return all columns at one argument; not a number where the argument is none.
 
         Parameters
         ----------
@@ -83,6 +84,8 @@ class Table:
         numpy.ndarray
             Shape (columns,).
         """
+        if math.isnan(at):
+            return np.full(self.values.shape[1], np.nan)
         last = self.values.shape[0] - 1
         position = min(max((at - self.lower) / self.step, 0.0), float(last))
         left = min(int(position), last - 1)
@@ -196,6 +199,8 @@ class FlatModel:
             If a name is neither parameter, state nor input.
         ValueRangeError
             If a number is outside the stated range.
+        UnitError
+            If a quantity measures something else.
         """
         names = {v.name for group in (self.parameters, self.states, self.inputs) for v in group}
         for name in values:
@@ -259,8 +264,10 @@ class FlatModel:
 def _with_start(variable: Variable, given: float | Quantity) -> Variable:
     value = given.number if isinstance(given, Quantity) else float(given)
     if isinstance(given, Quantity) and not same_dimension(given.unit, variable.unit):
-        raise ValueRangeError(
-            f"{variable.name} = {given}", f"the unit must measure what '{variable.unit}' measures"
+        raise UnitError(
+            f"{variable.name} = {given}",
+            f"'{given.unit}' does not measure {variable.description}",
+            next_step=f"give it in a unit like '{variable.unit}'",
         )
     if not variable.minimum <= value <= variable.maximum:
         raise ValueRangeError(

@@ -21,6 +21,9 @@ from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
 
+TYPICAL_SIZE = {"m": 1e-2, "m/s": 0.1, "N": 10.0, "Pa": 1e5}
+"""Nominal size of a state by its unit, where one of the unit is far off; for tolerances and scaling."""
+
 
 class Ledger:
     """What the parts have said so far: symbols, equations, names."""
@@ -31,7 +34,8 @@ class Ledger:
         self.states: dict[str, tuple[Variable, Expression]] = {}
         self.signals: dict[str, tuple[Variable, Expression]] = {}
         self.derivatives: dict[str, Expression] = {}
-        self.definitions: list[tuple[Expression, Expression]] = []
+        self.unknowns = ca.SX(0, 1)
+        self.solutions = ca.SX(0, 1)
         self.checks: dict[str, Expression] = {}
         self.order = {path: number for number, (path, _) in enumerate(assembly.walk())}
         for path, part in assembly.walk():
@@ -52,19 +56,28 @@ class Ledger:
 
     def cleaned(self, expression: Expression) -> Expression:
         """Return an expression with all defined unknowns replaced by their solutions."""
-        for unknown, solution in self.definitions:
-            expression = ca.substitute(expression, unknown, solution)
-        return expression
+        return ca.SX(ca.substitute(expression, self.unknowns, self.solutions))
+
+    def define(self, unknown: Expression, solution: Expression) -> None:
+        """Note the solution of an unknown; no solution ever contains a defined unknown.
+
+        All are replaced in one call each time, so that the solutions go on sharing their common parts;
+        one by one, they would grow with every step.
+        """
+        solution = self.cleaned(solution)
+        if depends(self.solutions, unknown):
+            self.solutions = ca.SX(ca.substitute(self.solutions, unknown, solution))
+        self.unknowns = ca.vertcat(self.unknowns, unknown)
+        self.solutions = ca.vertcat(self.solutions, solution)
 
     def named(self) -> dict[str, Expression]:
         """Return states, inputs and signals by name."""
         found = {name: e for group in (self.states, self.inputs) for name, (_, e) in group.items()}
         return found | {name: e for name, (_, e) in self.signals.items()}
 
-    def owner_order(self, name: str) -> int:
-        """Return the place of the part that owns a name in the written order."""
-        path = name.rpartition(".")[0]
-        return self.order.get(path, len(self.order))
+    def in_order(self, names: Iterable[str]) -> list[str]:
+        """Return names in the written order of the parts that own them."""
+        return sorted(names, key=lambda name: self.order.get(name.rpartition(".")[0], len(self.order)))
 
 
 class PartScope:
@@ -102,7 +115,8 @@ class PartScope:
         if full in self._ledger.states:
             raise ArrangementError(full, "two equations claim this state")
         symbol = ca.SX.sym(full)
-        self._ledger.states[full] = (Variable(full, unit, description), symbol)
+        variable = Variable(full, unit, description, nominal=TYPICAL_SIZE.get(unit, 1.0))
+        self._ledger.states[full] = (variable, symbol)
         return symbol
 
     def derive(self, state: Expression, derivative: Expression) -> None:
@@ -117,7 +131,7 @@ class PartScope:
 
     def define(self, unknown: Expression, solution: Expression) -> None:
         """Give the solution of an unknown."""
-        self._ledger.definitions.append((unknown, self._ledger.cleaned(solution)))
+        self._ledger.define(unknown, solution)
 
     def check(self, name: str, residual: Expression) -> None:
         """Record a residual that must vanish."""
@@ -137,7 +151,7 @@ class PartScope:
     def rate_is_used(self, rate: Expression) -> bool:
         """Tell whether anything given so far contains this symbol."""
         given = [*self._ledger.derivatives.values(), *(e for _, e in self._ledger.signals.values())]
-        given += [solution for _, solution in self._ledger.definitions]
+        given.append(self._ledger.solutions)
         return any(depends(e, rate) for e in given)
 
 
@@ -220,6 +234,17 @@ def _default_outputs(assembly: Assembly) -> list[str]:
     return readings or ties
 
 
+def _chosen(
+    kind: str, given: Sequence[str] | None, valid: Iterable[str], default: Sequence[str]
+) -> list[str]:
+    """Return the names that the user chose, each once, or the default."""
+    chosen = list(default if given is None else [given] if isinstance(given, str) else dict.fromkeys(given))
+    for name in chosen:
+        if name not in valid:
+            raise unknown_name(kind, name, valid)
+    return chosen
+
+
 def _needed_states(
     ledger: Ledger, derivatives: Mapping[str, Expression], roots: Iterable[Expression]
 ) -> list[str]:
@@ -232,27 +257,23 @@ def _needed_states(
             if name not in needed and depends(expression, symbol):
                 needed.add(name)
                 wanted.append(derivatives[name])
-    return sorted(needed, key=lambda name: (ledger.owner_order(name), list(ledger.states).index(name)))
+    return [name for name in ledger.in_order(ledger.states) if name in needed]
 
 
 def _model(
     assembly: Assembly, ledger: Ledger, inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> FlatModel:
-    kept = list(ledger.inputs) if inputs is None else list(inputs)
-    for name in kept:
-        if name not in ledger.inputs:
-            raise unknown_name("input", name, ledger.inputs)
+    kept = _chosen("input", inputs, ledger.inputs, ledger.in_order(ledger.inputs))
     known = ledger.named()
-    given = _default_outputs(assembly) if outputs is None else list(outputs)
-    for name in given:
-        if name not in known:
-            raise unknown_name("output", name, known)
+    given = _chosen("output", outputs, known, _default_outputs(assembly))
     open_states = [name for name in ledger.states if name not in ledger.derivatives]
     if open_states:
         raise ArrangementError(open_states[0], "no equation gives its derivative")
 
+    ledger.signals = {name: ledger.signals[name] for name in ledger.in_order(ledger.signals)}
     derivatives, signals, results, checks = _finished(ledger, kept, given)
-    states = _needed_states(ledger, derivatives, [*signals, *results])
+    moving = [ledger.states[n][1] for n in ledger.states if isinstance(assembly[n.rpartition(".")[0]], Body)]
+    states = _needed_states(ledger, derivatives, [*signals, *results, *moving])
     columns = [
         ca.SX.sym("time"),
         ca.vertcat(*[ledger.states[n][1] for n in states]),
@@ -266,7 +287,8 @@ def _model(
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
     )  # fmt: skip
     _check_unique(ledger)
-    if any(math.isnan(v) for v in _probe(equations)):
+    values = [v.start for v, _ in ledger.parameters.values()]
+    if not all(math.isfinite(v) for v in _probe(equations, values)):
         raise ArrangementError(
             f"assembly '{assembly.name}'",
             "the equations are singular",
@@ -313,6 +335,9 @@ def _check_unique(ledger: Ledger) -> None:
             seen.add(name)
 
 
-def _probe(equations: ca.Function) -> list[float]:
-    arguments = [ca.DM.ones(equations.sparsity_in(i)) * 0.1 for i in range(equations.n_in())]
+def _probe(equations: ca.Function, parameters: Sequence[float]) -> list[float]:
+    """Return every number that the equations give near rest, with the parameters as they are."""
+    # Not at rest itself, where a law may have a corner.
+    arguments = [ca.DM.ones(equations.sparsity_in(i)) * 1e-3 for i in range(equations.n_in())]
+    arguments[3] = ca.DM(parameters)
     return [float(v) for result in equations.call(arguments) for v in ca.densify(result).nonzeros()]

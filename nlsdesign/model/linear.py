@@ -10,7 +10,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError
+from ..errors import ConvergenceError, ValueRangeError, unknown_name
 from .flat import FlatModel
 
 Matrix = NDArray[np.float64]
@@ -117,9 +117,14 @@ def rest_state(
 
     Raises
     ------
+    UnknownNameError
+        If a held state does not exist.
     ConvergenceError
         If no such state is found.
     """
+    for name in held:
+        if name not in (names := [v.name for v in model.states]):
+            raise unknown_name("state", name, names)
     u = np.asarray(inputs if len(inputs) else model.start(model.inputs), dtype=float)
     x = model.start(model.states)
     for i, v in enumerate(model.states):

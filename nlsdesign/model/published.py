@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from ..errors import ArrangementError
+from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
 from .transform import cut, named
@@ -67,57 +67,61 @@ def published_form(model: FlatModel, names: PublishedNames | None = None) -> Fla
         If the force does not depend on extension and inner state alone, or is not affine in the latter.
     """
     n = PublishedNames() if names is None else names
+    states = [v.name for v in model.states]
+    for name in (n.inner, n.angle, n.speed):
+        if name not in states:
+            raise unknown_name("state", name, states)
     rubber, drive = cut(model, [n.extension]), cut(model, [n.force])
     symbols = {name: ca.SX.sym(name) for name in (n.force, n.extension, n.angle, n.speed, n.rate)}
     outer = {v.name: ca.SX.sym(v.name) for v in model.inputs}
     parameters = {v.name: ca.SX.sym(v.name) for v in model.parameters}
-    force_rate = _force_rate(rubber, n, symbols | parameters)
     known = symbols | outer | parameters
-    found = _expressed(drive, known, [f"der({n.speed})", *(v.name for v in drive.signals)])
-    if found[f"der({n.speed})"] is None:
-        raise ArrangementError(f"'{n.speed}'", f"its derivative does not follow from {', '.join(symbols)}")
-    geometric = _expressed(model, known, [n.extension])[n.extension]
-    if geometric is None:
-        raise ArrangementError(f"'{n.extension}'", f"does not follow from '{n.angle}'")
-    signals = [
-        (v, found[v.name]) for v in drive.signals if found[v.name] is not None and v.name not in symbols
-    ]
+    force_rate = _force_rate(rubber, n, known)
+    pull = _required(drive, known, f"der({n.speed})")
     extension = replace(model.variable(n.extension), start=0.0)
-    signals.append((replace(extension, name=f"{n.extension}.{GEOMETRIC}"), geometric))
-    states = [symbols[name] for name in (n.force, n.extension, n.angle, n.speed)]
+    found = _expressed(drive, known, [v.name for v in drive.signals if v.name not in symbols])
+    signals = {drive.variable(name): value for name, value in found.items() if value is not None}
+    signals[replace(extension, name=f"{n.extension}.{GEOMETRIC}")] = _required(model, known, n.extension)
+    carried = (n.force, n.extension, n.angle, n.speed)
     equations = ca.Function(
         "equations",
         [
-            ca.SX.sym("time"), _column(states), _column([symbols[n.rate], *outer.values()]),
-            _column(list(parameters.values())), ca.SX(0, 1),
+            ca.SX.sym("time"), _column([symbols[name] for name in carried]),
+            _column([symbols[n.rate], *outer.values()]), _column(list(parameters.values())), ca.SX(0, 1),
         ],
         [
-            _column([force_rate, symbols[n.rate], symbols[n.speed], found[f"der({n.speed})"]]),
-            _column([symbols[n.extension], symbols[n.angle]]), _column([value for _, value in signals]),
-            ca.SX(0, 1),
+            _column([force_rate, symbols[n.rate], symbols[n.speed], pull]),
+            _column([symbols[n.extension], symbols[n.angle]]), _column(list(signals.values())), ca.SX(0, 1),
         ],
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
     )  # fmt: skip
     start = model.evaluate([v.start for v in model.states])
-    unit = f"{extension.unit}/s"
+    kept = [model.variable(name) for name in carried]
     return replace(
         model,
         description=f"{model.description} (published form)".strip(),
-        states=tuple(
-            replace(model.variable(name), start=start.get(name, model.variable(name).start))
-            for name in (n.force, n.extension, n.angle, n.speed)
-        ),
-        inputs=(Variable(n.rate, unit, f"rate of {n.extension}"), *model.inputs),
+        states=tuple(replace(v, start=start.get(v.name, v.start)) for v in kept),
+        inputs=(Variable(n.rate, f"{extension.unit}/s", f"rate of {n.extension}"), *model.inputs),
         outputs=(extension, replace(model.variable(n.angle), start=0.0)),
-        signals=tuple(v for v, _ in signals),
+        signals=tuple(signals),
         equations=equations,
     )
+
+
+def _required(model: FlatModel, known: Mapping[str, Expression], name: str) -> Expression:
+    found = _expressed(model, known, [name])[name]
+    if found is None:
+        raise ArrangementError(
+            f"'{name}'", "does not follow from force, extension, angle and speed alone",
+            next_step="the published form knows a fixed load and one element behind one cam",
+        )  # fmt: skip
+    return found
 
 
 def _force_rate(rubber: FlatModel, n: PublishedNames, symbols: Mapping[str, Expression]) -> Expression:
     """Return dF/dt as a function of force, extension and its rate."""
     inner = ca.SX.sym(n.inner)
-    found = _expressed(rubber, dict(symbols) | {n.inner: inner}, [n.force, f"der({n.inner})"])
+    found = _expressed(rubber, {**symbols, n.inner: inner}, [n.force, f"der({n.inner})"])
     force, inner_rate = found[n.force], found[f"der({n.inner})"]
     if (
         force is None

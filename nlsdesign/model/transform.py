@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import casadi as ca
 
@@ -80,7 +81,8 @@ def with_signal(
     --------
     >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
     >>> from nlsdesign.model import Variable, flatten
-    >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=tie(TorsionSpring(stiffness=2.0), "wheel"))
+    >>> spring = tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring)
     >>> energy = Variable("spring.energy", "J", "energy stored in the spring")
     >>> half = lambda n: n["spring.torque"] * n["wheel.angle"] / 2
     >>> with_signal(flatten(swing), energy, half).evaluate([0.1, 0.0])["spring.energy"]
@@ -240,7 +242,7 @@ def _rebuilt(
         ends.append(ends[-1] + row.shape[0])
     equations = ca.Function(
         "equations", [s.time, s.state, s.input, s.parameter, s.table],
-        [shared[a:b] for a, b in zip(ends, ends[1:], strict=False)],
+        [shared[a:b] for a, b in pairwise(ends)],
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
     )  # fmt: skip
     return replace(

@@ -1,0 +1,8 @@
+"""What can be said of a model before anything is built on it: observability, stability, best estimate."""
+
+from .kalman import EstimateDeviation
+from .observability import Observability
+from .stability import Stability
+from .sweep import Chart, Point, View, over_angle
+
+__all__ = ["Chart", "EstimateDeviation", "Observability", "Point", "Stability", "View", "over_angle"]

@@ -1,0 +1,203 @@
+"""Where a model rests while its angle is held, and how large its variables typically are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArrangementError, ConvergenceError, unknown_name
+from ..model import FlatModel
+from ..model.transform import named
+
+Array = NDArray[np.float64]
+
+
+def rate_state(model: FlatModel, angle: str) -> str:
+    """Return the name of the state that is the derivative of another one.
+
+    Parameters
+    ----------
+    model
+        Continuous.
+    angle
+        Name of a state, for instance ``"motor.angle"``.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such state.
+    ArrangementError
+        If its derivative is not itself a state.
+    """
+    states = [v.name for v in model.states]
+    if angle not in states:
+        raise unknown_name("state", angle, states)
+    s = model.symbols()
+    rate = s.derivative[states.index(angle)]
+    for i, name in enumerate(states):
+        if ca.is_equal(rate, s.state[i]):
+            return name
+    raise ArrangementError(
+        f"'{angle}'", "its derivative is not a state", next_step="choose the angle of a moving body"
+    )
+
+
+def rest_states(
+    model: FlatModel,
+    angles: Array,
+    *,
+    angle: str = "motor.angle",
+    consistent: Mapping[str, str] | None = None,
+    tolerance: float = 1e-9,
+) -> Array:
+    """Return the states in which everything rests while the angle is held, at many angles at once.
+
+    Parameters
+    ----------
+    model
+        Continuous; inputs are at their start values.
+    angles
+        Shape (n,), in rad.
+    angle
+        State that is held; its rate is held at zero.
+    consistent
+        States that have to agree with a signal of the same model, such as the extension of the published
+        form with ``"spring.rubber.extension.geometric"``; state name to signal name.
+    tolerance
+        Of the states, relative to their largest value over the sweep, or to 1e-3 where that is larger.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (n, states).
+
+    Raises
+    ------
+    ConvergenceError
+        If a state does not come to rest.
+    """
+    names = [v.name for v in model.states]
+    tied = dict(consistent or {})
+    held = {angle, rate_state(model, angle), *tied}
+    x = np.tile(model.start(model.states), (len(angles), 1))
+    x[:, names.index(angle)] = angles
+    x[:, names.index(rate_state(model, angle))] = 0.0
+    s = model.symbols()
+    known = named(model, s)
+    p, u = model.start(model.parameters), model.start(model.inputs)
+    for name, signal in tied.items():
+        follow = ca.Function("follow", [s.time, s.state, s.input, s.parameter], [known[signal]])
+        x[:, names.index(name)] = evaluate_rows(follow, x, u, p)[0][:, 0]
+    free = [i for i, name in enumerate(names) if name not in held]
+    rate = ca.vertcat(*[s.derivative[i] for i in free])
+    slope = ca.jacobian(rate, ca.vertcat(*[s.state[i] for i in free])) if free else ca.SX(0, 0)
+    newton = ca.Function("rate", [s.time, s.state, s.input, s.parameter], [rate, ca.densify(slope)])
+    return _newton(newton, x, (u, p), free, (tolerance, model.name))
+
+
+def typical_sizes(model: FlatModel, angles: Array, *, angle: str = "motor.angle") -> dict[str, float]:
+    """Return a typical size of every state and output over a range of angles, for scaling.
+
+    Angle: the largest in the range. Other states: the largest of their rest values and of what they would
+    jump to if the angle moved there at once from zero. Speed: that of a swing with this amplitude and the
+    largest acceleration at rest. What stays zero has size one.
+
+    Parameters
+    ----------
+    model
+        Continuous, with the inner states free.
+    angles
+        Shape (n,), ascending, in rad.
+    angle
+        Name of the state that is swept.
+    """
+    names = [v.name for v in model.states]
+    speed = rate_state(model, angle)
+    grid = np.linspace(0.0, float(np.max(np.abs(angles))), 65)
+    rest = rest_states(model, grid, angle=angle)
+    s = model.symbols()
+    column = s.state[names.index(speed)]
+    probe = ca.Function(
+        "probe", [s.time, s.state, s.input, s.parameter],
+        [s.derivative, ca.jacobian(s.derivative, column), s.output],
+    )  # fmt: skip
+    rates, driven, outputs = evaluate_rows(
+        probe, rest, model.start(model.inputs), model.start(model.parameters)
+    )
+    steps = np.diff(grid)[:, None]
+    jump = np.abs(np.cumsum((driven[1:] + driven[:-1]) / 2 * steps, axis=0)[-1])
+    sizes = np.maximum(np.max(np.abs(rest), axis=0), jump)
+    at, of = names.index(angle), names.index(speed)
+    sizes[at] = grid[-1]
+    sizes[of] = np.sqrt(grid[-1] * np.max(np.abs(rates[:, of])))
+    result = {name: float(size) if size > 0.0 else 1.0 for name, size in zip(names, sizes, strict=True)}
+    for i, v in enumerate(model.outputs):
+        size = float(np.max(np.abs(outputs[:, i])))
+        result.setdefault(v.name, size if size > 0.0 else 1.0)
+    return result
+
+
+def evaluate_rows(function: ca.Function, x: Array, u: Array, p: Array) -> list[Array]:
+    """Evaluate a function of (time, state, input, parameter) at many states, at time zero.
+
+    Parameters
+    ----------
+    function
+        Any number of results of fixed shape.
+    x
+        Shape (n, states).
+    u
+        Shape (inputs,), the same for all, or (n, inputs).
+    p
+        Shape (parameters,).
+
+    Returns
+    -------
+    list of numpy.ndarray
+        One per result, with one row per state: a matrix result is laid out row by row.
+    """
+    count = len(x)
+    inputs = u.T if u.ndim == 2 else np.tile(u[:, None], (1, count))
+    results = function.map(count).call([np.zeros((1, count)), x.T, inputs, np.tile(p[:, None], (1, count))])
+    rows = []
+    for i, result in enumerate(results):
+        wide = function.size2_out(i)
+        dense = np.array(result).reshape(function.size1_out(i), count, wide)
+        rows.append(np.ascontiguousarray(dense.transpose(1, 0, 2).reshape(count, -1)))
+    return rows
+
+
+def _newton(
+    function: ca.Function, x: Array, fixed: tuple[Array, Array], free: list[int], limit: tuple[float, str]
+) -> Array:
+    """Solve for the free states of all rows at once; done when the steps are small or down to rounding."""
+    if not free or not len(x):
+        return x
+    tolerance, name = limit
+    last = np.full(len(free), np.inf)
+    for _ in range(60):
+        rate, slope = evaluate_rows(function, x, *fixed)
+        try:
+            step = np.linalg.solve(slope.reshape(len(x), len(free), len(free)), rate[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                f"rest states of {name}", "a state has no rest of its own: at standstill nothing moves it",
+                next_step="leave out hysteresis that is led by the speed, and bodies that nothing holds",
+            ) from error  # fmt: skip
+        if not np.all(np.isfinite(step)):
+            break
+        x = x.copy()
+        x[:, free] -= step
+        largest = np.max(np.abs(step), axis=0)
+        size = np.maximum(np.max(np.abs(x[:, free]), axis=0), 1e-3)
+        rounding = (largest > 0.5 * last) & (largest <= 1e3 * tolerance * size)
+        if np.all((largest <= tolerance * size) | rounding):
+            return x
+        last = largest
+    raise ConvergenceError(
+        f"rest states of {name}", "not all states come to rest while the angle is held",
+        next_step="hold further states, or leave out what only drifts",
+    )  # fmt: skip

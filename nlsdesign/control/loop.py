@@ -1,0 +1,258 @@
+"""A closed loop of plant, observer and controller, simulated in one piece.
+
+Time runs in samples. At t_k the plant is read, the observer and the controller are stepped with what was
+read, and the plant is integrated to t_{k+1} with the current held. The current that the controller computes
+at t_k acts from t_{k+delay} on; with the default of one sample the computer has a whole sample for it. The
+observer is told the current that really acts in the coming sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ArrangementError, ValueRangeError, unknown_name
+from ..model import FlatModel
+from ..simulation import Trace
+from .sampled import DiscreteStepper, PlantStepper
+
+Array = NDArray[np.float64]
+Drive = Callable[[float], float] | float
+
+PLANT, OBSERVER, CONTROLLER = "plant", "observer", "controller"
+CURRENT = "motor.current"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ClosedLoop:
+    """Plant, observer and controller wired by name.
+
+    Parameters
+    ----------
+    plant
+        Continuous.
+    observer, controller
+        Discrete, with the same sample time.
+    wires
+        Where an input comes from, ``{"observer.motor.angle": "plant.motor_encoder.reading"}``. Inputs that
+        are not named get the variable of the same name: the observer from the plant, the controller's
+        ``spring.torque`` from the observer and its ``motor.angle`` from the plant.
+    delay
+        Samples between a current's computation and its effect.
+    substeps
+        Integration steps of the plant per sample.
+    """
+
+    plant: FlatModel
+    observer: FlatModel
+    controller: FlatModel
+    wires: Mapping[str, str] = field(default_factory=dict)
+    delay: int = 1
+    substeps: int = 10
+
+    def __post_init__(self) -> None:
+        if self.observer.sample_time is None or self.observer.sample_time != self.controller.sample_time:
+            raise ValueRangeError(
+                f"sample times {self.observer.sample_time} and {self.controller.sample_time} s",
+                "observer and controller must be discrete and sampled alike",
+            )
+        if self.delay < 0 or self.substeps < 1:
+            raise ValueRangeError(f"delay {self.delay}, substeps {self.substeps}", "must be at least 0 and 1")
+        for name in (*self.wires, *self.wires.values()):
+            owner = name.partition(".")[0]
+            if owner not in (PLANT, OBSERVER, CONTROLLER):
+                raise ArrangementError(
+                    f"wire '{name}'", f"must begin with {PLANT}., {OBSERVER}. or {CONTROLLER}."
+                )
+
+    @property
+    def sample_time(self) -> float:
+        """Sample time in s."""
+        return float(self.controller.sample_time or 0.0)
+
+    def run(
+        self, stop: float, *, inputs: Mapping[str, Drive], start: Mapping[str, float] | None = None
+    ) -> Trace:
+        """Simulate from zero.
+
+        Parameters
+        ----------
+        stop
+            Last time in s.
+        inputs
+            Open inputs by full name: functions of time or constants. Those of the controller, such as
+            ``"controller.spring.torque.desired"``, are held from sample to sample; those of the plant, such
+            as ``"plant.load.angle"``, run linearly.
+        start
+            Start values of states by full name; the others are those of the models.
+
+        Returns
+        -------
+        Trace
+            Every variable of the plant and the inputs and outputs of observer and controller, at the
+            samples, with the prefixes ``plant.``, ``observer.`` and ``controller.``.
+
+        Raises
+        ------
+        UnknownNameError
+            If an input or state does not exist.
+        ConvergenceError
+            If the plant runs away.
+        """
+        return _Run(self, inputs, dict(start or {})).until(stop)
+
+
+class _Run:
+    """One simulation: the steppers, the wiring, the record."""
+
+    def __init__(self, loop: ClosedLoop, inputs: Mapping[str, Drive], start: dict[str, float]) -> None:
+        self.loop = loop
+        self.observer, self.controller = DiscreteStepper(loop.observer), DiscreteStepper(loop.controller)
+        self.open = dict(inputs)
+        self.current = [v.name for v in loop.plant.inputs].index(CURRENT)
+        self.sources = {
+            f"{owner}.{v.name}": self._source(owner, v.name)
+            for owner, model in ((OBSERVER, loop.observer), (CONTROLLER, loop.controller))
+            for v in model.inputs
+        }
+        self._check_open()
+        self._check_sources()
+        seen = {s.partition(".")[2] for s in self.sources.values() if s.startswith(PLANT + ".")} - {CURRENT}
+        self.seen = sorted(seen)
+        self.plant = PlantStepper(loop.plant, loop.sample_time, loop.substeps, self.seen)
+        self._begin(start)
+
+    def _source(self, owner: str, name: str) -> str:
+        full = f"{owner}.{name}"
+        if full in self.open:
+            return full
+        if full in self.loop.wires:
+            return self.loop.wires[full]
+        outputs = {v.name for v in self.loop.observer.outputs}
+        return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
+
+    def _check_open(self) -> None:
+        known = {f"{PLANT}.{v.name}" for v in self.loop.plant.inputs} - {f"{PLANT}.{CURRENT}"}
+        known |= {name for name, source in self.sources.items() if source == name}
+        known |= {f"{CONTROLLER}.{v.name}" for v in self.loop.controller.inputs}
+        for name in self.open:
+            if name not in known:
+                raise unknown_name("input of the loop", name, known)
+
+    def _check_sources(self) -> None:
+        plant = self.loop.plant
+        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
+        known = {f"{PLANT}.{v.name}" for group in groups for v in group}
+        known |= {f"{OBSERVER}.{v.name}" for v in self.loop.observer.outputs}
+        for name, source in self.sources.items():
+            if source in known or source == name:
+                continue
+            if name in self.loop.wires:
+                raise unknown_name(f"wire to '{name}' from", source, known)
+            raise ArrangementError(
+                f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
+                next_step="give it in inputs or in wires",
+            )  # fmt: skip
+
+    def _begin(self, start: dict[str, float]) -> None:
+        owners = {
+            PLANT: (self.loop.plant, self.plant.state),
+            OBSERVER: (self.loop.observer, self.observer.state),
+        }
+        owners[CONTROLLER] = (self.loop.controller, self.controller.state)
+        known = {
+            f"{o}.{v.name}": (state, i) for o, (m, state) in owners.items() for i, v in enumerate(m.states)
+        }
+        for name, value in start.items():
+            if name not in known:
+                raise unknown_name("state of the loop", name, known)
+            state, place = known[name]
+            state[place] = value
+
+    def until(self, stop: float) -> Trace:
+        """Run, and return the record."""
+        step = self.loop.sample_time
+        time: Array = step * np.arange(round(stop / step) + 1.0)
+        loop = self.loop
+        groups = (
+            loop.plant.states, loop.plant.inputs, loop.observer.inputs, loop.observer.outputs,
+            loop.controller.inputs, loop.controller.outputs,
+        )  # fmt: skip
+        logs = [np.zeros((len(group), len(time))) for group in groups]
+        others = [
+            (i, self._drive(f"{PLANT}.{v.name}", v.start))
+            for i, v in enumerate(loop.plant.inputs)
+            if i != self.current
+        ]
+        waiting = [float(loop.plant.inputs[self.current].start)] * loop.delay
+        for k, now in enumerate(time):
+            for i, drive in others:
+                self.plant.begin[i], self.plant.end[i] = drive(now), drive(now + step)
+            current = self._sample(float(now), waiting)
+            parts = (
+                self.plant.state, self.plant.begin, self.observer.inputs, self.observer.outputs,
+                self.controller.inputs, self.controller.outputs,
+            )  # fmt: skip
+            for log, part in zip(logs, parts, strict=True):
+                log[:, k] = part[: len(log)]
+            if k + 1 < len(time):
+                self.plant.end[self.current] = current
+                self.plant.advance(float(now))
+        return self._trace(time, logs)
+
+    def _sample(self, now: float, waiting: list[float]) -> float:
+        """Step observer and controller at one sample; return the current that acts in the coming one."""
+        if waiting:
+            self.plant.begin[self.current] = waiting[0]
+        found = {f"{PLANT}.{n}": v for n, v in zip(self.seen, self.plant.read(now), strict=False)}
+        found[f"{PLANT}.{CURRENT}"] = self.plant.begin[self.current]
+        self._feed(OBSERVER, self.observer, found, now)
+        self.observer.evaluate()
+        found |= {
+            f"{OBSERVER}.{v.name}": self.observer.outputs[i] for i, v in enumerate(self.loop.observer.outputs)
+        }
+        self._feed(CONTROLLER, self.controller, found, now)
+        self.controller.evaluate()
+        self.controller.advance()
+        waiting.append(float(self.controller.outputs[0]))
+        acting = waiting.pop(0)
+        if self.loop.delay == 0:
+            # What was computed just now acts at once: the observer hears of it before it moves on.
+            self.plant.begin[self.current] = found[f"{PLANT}.{CURRENT}"] = acting
+            self._feed(OBSERVER, self.observer, found, now)
+            self.observer.evaluate()
+        self.observer.advance()
+        return acting
+
+    def _feed(self, owner: str, stepper: DiscreteStepper, found: Mapping[str, float], now: float) -> None:
+        for i, v in enumerate(stepper.model.inputs):
+            source = self.sources[f"{owner}.{v.name}"]
+            stepper.inputs[i] = found[source] if source in found else self._drive(source, v.start)(now)
+
+    def _drive(self, name: str, rest: float) -> Callable[[float], float]:
+        given = self.open.get(name, rest)
+        if callable(given):
+            return given
+        constant = float(given)
+        return lambda _: constant
+
+    def _trace(self, time: Array, logs: list[Array]) -> Trace:
+        loop = self.loop
+        plant = loop.plant
+        p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
+        _, y, s, _ = plant.equations.map(len(time))(
+            time[None, :], logs[0], logs[1], p, np.zeros((0, len(time)))
+        )
+        groups = [
+            (PLANT, plant.signals, np.array(ca.densify(s))), (PLANT, plant.outputs, np.array(ca.densify(y))),
+            (PLANT, plant.inputs, logs[1]), (PLANT, plant.states, logs[0]),
+            (OBSERVER, loop.observer.inputs, logs[2]), (OBSERVER, loop.observer.outputs, logs[3]),
+            (CONTROLLER, loop.controller.inputs, logs[4]), (CONTROLLER, loop.controller.outputs, logs[5]),
+        ]  # fmt: skip
+        signals = {f"{o}.{v.name}": rows[i] for o, group, rows in groups for i, v in enumerate(group)}
+        units = {f"{o}.{v.name}": v.unit for o, group, _ in groups for v in group}
+        return Trace(time, signals, units, f"closed loop of {loop.plant.name}")

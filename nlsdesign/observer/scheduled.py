@@ -1,0 +1,325 @@
+"""Designs an observer that is scheduled over a measured angle, as a discrete flat model with one table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ValueRangeError
+from ..model import FlatModel, Table, Variable
+from ..symbolic import Expression
+from .forms import Minimal, StateForm
+from .gains import CascadeGain, GainRule
+from .step import Step
+from .table import Compact, Grid, GridByTolerance
+
+Array = NDArray[np.float64]
+
+MEMORY, ESTIMATE, INNOVATION, PREVIOUS = "memory", "estimate", "innovation", "previous"
+"""What is added to a name of the plant for variables that the plant does not have."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObserverDesign:
+    """An observer and what went into it.
+
+    Parameters
+    ----------
+    model
+        The observer: discrete, scheduled over one table.
+    step
+        Its step as exact functions of the angle.
+    compact
+        Its table, and the error that the table makes.
+    """
+
+    model: FlatModel
+    step: Step
+    compact: Compact
+
+    @property
+    def table_error(self) -> dict[str, float]:
+        """Largest error of each sum of the step by reading the table, as a share of its typical size.
+
+        Measured at the grid points and three points between any two of them.
+        """
+        return dict(self.compact.error)
+
+    def start(self, angle: float) -> dict[str, float]:
+        """Return the start values of an observer that begins while the actuator rests at an angle.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        plant, at = self.step.plant, np.array([angle])
+        matrices = self.step.matrices(at)
+        memory = plant.rest(at)[0] - matrices["shift"][0, :, 0] - matrices["prior"][0, :, 0]
+        values = {f"{n}.{MEMORY}": float(m) for n, m in zip(plant.names, memory, strict=True)}
+        for i, name in enumerate(plant.measured):
+            values[f"{name}.{PREVIOUS}"] = float(matrices["measured"][0, i, 0])
+        return values
+
+    def __str__(self) -> str:
+        grid = self.compact.angles
+        lines = [
+            f"Observer of {self.step.plant.estimate.name} every {self.step.sample_time:g} s",
+            f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
+            f"{len(self.compact.columns)} columns",
+            f"  estimate is linear in the inner states to {self.step.plant.affine_error:.2g} of its size",
+        ]
+        lines += [
+            f"  table error of {row}: {error:.2g}" for row, error in self.compact.error.items() if error
+        ]
+        return "\n".join(lines)
+
+
+def observer_design(
+    model: FlatModel,
+    *,
+    estimate: str = "spring.torque",
+    measured: str = "motor.angle",
+    sample_time: float = 1e-3,
+    gain: GainRule | None = None,
+    form: StateForm | None = None,
+    grid: Grid | None = None,
+) -> ObserverDesign:
+    """Design an observer and return it with its table error and start values.
+
+    Parameters
+    ----------
+    model, estimate, measured, sample_time, gain, form, grid
+        As for :func:`design_observer`, which also says what is raised.
+    """
+    if not 0.0 < sample_time < 1.0:
+        raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
+    if model.sample_time is not None:
+        raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
+    rule, over = gain or CascadeGain(), grid or whole_contour(model)
+    reference = np.linspace(over.lower, over.upper, 65)
+    plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
+    step = Step(plant, rule, sample_time, reference)
+    compact = over.compact(step.entries)
+    design = ObserverDesign(_Writer(step, compact).model(), step, compact)
+    return replace(design, model=design.model.with_values(design.start(0.0)))
+
+
+def whole_contour(model: FlatModel) -> GridByTolerance:
+    """Return a grid that reaches to the ends of the cam's contour, or ±90° where there is none.
+
+    Parameters
+    ----------
+    model
+        Its parameters ``<cam>.last_angle`` say where a contour ends; beyond it there is no lever arm.
+    """
+    ends = [v.start for v in model.parameters if v.name.endswith(".last_angle")]
+    end = min(ends, default=math.pi / 2.0)
+    return GridByTolerance(-end, end)
+
+
+def design_observer(
+    model: FlatModel,
+    *,
+    estimate: str = "spring.torque",
+    measured: str = "motor.angle",
+    sample_time: float = 1e-3,
+    gain: GainRule | None = None,
+    form: StateForm | None = None,
+    grid: Grid | None = None,
+) -> FlatModel:
+    """Design an observer that estimates a torque from a measured angle and the known inputs.
+
+    Its inputs are the measured angle and the inputs of the model, held over the coming sample; its outputs
+    the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have
+    carries an ending: ``.memory`` is what goes from sample to sample, ``.innovation`` the measured minus
+    the expected angle, ``.estimate`` the estimate of the angle itself, whose name the input has.
+
+    Parameters
+    ----------
+    model
+        Continuous, load fixed.
+    estimate
+        Output or signal that is wanted.
+    measured
+        State that is measured and over which everything is scheduled.
+    sample_time
+        In s.
+    gain
+        Rule for the correction; :class:`~nlsdesign.observer.gains.CascadeGain` by default.
+    form
+        Which states are carried; :class:`~nlsdesign.observer.forms.Minimal` by default.
+    grid
+        Range and number of grid points; :func:`whole_contour` by default.
+
+    Raises
+    ------
+    UnknownNameError
+        If a name does not exist.
+    ArrangementError
+        If the equations cannot be scheduled over one angle.
+    ValueRangeError
+        If the estimate is far from linear in the inner states, or a setting is out of range.
+    ConvergenceError
+        If a gain cannot be found, or the table does not keep its error bound.
+    """
+    return observer_design(
+        model, estimate=estimate, measured=measured, sample_time=sample_time, gain=gain, form=form, grid=grid
+    ).model
+
+
+class _Writer:
+    """Writes the step with the entries read from the table."""
+
+    def __init__(self, step: Step, compact: Compact) -> None:
+        self.step, self.compact, self.plant = step, compact, step.plant
+        self.w = ca.SX.sym("w", len(compact.columns))
+        self.n = len(self.plant.states)
+        self.angle = self.plant.states[self.n - 2]
+
+    def read(self, kind: str, i: int, j: int = 0) -> Expression:
+        """Return one entry; zero entries vanish from the expressions."""
+        place = self.compact.places[f"{kind}[{i}][{j}]"]
+        return ca.SX(place.factor) if place.column is None else place.factor * self.w[place.column]
+
+    def row(self, kind: str, i: int, of: Sequence[Expression]) -> Expression:
+        """Return one sum."""
+        return sum((self.read(kind, i, j) * x for j, x in enumerate(of)), start=ca.SX(0))
+
+    def model(self) -> FlatModel:
+        """Return the observer."""
+        plant, n = self.plant, self.n
+        memory = [ca.SX.sym(f"{name}.{MEMORY}") for name in plant.names]
+        previous = [ca.SX.sym(f"{name}.{PREVIOUS}") for name in plant.measured]
+        filtered = [ca.SX.sym(f"{name}.rate") for name in plant.measured] if self._filters else []
+        angle, u = ca.SX.sym(self.angle.name), [ca.SX.sym(v.name) for v in plant.inputs]
+        measured = [angle, *(self.read("measured", i) for i in range(len(plant.measured)))]
+        prior = self._braked([memory[i] + self.read("prior", i) for i in range(n)])
+        seen = [int(np.argmax(row)) for row in plant.output_matrix]
+        innovation = [y - prior[i] for y, i in zip(measured, seen, strict=True)]
+        state = [prior[i] + self.row("correction", i, innovation) for i in range(n)]
+        rates = self._rates(measured[1:], previous, filtered)
+        driven = ca.SX(plant.driven(ca.vertcat(*u)))
+        pushed = [*[driven[i] for i in range(driven.numel())], *(rates or [ca.SX(0)])]
+        following = [self.row("next", i, [*state, ca.SX(1), *pushed]) for i in range(n)]
+        estimate = self.row("estimate", 0, [*state, ca.SX(1)])
+        shown = [state[i] + self.read("shift", i) for i in range(n)]
+        equations = ca.Function(
+            "equations",
+            [
+                ca.SX.sym("time"), _column([*memory, *previous, *filtered]), _column([angle, *u]),
+                ca.SX(0, 1), self.w,
+            ],
+            [
+                _column([*following, *measured[1:], *(rates if filtered else [])]),
+                _column([estimate, *shown, *innovation]), ca.SX(0, 1), ca.SX(0, 1),
+            ],
+            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+        )  # fmt: skip
+        return FlatModel(
+            f"{plant.name}_observer", self._description(), self._states(), self._inputs(), (),
+            self._outputs(), (), equations, self.step.sample_time, self._tables(),
+        )  # fmt: skip
+
+    @property
+    def _filters(self) -> bool:
+        return math.isfinite(self.plant.rate_bandwidth)
+
+    def _rates(
+        self, measured: Sequence[Expression], previous: Sequence[Expression], filtered: Sequence[Expression]
+    ) -> list[Expression]:
+        time = self.step.sample_time
+        raw = [(now - before) / time for now, before in zip(measured, previous, strict=True)]
+        keep = math.exp(-2.0 * math.pi * self.plant.rate_bandwidth * time) if self._filters else 0.0
+        return (
+            [keep * old + (1.0 - keep) * new for old, new in zip(filtered, raw, strict=True)]
+            if filtered
+            else raw
+        )
+
+    def _braked(self, state: list[Expression]) -> list[Expression]:
+        """Return the state after friction has acted for one sample on the speed that all else left.
+
+        Friction is stiff near zero speed: held at its value it would throw the speed from side to side. So it
+        comes last (Lie splitting), its step is the exponential Rosenbrock–Euler one, Δω = T·f·(e^x − 1)/x
+        with x = T·∂f/∂ω, which is exact where f is linear, and it may stop the speed but not turn it around.
+        The angle moves by half of that.
+        """
+        if self.plant.friction is None:
+            return state
+        time, speed = self.step.sample_time, ca.SX.sym("speed")
+        rate = ca.SX(self.plant.friction(speed))
+        x = time * ca.jacobian(rate, speed)
+        # Away from zero, where the quotient is undefined; its limit there is one.
+        x = x - 1e-9 * (ca.fabs(x) < 1e-9)
+        left = speed + time * rate * ca.expm1(x) / x
+        change = ca.substitute(left * (left * speed > 0) - speed, speed, state[-1])
+        return [*state[:-2], state[-2] + time / 2.0 * change, state[-1] + change]
+
+    def _description(self) -> str:
+        grid = self.compact.angles
+        return (
+            f"observer of {self.plant.estimate.name}, {self.step.gain}, table of {len(grid)} angles from "
+            f"{grid[0]:.4g} to {grid[-1]:.4g} rad"
+        )
+
+    def _states(self) -> tuple[Variable, ...]:
+        plant = self.plant
+        states = [
+            Variable(
+                f"{v.name}.{MEMORY}", v.unit, f"what the estimate of {v.name} carries on", nominal=float(size)
+            )
+            for v, size in zip(plant.states, plant.sizes, strict=True)
+        ]  # fmt: skip
+        for name in plant.measured:
+            v = plant.states[plant.names.index(name)]
+            states.append(Variable(f"{name}.{PREVIOUS}", v.unit, f"{name} one sample ago"))
+        for name in plant.measured if self._filters else ():
+            v = plant.states[plant.names.index(name)]
+            states.append(Variable(f"{name}.rate", f"{v.unit}/s", f"filtered rate of {name}"))
+        return tuple(states)
+
+    def _inputs(self) -> tuple[Variable, ...]:
+        grid, size = self.compact.angles, float(self.plant.sizes[-2])
+        angle = Variable(
+            self.angle.name, self.angle.unit, f"measured {self.angle.name}; the table reaches from "
+            f"{grid[0]:.4g} to {grid[-1]:.4g} rad and holds its ends beyond", nominal=size,
+        )  # fmt: skip
+        return (angle, *self.plant.inputs)
+
+    def _outputs(self) -> tuple[Variable, ...]:
+        plant = self.plant
+        size = float(np.max(np.abs(self.step.scales()["estimate"])))
+        outputs = [
+            Variable(
+                plant.estimate.name, plant.estimate.unit, f"estimate of {plant.estimate.name}", nominal=size
+            )
+        ]
+        for v in plant.states:
+            name = f"{v.name}.{ESTIMATE}" if v.name == self.angle.name else v.name
+            outputs.append(Variable(name, v.unit, f"estimate of {v.name}"))
+        for name in (self.angle.name, *plant.measured):
+            v = plant.states[plant.names.index(name)]
+            outputs.append(Variable(f"{name}.{INNOVATION}", v.unit, f"measured minus expected {name}"))
+        return tuple(outputs)
+
+    def _tables(self) -> tuple[Table, ...]:
+        if not self.compact.columns:
+            return ()
+        grid = self.compact.angles
+        columns = tuple(
+            Variable(c.name, c.unit, f"entry {c.key} of the step, in the sum of {c.row}")
+            for c in self.compact.columns
+        )
+        return (
+            Table(self.angle.name, float(grid[0]), float(grid[1] - grid[0]), columns, self.compact.values),
+        )
+
+
+def _column(items: Sequence[Expression]) -> Expression:
+    return ca.SX(ca.densify(ca.vertcat(*items))) if items else ca.SX(0, 1)
