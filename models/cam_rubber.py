@@ -9,7 +9,9 @@ from nlsdesign.components import (
     Fixed,
     GearedMotor,
     LinearElastic,
+    Specimen,
     StrainStiffening,
+    Through,
     TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
@@ -44,22 +46,22 @@ def cam_rubber_actuator(deck: Deck) -> Assembly:
     ['motor', 'load', 'spring', 'bearing', 'dry_friction', 'motor_encoder']
     """
     rubber = specimen(
-        stiff=StrainStiffening(**numbers_of(deck, "spring.rubber.stiff")),
+        stiff=StrainStiffening(**numbers_of(deck, "spring.rubber.stiff", StrainStiffening)),
         relaxing=series(
-            spring=LinearElastic(**numbers_of(deck, "spring.rubber.relaxing.spring")),
-            dashpot=ViscousMaterial(**numbers_of(deck, "spring.rubber.relaxing.dashpot")),
+            spring=LinearElastic(**numbers_of(deck, "spring.rubber.relaxing.spring", LinearElastic)),
+            dashpot=ViscousMaterial(**numbers_of(deck, "spring.rubber.relaxing.dashpot", ViscousMaterial)),
         ),
-        **numbers_of(deck, "spring.rubber"),
+        **numbers_of(deck, "spring.rubber", Specimen),
     )
-    cam = TwoSidedCam(**numbers_of(deck, "spring.cam"))
+    cam = TwoSidedCam(**numbers_of(deck, "spring.cam", TwoSidedCam))
     found = assembly(
         deck.name,
         description=deck.description,
-        motor=GearedMotor(**numbers_of(deck, "motor")),
+        motor=GearedMotor(**numbers_of(deck, "motor", GearedMotor)),
         load=Fixed(),
-        spring=tie(through(cam, rubber=rubber, **numbers_of(deck, "spring")), "motor", "load"),
-        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing")), "motor"),
-        dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction")), "motor"),
-        motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder")),
+        spring=tie(through(cam, rubber=rubber, **numbers_of(deck, "spring", Through)), "motor", "load"),
+        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing", TorsionDashpot)), "motor"),
+        dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "motor"),
+        motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder", Encoder)),
     )
     return require_same_numbers(found, deck)

@@ -33,11 +33,11 @@ def linear_spring_actuator(deck: Deck) -> Assembly:
     found = assembly(
         deck.name,
         description=deck.description,
-        motor=GearedMotor(**numbers_of(deck, "motor")),
+        motor=GearedMotor(**numbers_of(deck, "motor", GearedMotor)),
         load=Fixed(),
-        spring=tie(TorsionSpring(**numbers_of(deck, "spring")), "motor", "load"),
-        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing")), "motor"),
-        dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction")), "motor"),
-        motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder")),
+        spring=tie(TorsionSpring(**numbers_of(deck, "spring", TorsionSpring)), "motor", "load"),
+        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing", TorsionDashpot)), "motor"),
+        dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "motor"),
+        motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder", Encoder)),
     )
     return require_same_numbers(found, deck)

@@ -13,8 +13,10 @@ from typing import Any
 
 from .errors import unknown_name
 from .locations import bundled, version
+from .quantity import quantity  # the function, before a room's import puts the module in its place
 
 __version__ = version()
+__all__ = ["ROOMS", "WHOLE", "__version__", "quantity"]
 
 ROOMS = (
     "quantity",

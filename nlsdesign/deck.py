@@ -2,21 +2,49 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from .errors import DeckError, UnitError, nearest, unknown_name
+from .errors import DeckError, NlsError, UnitError, nearest, unknown_name
 from .locations import folder
 from .quantity import Quantity, parse_unit
 
-_HEADER = re.compile(r"^\s*\[+\s*([^\]]+?)\s*\]+")
-_KEY = re.compile(r"^(\s*)([A-Za-z0-9_\-]+)\s*=")
+_WORD = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
+_NAME = rf"{_WORD}(?:\s*\.\s*{_WORD})*"
+_HEADER = re.compile(rf"^\s*\[\[?\s*({_NAME})\s*\]")
+_KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
+
+
+class Written(float):
+    """A number that still knows how it was written, so that it is rounded once, in SI, and not twice."""
+
+    text: str
+
+    def __new__(cls, text: str) -> Self:
+        """Return the number of a text."""
+        made = super().__new__(cls, text)
+        made.text = text
+        return made
+
+    def times(self, factor: float) -> float:
+        """Return the number in SI, correctly rounded.
+
+        Parameters
+        ----------
+        factor
+            Of the unit.
+        """
+        if self == 0.0 or not math.isfinite(self):
+            return float(self) * factor
+        return float(Fraction(self.text) * Fraction(factor))
 
 
 @dataclass(frozen=True)
@@ -33,6 +61,8 @@ class Deck:
         Everything else.
     places
         Line and column by full name.
+    head
+        The table ``[deck]`` itself.
     """
 
     name: str
@@ -40,6 +70,7 @@ class Deck:
     path: Path
     tables: Mapping[str, Any]
     places: Mapping[str, tuple[int, int]]
+    head: Mapping[str, Any] = field(default_factory=dict)
 
     def place(self, full_name: str) -> str:
         """Return ``file:line:column: name``; the place of the nearest owner where the name has none.
@@ -121,15 +152,16 @@ class Deck:
         items = value if isinstance(value, list) else [value]
         if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in [*items, spread]):
             raise DeckError(where, f"value {value!r} or spread {spread!r} is not a number")
+        for key in ("unit", "source"):
+            if not isinstance(raw[key], str) or not raw[key].strip():
+                raise DeckError(where, f"{key} {raw[key]!r} is not a text", next_step=f'write {key} = "..."')
         try:
-            factor = parse_unit(str(raw["unit"])).factor
-        except UnitError as error:
-            raise UnitError(where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean,
-                            next_step=error.next_step) from None  # fmt: skip
-        scaled = tuple(v * factor for v in items)
-        return Quantity(
-            scaled if isinstance(value, list) else scaled[0], raw["unit"], str(raw["source"]), float(spread)
-        )
+            factor = parse_unit(raw["unit"]).factor
+            scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)
+            in_si = scaled if isinstance(value, list) else scaled[0]
+            return Quantity(in_si, raw["unit"], raw["source"], float(spread))
+        except NlsError as error:
+            raise error.at(where) from None
 
 
 def _tables(path: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -168,7 +200,13 @@ def load_deck(name: str | Path) -> Deck:
     if not path.exists():
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
-    return read_deck(path.read_text(encoding="utf8"), path)
+    try:
+        # An editor may have put a byte order mark in front.
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        rule = f"cannot be read: {error}"
+        raise DeckError(str(path), rule, next_step="give a text file in UTF-8") from None
+    return read_deck(text, path)
 
 
 def read_deck(text: str, path: Path) -> Deck:
@@ -182,13 +220,24 @@ def read_deck(text: str, path: Path) -> Deck:
         Where it came from, for messages.
     """
     try:
-        tables = tomllib.loads(text)
+        tables = tomllib.loads(text, parse_float=Written)
     except tomllib.TOMLDecodeError as error:
-        raise DeckError(path.name, f"is not valid TOML: {error}") from None
+        raise _not_toml(text, path, str(error)) from None
+    places = _places(text)
     head = tables.pop("deck", {})
-    return Deck(
-        str(head.get("name", path.stem)), str(head.get("description", "")), path, tables, _places(text)
-    )
+    if not isinstance(head, dict):
+        line, column = places.get("deck", (1, 1))
+        raise DeckError(f"{path.name}:{line}:{column}: deck", "is not a table", next_step="write [deck]")
+    name, description = str(head.get("name", path.stem)), str(head.get("description", ""))
+    return Deck(name, description, path, tables, places, head)
+
+
+def _not_toml(text: str, path: Path, message: str) -> DeckError:
+    found = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
+    lines = text.splitlines() or [""]
+    place = f"{found[1]}:{found[2]}" if found else f"{len(lines)}:{len(lines[-1]) + 1}"
+    rule = message.replace(found[0], "") if found else message
+    return DeckError(f"{path.name}:{place}", f"is not valid TOML: {rule}", next_step="mend that line")
 
 
 def _places(text: str) -> dict[str, tuple[int, int]]:
@@ -197,12 +246,16 @@ def _places(text: str) -> dict[str, tuple[int, int]]:
     for number, line in enumerate(text.splitlines(), start=1):
         header, key = _HEADER.match(line), _KEY.match(line)
         if header:
-            table = header[1].replace(" ", "")
+            table = _joined(header[1])
             places.setdefault(table, (number, line.index("[") + 1))
         elif key:
-            full = f"{table}.{key[2]}" if table else key[2]
+            full = f"{table}.{_joined(key[2])}" if table else _joined(key[2])
             places.setdefault(full, (number, len(key[1]) + 1))
     return places
+
+
+def _joined(name: str) -> str:
+    return re.sub(r"[\s\"']", "", name)
 
 
 def write_text(path: Path, text: str) -> None:

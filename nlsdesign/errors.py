@@ -17,6 +17,9 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
         The names that would have been accepted.
     """
     candidates = list(valid)
+    for candidate in candidates:
+        if candidate.lower() == name.lower():
+            return candidate
     found = difflib.get_close_matches(name, candidates, n=1, cutoff=0.5)
     if found:
         return found[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -42,7 +42,8 @@ _ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
 }
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "u": 1e-6, "n": 1e-9}
 _PREFIXED = {"g", "m", "s", "A", "N", "Pa", "J", "W", "V", "Hz", "rad", "Ohm", "Ω", "H", "K"}
-_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+# Superscripts, and the Greek mu and the ohm sign that look like the micro sign and the Greek omega.
+_WRITTEN = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻\u03bc\u2126", "0123456789-\u00b5\u03a9")
 _POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
 
 
@@ -104,7 +105,7 @@ def parse_unit(text: str) -> Unit:
         If a symbol is not known.
     """
     factor, exponents = 1.0, [0] * len(BASE)
-    pieces = re.split(r"([*·/])", text.strip().translate(_SUPERSCRIPTS).replace(" ", ""))
+    pieces = re.split(r"([*·/])", text.strip().translate(_WRITTEN).replace(" ", ""))
     sign = 1
     for piece in pieces:
         if piece in ("*", "·"):
@@ -123,6 +124,13 @@ def parse_unit(text: str) -> Unit:
         factor *= one_factor**power
         exponents = [total + power * each for total, each in zip(exponents, one, strict=True)]
     return Unit(text, factor, tuple(exponents))
+
+
+def _plain(value: float | Iterable[float]) -> float | tuple[float, ...]:
+    """Return a float, or a tuple of floats for a row of any kind (list, array)."""
+    if isinstance(value, Iterable) and getattr(value, "shape", None) != ():
+        return tuple(float(item) for item in value)
+    return float(value)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -149,10 +157,9 @@ class Quantity:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_parsed", parse_unit(self.unit))
-        if isinstance(self.value, tuple):
-            object.__setattr__(self, "value", tuple(float(item) for item in self.value))
-        else:
-            object.__setattr__(self, "value", float(self.value))
+        object.__setattr__(self, "value", _plain(self.value))
+        if not self.values:
+            raise ValueRangeError(f"() {self.unit}", "a row of numbers needs at least one")
         if not all(math.isfinite(item) for item in self.values):
             raise ValueRangeError(f"{self.value} {self.unit}", "a quantity must be finite")
         if not self.spread >= 0.0:
@@ -230,8 +237,8 @@ def quantity(
     >>> quantity(0.58, "MPa", source="Austin 2015, Table I").number
     580000.0
     """
-    factor = parse_unit(unit).factor
-    converted = tuple(item * factor for item in value) if isinstance(value, tuple) else value * factor
+    factor, plain = parse_unit(unit).factor, _plain(value)
+    converted = tuple(item * factor for item in plain) if isinstance(plain, tuple) else plain * factor
     return Quantity(converted, unit, source, spread)
 
 

@@ -71,19 +71,36 @@ def smooth_sign(value: Expression, width: Expression | float) -> Expression:
     return ca.tanh(value / width)
 
 
-def _cubic_bump(u: Expression) -> Expression:
-    """Return the cardinal cubic B-spline on (−2, 2); C², no branches."""
-    a = ca.fmax(2 - ca.fabs(u), 0)
-    b = ca.fmax(1 - ca.fabs(u), 0)
-    return (a * a * a - 4 * b * b * b) / 6
+def _selected(hits: Sequence[Expression], rows: Sequence[Sequence[Expression]]) -> list[Expression]:
+    """Return the row whose hit is 1, item by item; SX knows no indexing by an expression."""
+    return [
+        sum((ca.if_else(hit, item, 0) for hit, item in zip(hits, items, strict=True)), start=ca.SX(0))
+        for items in zip(*rows, strict=True)
+    ]
 
 
-def _cubic_bump_integral(u: Expression) -> Expression:
-    """Return ∫ from −∞ to u of the cardinal cubic B-spline; C³."""
-    a = ca.fmax(2 - ca.fabs(u), 0)
-    b = ca.fmax(1 - ca.fabs(u), 0)
-    tail = (a**4 - 4 * b**4) / 24
-    return ca.if_else(u < 0, tail, 1 - tail)
+def _windows(values: Sequence[Expression], width: int, at: Expression) -> list[Expression]:
+    """Return the ``width`` values from number ``at`` on, found in two stages: first the block, then inside.
+
+    Two stages of about √n choices take far fewer operations than one of n.
+    """
+    starts = len(values) - width + 1
+    block = max(1, math.isqrt(starts))
+    blocks = -(-starts // block)
+    padded = [*values, *[ca.SX(0)] * (blocks * block + width - 1 - len(values))]
+    number = ca.floor(at / block)
+    coarse = _selected(
+        [number == k for k in range(blocks)],
+        [padded[k * block : (k + 1) * block + width - 1] for k in range(blocks)],
+    )
+    inside = at - block * number
+    return _selected([inside == k for k in range(block)], [coarse[k : k + width] for k in range(block)])
+
+
+def _span(coefficients: Sequence[Expression], u: Expression) -> tuple[Expression, Expression]:
+    """Return the number of the span in which u lies and the place in it, in [0, 1] on the whole spline."""
+    number = ca.fmin(ca.fmax(ca.floor(u), 0), len(coefficients) - 4)
+    return number, u - number
 
 
 def uniform_spline(
@@ -100,10 +117,12 @@ def uniform_spline(
     step
         Distance of the knots.
     at
-        Argument; the spline is whole on [lower, lower + (n − 3)·step].
+        Argument in [lower, lower + (n − 3)·step]; beyond, the polynomial of the last span goes on.
     """
-    u = (at - lower) / step
-    return sum((c * _cubic_bump(u - (k - 1)) for k, c in enumerate(coefficients)), start=ca.SX(0))
+    number, r = _span(coefficients, (at - lower) / step)
+    a, b, c, d = _windows(coefficients, 4, number)
+    q = 1 - r
+    return (a * q**3 + b * (4 - 3 * r * r * (2 - r)) + c * (4 - 3 * q * q * (2 - q)) + d * r**3) / 6
 
 
 def uniform_spline_integral(
@@ -116,13 +135,22 @@ def uniform_spline_integral(
     coefficients, lower, step, at
         As for :func:`uniform_spline`.
     """
-    u = (at - lower) / step
-    zero = ca.SX(0)
-    terms = (
-        c * (_cubic_bump_integral(u - (k - 1)) - _cubic_bump_integral(zero - (k - 1)))
-        for k, c in enumerate(coefficients)
-    )
-    return step * sum(terms, start=ca.SX(0))
+    number, r = _span(coefficients, (at - lower) / step)
+    a, b, c, d = _windows(coefficients, 4, number)
+    q = 1 - r
+    # Sums of the coefficients whose bumps lie wholly to the left of the span.
+    sums = [ca.SX(0)]
+    for each in coefficients[: len(coefficients) - 4]:
+        sums.append(sums[-1] + each)
+    (left,) = _windows(sums, 1, number)
+    inside = a * (24 - q**4) + b * (12 + _half_bump(r)) + c * (12 - _half_bump(q)) + d * r**4
+    before = 23 * coefficients[0] + 12 * coefficients[1] + coefficients[2]
+    return step * (left + (inside - before) / 24)
+
+
+def _half_bump(r: Expression) -> Expression:
+    """Return 24 times the integral of the cardinal cubic B-spline from 0 to r, for r in [0, 1]."""
+    return r * (16 - r * r * (8 - 3 * r))
 
 
 def _linear_solution(residual: Expression, unknown: Expression) -> Expression | None:
@@ -138,7 +166,10 @@ def solve_monotone(
     """Solve g(z) = 0 for a monotonically increasing g, symbolically where g is linear.
 
     Otherwise a bracketed Newton iteration of fixed length is written out, so that the result is a plain
-    expression with a fixed bound of work: it differentiates and becomes C like any other.
+    expression with a fixed bound of work: it differentiates and becomes C like any other. A Newton step that
+    does not fall strictly inside the bracket is replaced by its middle, or steps would go to and fro between
+    the two ends for ever where g is flat, steep and flat again. The last step starts from the best point
+    found and is never replaced: so the derivative is that of the implicit function, whatever came before.
 
     Parameters
     ----------
@@ -156,12 +187,20 @@ def solve_monotone(
     free = [s for s in ca.symvar(g) if not ca.is_equal(s, unknown)]
     value_and_slope = ca.Function("g", [unknown, *free], [g, ca.jacobian(g, unknown)])
     z, low, high = guess, ca.SX(-math.inf), ca.SX(math.inf)
+    best, least = guess, ca.SX(math.inf)
     for _ in range(NEWTON_STEPS):
         value, slope = value_and_slope.call([z, *free])
+        closer = ca.fabs(value) <= least
+        best, least = ca.if_else(closer, z, best), ca.if_else(closer, ca.fabs(value), least)
         low, high = ca.if_else(value <= 0, z, low), ca.if_else(value >= 0, z, high)
-        newton = z - value / slope
-        inside = ca.logic_and(newton >= low, newton <= high)
+        newton = z - value / _not_zero(slope)
         # A finite middle even while one side of the bracket is still open.
         middle = (ca.fmax(low, -1e30) + ca.fmin(high, 1e30)) / 2
-        z = ca.if_else(inside, newton, middle)
-    return z
+        z = ca.if_else(ca.logic_and(newton > low, newton < high), newton, middle)
+    value, slope = value_and_slope.call([best, *free])
+    return best - value / _not_zero(slope)
+
+
+def _not_zero(slope: Expression) -> Expression:
+    # Where g is flat, as between two slack cables, any point is a root and the step is zero.
+    return ca.if_else(slope > 0, slope, 1)

@@ -14,6 +14,7 @@ import numpy as np
 
 import nlsdesign as nls
 
+from ._austin2015_bench import diagnosed
 from ._austin2015_loop import exported
 from ._austin2015_measured import compare_with_figures
 from ._austin2015_pages import write_pages
@@ -52,10 +53,8 @@ def main(out: Path, fast: bool = False, steps: Any = None) -> dict[str, float]:
         done |= observers(actuator, model, 2.0 if fast else 5.0)
     with steps.step("C code, FMUs and their co-simulation"):
         done |= exported(model, done["observer"], out, 1.0 if fast else 3.0)
-    with steps.step("diagnosis of the bench records") as _:
-        records = nls.load_records(Path(__file__).parent / "austin2015_bench", model)
-        done["verdict"] = nls.diagnose(actuator, records, progress=steps.note)
-        nls.write_verdict(done["verdict"], out / "diagnosis")
+    with steps.step("diagnosis of the bench records"):
+        done["verdict"] = diagnosed(actuator, out, steps)
     with steps.step("report"):
         return write_pages(done)
 

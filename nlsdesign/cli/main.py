@@ -11,6 +11,7 @@ from ..locations import version
 from .analyse import analyse
 from .decks import deck
 from .design import design
+from .diagnose import diagnose, simulate
 from .export import export, observer
 from .studies import study
 
@@ -21,7 +22,7 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-for command in (deck, design, analyse, observer, export, study):
+for command in (deck, design, analyse, observer, export, simulate, diagnose, study):
     program.add_command(command)
 
 

@@ -2,11 +2,16 @@
 
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
+from .cable import StretchyCable
 from .cam import Cam, Pulley, TwoSidedCam, control_values
+from .contact import InextensibleCable
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
+from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
+from .hysteresis import SlidingFillers
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
+from .play import Backlash, Slack, Turned
 from .sensors import CurrentSensor, DelayedForceSensor, Encoder, ForceSensor, Sensor
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
 from .tie import Tie, tie
@@ -16,6 +21,7 @@ __all__ = [
     "ROTATION",
     "TRANSLATION",
     "Assembly",
+    "Backlash",
     "Body",
     "Cam",
     "CoulombFriction",
@@ -32,22 +38,31 @@ __all__ = [
     "ForceSensor",
     "GearedMotor",
     "Inertia",
+    "InextensibleCable",
     "LinearElastic",
+    "LoadFriction",
     "Mass",
     "Parallel",
     "Part",
     "PullOnly",
     "Pulley",
+    "QuadraticDrag",
     "Sensor",
     "Series",
+    "Slack",
+    "SlidingFillers",
     "SmoothStrainStiffening",
     "Specimen",
     "Spring",
     "StrainStiffening",
+    "StretchyCable",
+    "StribeckFriction",
     "Through",
     "Tie",
+    "TorqueRipple",
     "TorsionDashpot",
     "TorsionSpring",
+    "Turned",
     "TwoSidedCam",
     "ViscousMaterial",
     "assembly",

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..errors import ArrangementError, unknown_name
+from ..errors import ArrangementError, NlsError, unknown_name
 from ..quantity import Quantity
 from .bodies import Body, Fixed
 from .drawing import draw
 from .element import Element
-from .part import Part, quantities, replaced, walk, with_values
+from .part import Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from .sensors import Sensor
 from .tie import Tie
 
@@ -35,17 +35,11 @@ class Assembly:
     description: str = ""
 
     def __post_init__(self) -> None:
-        bodies = {n: p for n, p in self.parts if isinstance(p, Body)}
-        for name, part in self.parts:
-            if isinstance(part, Tie):
-                _check_tie(name, part, bodies)
-            elif not isinstance(part, Body | Sensor):
-                raise ArrangementError(
-                    f"part '{name}'",
-                    f"is a {type(part).__name__}; an assembly holds bodies, ties and sensors",
-                    next_step="tie an element to bodies with tie(element, 'motor', 'load')",
-                )
-        if not bodies:
+        # In a deck the table [deck] holds name and description.
+        check_names(f"assembly '{self.name}'", [name for name, _ in self.parts], taken=("deck",))
+        for _, error in arrangement_problems(self.parts):
+            raise error
+        if not any(isinstance(part, Body) for _, part in self.parts):
             raise ArrangementError(
                 f"assembly '{self.name}'", "has no body", next_step="add for instance load=Fixed()"
             )
@@ -67,6 +61,10 @@ class Assembly:
         """Return every part with its path, in written order."""
         return [pair for name, part in self.parts for pair in walk(part, name)]
 
+    def sensors(self) -> dict[str, Sensor]:
+        """Return the sensors by name."""
+        return {name: part for name, part in self.parts if isinstance(part, Sensor)}
+
     def quantities(self) -> dict[str, Quantity]:
         """Return every number by full name."""
         return {k: q for name, part in self.parts for k, q in quantities(part, name).items()}
@@ -84,16 +82,14 @@ class Assembly:
         UnknownNameError
             With the nearest name that exists.
         """
-        known = self.quantities()
-        parts = dict(self.parts)
-        for name, value in values.items():
-            row = name.partition("[")[0]
-            if row not in known:
-                raise unknown_name("parameter", name, known)
+        inside: dict[str, dict[str, Quantity | float | tuple[float, ...]]] = {}
+        for name, value in resolved(self.quantities(), values).items():
             head, _, tail = name.partition(".")
+            inside.setdefault(head, {})[tail] = value
+        parts = dict(self.parts)
+        for head, numbers in inside.items():
             part = parts[head]
-            inner = part.element if isinstance(part, Tie) else part
-            changed = with_values(inner, {tail: value})
+            changed = with_values(part.element if isinstance(part, Tie) else part, numbers)
             parts[head] = part.around(changed) if isinstance(part, Tie) else changed
         return replace(self, parts=tuple(parts.items()))
 
@@ -154,27 +150,54 @@ class Assembly:
 
 def _with_inner(root: Part, path: str, new: Part) -> Part:
     owner, _, name = path.rpartition(".")
-    holder = root
-    for step in filter(None, owner.split(".")):
-        holder = holder.children()[step]
+    holder = find(root, owner)
     return replaced(root, owner, holder.with_children({**holder.children(), name: new}))
 
 
-def _check_tie(name: str, part: Tie, bodies: Mapping[str, Body]) -> None:
-    for end in part.between:
-        if end not in bodies:
-            raise unknown_name(f"'{name}': body", end, bodies)
+def arrangement_problems(
+    parts: Sequence[tuple[str, Part]], unsure: Sequence[str] = ()
+) -> Iterator[tuple[str, NlsError]]:
+    """Yield what is wrong with the way in which parts are put together, with the name of the part.
+
+    Parameters
+    ----------
+    parts
+        Pairs of name and part.
+    unsure
+        Names of parts that are there but could not be read; nothing is said of what is tied to them.
+    """
+    bodies = {name: part for name, part in parts if isinstance(part, Body)}
+    for name, part in parts:
+        if isinstance(part, Tie):
+            if not set(unsure) & set(part.between):
+                yield from ((name, error) for error in _tie_problems(name, part, bodies))
+        elif not isinstance(part, Body | Sensor):
+            yield (
+                name,
+                ArrangementError(
+                    f"part '{name}'",
+                    f"is a {type(part).__name__}; an assembly holds bodies, ties and sensors",
+                    next_step="tie an element to bodies with tie(element, 'motor', 'load')",
+                ),
+            )
+
+
+def _tie_problems(name: str, part: Tie, bodies: Mapping[str, Body]) -> Iterator[NlsError]:
+    missing = [end for end in part.between if end not in bodies]
+    if missing:
+        yield from (unknown_name(f"'{name}': body", end, bodies) for end in missing)
+        return
     ends = [bodies[end] for end in part.between]
     for end, body in zip(part.between, ends, strict=True):
         if body.domain != part.element.domain:
-            raise ArrangementError(
+            yield ArrangementError(
                 f"part '{name}'",
                 f"relates {part.element.domain.motion} and {part.element.domain.effort}, "
                 f"but '{end}' has a {body.domain.motion}",
                 next_step="put a cam or pulley (through) in between",
             )
     if all(isinstance(body, Fixed) for body in ends) or len(set(part.between)) < len(part.between):
-        raise ArrangementError(
+        yield ArrangementError(
             f"part '{name}'",
             "both ends rest on the same or on fixed bodies, so it can never move",
             next_step="tie one end to a body that moves",

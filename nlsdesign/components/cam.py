@@ -68,7 +68,7 @@ class TwoSidedCam(Cam):
     """
 
     lever_arm: Quantity = parameter(
-        "m", "control values of the lever arm over the angle", minimum=-0.05, maximum=1.0
+        "m", "control values of the lever arm over the angle", minimum=-0.05, maximum=1.0, row=True
     )
     last_angle: Quantity = parameter("rad", "angle at the end of the contour", minimum=0.01, maximum=6.3)
     changeover: Quantity = parameter(

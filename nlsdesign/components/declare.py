@@ -2,122 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
+import json
+from decimal import Context
+from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from .. import components
-from ..deck import Deck, write_text
+from ..deck import Deck, Written, write_text
 from ..errors import DeckError, NlsError, nearest
 from ..quantity import Quantity, parse_unit
-from .assembly import Assembly
-from .element import Combination, Element
-from .networks import Through
+from .assembly import Assembly, arrangement_problems
+from .element import Element
 from .part import Part
+from .reading import Builder
 from .sensors import Sensor
 from .tie import Tie
-
-_STRUCTURE = ("component", "between", "of")
-
-
-def component_classes() -> dict[str, type[Part]]:
-    """Return the components that a deck can name, by name."""
-    everything = (getattr(components, name) for name in components.__all__)
-    kinds = [c for c in everything if isinstance(c, type) and issubclass(c, Part)]
-    return {
-        c.__name__: c for c in kinds if not getattr(c, "__abstractmethods__", None) and c not in (Part, Tie)
-    }
-
-
-class _Builder:
-    """Builds parts from tables and collects everything that is wrong on the way."""
-
-    def __init__(self, deck: Deck) -> None:
-        self.deck = deck
-        self.problems: list[NlsError] = []
-        self.classes = component_classes()
-
-    def part(self, path: str, table: Mapping[str, Any]) -> Part | None:
-        kind = self._kind(path, table)
-        if kind is None:
-            return None
-        infos = kind.parameter_infos()
-        fields: dict[str, Any] = {}
-        children: dict[str, Part] = {}
-        for key, raw in table.items():
-            if key in _STRUCTURE:
-                continue
-            if isinstance(raw, dict) and "component" in raw:
-                child = self.part(f"{path}.{key}", raw)
-                children |= {} if child is None else {key: child}
-            elif key in infos:
-                self._number(f"{path}.{key}", raw, infos[key], fields, key)
-            else:
-                self._unknown_field(f"{path}.{key}", key, kind)
-        return self._made(path, kind, fields, children, table)
-
-    def _kind(self, path: str, table: Mapping[str, Any]) -> type[Part] | None:
-        where, name = self.deck.place(f"{path}.component"), table.get("component")
-        if not isinstance(name, str):
-            self.problems.append(
-                DeckError(where, "is missing", next_step='add component = "..." to the table')
-            )
-            return None
-        if name not in self.classes:
-            self.problems.append(
-                DeckError(where, f"'{name}' is not a component", did_you_mean=nearest(name, self.classes),
-                          next_step=f"use one of: {', '.join(sorted(self.classes))}")
-            )  # fmt: skip
-            return None
-        return self.classes[name]
-
-    def _number(self, full: str, raw: object, info: Any, fields: dict[str, Any], key: str) -> None:
-        try:
-            fields[key] = info.checked(key, self.deck.number(full, raw))
-        except NlsError as error:
-            located = error.thing.startswith(self.deck.path.name)
-            self.problems.append(error if located else error.at(self.deck.place(full)))
-
-    def _unknown_field(self, full: str, key: str, kind: type[Part]) -> None:
-        valid = [*kind.parameter_infos(), *_STRUCTURE]
-        step = f"fields are: {', '.join(kind.parameter_infos())}"
-        rule = f"{kind.__name__} has no field '{key}'"
-        self.problems.append(
-            DeckError(self.deck.place(full), rule, did_you_mean=nearest(key, valid), next_step=step)
-        )
-
-    def _made(
-        self,
-        path: str,
-        kind: type[Part],
-        fields: dict[str, Any],
-        children: dict[str, Part],
-        table: Mapping[str, Any],
-    ) -> Part | None:
-        needed = [f.name for f in dataclasses.fields(kind) if f.name in kind.parameter_infos()
-                  and f.default is dataclasses.MISSING and f.name not in table]  # fmt: skip
-        if needed:
-            unit = kind.parameter_infos()[needed[0]].unit
-            example = f'add {needed[0]} = {{value = ..., unit = "{unit}", source = "..."}}'
-            rule = f"{kind.__name__} needs '{needed[0]}'"
-            self.problems.append(DeckError(self.deck.place(path), rule, next_step=example))
-        if self.problems:
-            return None
-        try:
-            if issubclass(kind, Combination):
-                fields["members"] = tuple(children.items())
-            elif issubclass(kind, Through):
-                behind = [pair for pair in children.items() if pair[0] != "cam"]
-                if "cam" not in children or len(behind) != 1:
-                    raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
-                fields |= {"cam": children["cam"], "behind": behind[0]}
-            elif issubclass(kind, Sensor):
-                fields["of"] = str(table.get("of", ""))
-            return kind(**fields)
-        except NlsError as error:
-            self.problems.append(error.at(self.deck.place(path)))
-            return None
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:
@@ -151,27 +51,28 @@ def declare(deck: Deck) -> Assembly:
 
 
 def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
-    builder = _Builder(deck)
-    parts: list[tuple[str, Part]] = []
+    builder = Builder(deck)
+    builder.head()
+    parts: dict[str, Part | None] = {}
     for name, table in deck.tables.items():
         if not isinstance(table, dict):
-            builder.problems.append(DeckError(deck.place(name), "stands outside of any part",
-                                              next_step="put it into a table such as [motor]"))  # fmt: skip
+            step = "put it into a table such as [motor]"
+            builder.problems.append(DeckError(deck.place(name), "stands outside of any part", next_step=step))
             continue
-        before = list(builder.problems)
-        builder.problems = []
         part = builder.part(name, table)
-        builder.problems = before + builder.problems
-        if isinstance(part, Element):
-            part = Tie(element=part, between=tuple(table.get("between", ())))
-        if part is not None:
-            parts.append((name, part))
+        is_tied = issubclass(builder.class_of(name) or Part, Element)
+        parts[name] = builder.tied(name, part, table) if is_tied else part
+    sound = tuple((name, part) for name, part in parts.items() if part is not None)
+    unsure = [name for name, part in parts.items() if part is None]
+    for name, error in arrangement_problems(sound, unsure):
+        field = f"{name}.between" if f"{name}.between" in deck.places else name
+        builder.problems.append(error.at(deck.place(field)))
     if builder.problems:
         return None, builder.problems
     try:
-        return Assembly(deck.name, tuple(parts), deck.description), []
+        return Assembly(deck.name, sound, deck.description), []
     except NlsError as error:
-        return None, [error.at(deck.path.name)]
+        return None, [error.at(deck.place("deck"))]
 
 
 def deck_text(assembly: Assembly) -> str:
@@ -223,16 +124,19 @@ def _number(given: Quantity) -> str:
 
 def _shortest(value: float, factor: float) -> str:
     """Return the shortest decimal that reads back as the same number in SI."""
-    exact = value / factor
-    candidates = (repr(float(f"{exact:.{digits}g}")) for digits in (6, 12, 15))
-    return next((text for text in candidates if float(text) * factor == value), repr(exact))
+    exact = Fraction(value) / Fraction(factor)
+    short = (repr(float(f"{float(exact):.{digits}g}")) for digits in (6, 12, 15))
+    # Where no float times the factor is the value, the text has more digits than a float.
+    long = (str(Context(prec=n).divide(exact.numerator, exact.denominator)) for n in range(17, 40))
+    return next(text for text in chain(short, long) if Written(text).times(factor) == value)
 
 
 def _string(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'
+    """Return a text as TOML writes it, which is as JSON does but for the delete character."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def numbers_of(deck: Deck, path: str) -> dict[str, Any]:
+def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
     """Return the numbers that stand directly in one table of a deck, by field name.
 
     Parameters
@@ -241,14 +145,27 @@ def numbers_of(deck: Deck, path: str) -> dict[str, Any]:
         As read.
     path
         Full name of the table, for instance ``"spring.rubber"``.
+    kind
+        The component that the numbers are for.
 
     Raises
     ------
     NlsError
-        If a number is not written as one.
+        If the table is missing or is another component, or a number is missing, too much or not sound.
     """
-    inside = [name for name in deck.numbers() if name.rpartition(".")[0] == path]
-    return {name.rpartition(".")[2]: deck.quantity(name) for name in inside}
+    table: Any = deck.tables
+    for step in path.split("."):
+        table = table.get(step) if isinstance(table, dict) else None
+    if not isinstance(table, dict) or table.get("component") != kind.__name__:
+        rule = f"this model has a {kind.__name__} here"
+        raise DeckError(
+            deck.place(path), rule, next_step="use declare(deck), which takes any deck as it stands"
+        )
+    builder = Builder(deck)
+    found = builder.numbers(path, table, kind)
+    if builder.problems:
+        raise builder.problems[0]
+    return found
 
 
 def require_same_numbers(assembly: Assembly, deck: Deck) -> Assembly:

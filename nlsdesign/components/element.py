@@ -15,7 +15,7 @@ import casadi as ca
 
 from ..errors import ArrangementError
 from ..symbolic import Expression, depends, solve_monotone, symbol
-from .part import Part
+from .part import RESERVED, Part, check_names
 
 
 @dataclass(frozen=True)
@@ -156,6 +156,7 @@ class Combination(Element):
             raise ArrangementError(
                 kind, "needs at least one element", next_step="name elements, for instance spring=..."
             )
+        check_names(kind, [name for name, _ in self.members], taken=RESERVED | set(self.parameter_infos()))
         for name, member in self.members:
             if not isinstance(member, Element):
                 raise ArrangementError(
@@ -232,7 +233,7 @@ class Series(Combination):
             inside = scope.child(name)
             own = observed_effort(member, inside, states[name], rates[name])
             inside.derive(states[name], rates[name])
-            scope.define(rates[name], _root(own - common, rates[name], inside))
+            scope.define(rates[name], _root(own, common, rates[name], inside))
         return common
 
 
@@ -242,14 +243,19 @@ def _own_motion(member: Element, scope: Scope) -> Expression:
 
 
 def _root(
-    residual: Expression, unknown: Expression, scope: Scope, guess: Expression | None = None
+    one: Expression, other: Expression, unknown: Expression, scope: Scope, guess: Expression | None = None
 ) -> Expression:
-    """Return the root of a monotone residual; where it was iterated, the remainder is recorded as a check."""
+    """Return where one (rising) equals the other (falling).
+
+    Where the root was iterated, the remainder relative to the size of both sides is recorded as a check.
+    """
+    residual = one - other
     solution = solve_monotone(
         lambda z: ca.substitute(residual, unknown, z), unknown, ca.SX(0) if guess is None else guess
     )
     if depends(ca.jacobian(residual, unknown), unknown):
-        scope.check(unknown.name(), ca.substitute(residual, unknown, solution))
+        relative = residual / (1 + ca.fabs(one) + ca.fabs(other))
+        scope.check(unknown.name(), ca.substitute(relative, unknown, solution))
     return solution
 
 
@@ -269,7 +275,7 @@ def _flowing(
     own_rate = symbol(f"{inside.path}.own_rate")
     one = observed_effort(first, inside, own, own_rate)
     other = _flowing(members[1:], scope, motion - own, rate - own_rate)
-    solution = _root(one - other, own_rate, inside)
+    solution = _root(one, other, own_rate, inside)
     inside.derive(own, own_rate)
     scope.define(own_rate, solution)
     return ca.substitute(one, own_rate, solution)
@@ -291,12 +297,11 @@ def _shared(
     share, share_rate = symbol(f"{inside.path}.share"), symbol(f"{inside.path}.share_rate")
     one = observed_effort(first, inside, share, share_rate)
     other = _shared(members[1:], scope, whole - share, whole_rate - share_rate)
-    residual = one - other
-    solution = _root(residual, share, inside, whole / 2)
+    solution = _root(one, other, share, inside, whole / 2)
     if scope.rate_is_used(share_rate):
         moving = {share: share_rate, whole: whole_rate}
-        drift = scope.total_rate(residual, moving)
-        scope.define(share_rate, _root(drift, share_rate, inside))
+        drifts = scope.total_rate(one, moving), scope.total_rate(other, moving)
+        scope.define(share_rate, _root(*drifts, share_rate, inside))
     scope.define(share, solution)
     scope.define(whole, motion)
     scope.define(whole_rate, rate)

@@ -11,7 +11,7 @@ from ..quantity import Quantity
 from ..symbolic import Expression, positive_part
 from .cam import Cam
 from .element import MATERIAL, ROTATION, TRANSLATION, Combination, Domain, Element, Scope, observed_effort
-from .part import Part, parameter
+from .part import RESERVED, Part, check_names, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +74,9 @@ class Through(Element):
     def __post_init__(self) -> None:
         super().__post_init__()
         name, element = self.behind
+        check_names("through", [name], taken=RESERVED | {"cam", *self.parameter_infos()})
+        if not isinstance(element, Element):
+            raise ArrangementError(f"through: '{name}'", f"is a {type(element).__name__}, not an element")
         if not isinstance(self.cam, Cam):
             raise ArrangementError(
                 "through", f"the first thing must be a cam, not a {type(self.cam).__name__}"
@@ -146,7 +149,7 @@ class PullOnly(Combination):
         return positive_part(sum(forces[1:], start=forces[0]), scope.parameter("width"))
 
 
-def through(cam: Cam, *, pretension: Quantity | float = 0.0, **behind: Element) -> Through:
+def through(cam: Cam, *, pretension: Quantity | float | None = None, **behind: Element) -> Through:
     """Put an element behind a cam or pulley.
 
     Parameters
@@ -154,7 +157,7 @@ def through(cam: Cam, *, pretension: Quantity | float = 0.0, **behind: Element) 
     cam
         Turns the angle into an extension.
     pretension
-        Extension at angle zero in m.
+        Extension at angle zero in m; none by default.
     **behind
         Exactly one element by name, for instance ``rubber=...``.
 
@@ -170,6 +173,8 @@ def through(cam: Cam, *, pretension: Quantity | float = 0.0, **behind: Element) 
             next_step="combine several with parallel(...) or series(...)",
         )
     from_name = next(iter(behind.items()))
+    if pretension is None:
+        return Through(cam=cam, behind=from_name)
     return Through(cam=cam, behind=from_name, pretension=pretension)  # type: ignore[arg-type]
 
 

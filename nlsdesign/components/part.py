@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from abc import ABC
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
-from ..errors import UnitError, ValueRangeError, unknown_name
+from ..errors import ArrangementError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, parse_unit, same_dimension
+
+RESERVED = frozenset({"component", "between", "of"})
+"""Keys of a deck that say what a part is and where it sits."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +29,15 @@ class ParameterInfo:
         Meaning in words.
     minimum, maximum
         Range in which the law holds and beyond which a number is taken for a slip of units; inclusive.
+    row
+        Whether it may be a row of numbers.
     """
 
     unit: str
     description: str
     minimum: float
     maximum: float
+    row: bool = False
 
     def checked(self, name: str, given: Quantity | float | tuple[float, ...] | list[float]) -> Quantity:
         """Return the number as a quantity of the right dimension and size.
@@ -47,11 +54,15 @@ class ParameterInfo:
         UnitError
             If the unit measures something else.
         ValueRangeError
-            If a number lies outside the range.
+            If a number lies outside the range, or a row stands where one number belongs.
         """
-        if isinstance(given, list):
-            given = tuple(given)
-        result = given if isinstance(given, Quantity) else Quantity(given, self.unit)
+        result = given if isinstance(given, Quantity) else Quantity(given, self.unit)  # type: ignore[arg-type]
+        if isinstance(result.value, tuple) and not self.row:
+            raise ValueRangeError(
+                f"{name} = {result}",
+                f"is a row of {len(result.values)} numbers; {self.description} is one number",
+                next_step="give one number without brackets",
+            )
         if not same_dimension(result.unit, self.unit):
             raise UnitError(
                 f"{name} = {result}",
@@ -68,15 +79,14 @@ class ParameterInfo:
         return result
 
     def _slip(self, given: Quantity, value: float) -> str | None:
-        for prefix, factor in (("m", 1e-3), ("k", 1e3), ("M", 1e6), ("c", 1e-2)):
-            if self.minimum <= value * factor <= self.maximum and value * factor != value:
-                slipped = prefix + given.unit
-                try:
-                    parse_unit(slipped)
-                except UnitError:
-                    continue
-                number = value / parse_unit(given.unit).factor
-                return f"was '{slipped}' meant? {number:g} {slipped} is in the range"
+        number = value / parse_unit(given.unit).factor
+        for unit in [prefix + given.unit for prefix in ("m", "k", "M", "c")] + ["%"]:
+            try:
+                factor = parse_unit(unit).factor
+            except UnitError:
+                continue
+            if same_dimension(unit, self.unit) and self.minimum <= number * factor <= self.maximum:
+                return f"was '{unit}' meant? {number:g} {unit} is in the range"
         return None
 
 
@@ -87,6 +97,7 @@ def parameter(
     minimum: float = 0.0,
     maximum: float = math.inf,
     default: float | tuple[float, ...] | None = None,
+    row: bool = False,
 ) -> Any:
     """Declare a number of a part as a dataclass field.
 
@@ -100,8 +111,10 @@ def parameter(
         Inclusive range.
     default
         Value in SI where there is a natural one; such a value is marked as assumed.
+    row
+        Whether it may be a row of numbers.
     """
-    info = ParameterInfo(unit, description, minimum, maximum)
+    info = ParameterInfo(unit, description, minimum, maximum, row)
     if default is None:
         return dataclasses.field(metadata={"parameter": info})
     value = Quantity(default, unit, "assumed: default of the component")
@@ -149,6 +162,34 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
 
 def _short(given: Quantity) -> str:
     return str(given) if len(given.values) <= 4 else f"<{len(given.values)} numbers in {given.unit}>"
+
+
+def check_names(owner: str, names: Sequence[str], taken: Collection[str] = ()) -> None:
+    """Check that names of parts are plain words, used once.
+
+    Parameters
+    ----------
+    owner
+        What holds the parts, for messages.
+    names
+        As given.
+    taken
+        Names that mean something else there.
+
+    Raises
+    ------
+    ArrangementError
+        If a name cannot stand in a deck, or stands there twice.
+    """
+    for number, name in enumerate(names):
+        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+            raise ArrangementError(
+                f"{owner}: name '{name}'",
+                "is not a plain word",
+                next_step="use letters, digits and underscores, and a letter first",
+            )
+        if name in taken or name in names[:number]:
+            raise ArrangementError(f"{owner}: name '{name}'", "is taken", next_step="choose another name")
 
 
 def walk(part: Part, path: str = "") -> Iterator[tuple[str, Part]]:
@@ -231,6 +272,34 @@ def with_values(part: Part, values: Mapping[str, Quantity | float | tuple[float,
     part
         Root.
     values
+        As for :func:`resolved`.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest name that exists.
+    """
+    changes: dict[str, dict[str, Quantity]] = {}
+    for name, value in resolved(quantities(part), values).items():
+        owner, _, field_name = name.rpartition(".")
+        changes.setdefault(owner, {})[field_name] = value
+    # All numbers of a part change at once: rules between them, such as ascending knots, hold at the end.
+    for owner, fields in changes.items():
+        target = find(part, owner) if owner else part
+        part = replaced(part, owner, dataclasses.replace(target, **fields))
+    return part
+
+
+def resolved(
+    known: Mapping[str, Quantity], values: Mapping[str, Quantity | float | tuple[float, ...]]
+) -> dict[str, Quantity]:
+    """Return new numbers as whole quantities by full name.
+
+    Parameters
+    ----------
+    known
+        The numbers as they are.
+    values
         Quantities, or numbers in SI, by full name; ``name[3]`` is the third of a row.
 
     Raises
@@ -238,32 +307,30 @@ def with_values(part: Part, values: Mapping[str, Quantity | float | tuple[float,
     UnknownNameError
         With the nearest name that exists.
     """
-    known = quantities(part)
+    found: dict[str, Quantity] = {}
     for name, value in values.items():
         row, index = _row_item(name)
         if row not in known:
             raise unknown_name("parameter", name, known)
-        owner, _, field_name = row.rpartition(".")
-        target = find(part, owner) if owner else part
-        new = _changed(known[row], value, index)
-        part = replaced(part, owner, dataclasses.replace(target, **{field_name: new}))
-        known[row] = new
-    return part
+        found[row] = _changed(name, found.get(row, known[row]), value, index)
+    return found
 
 
 def _row_item(name: str) -> tuple[str, int | None]:
-    if not name.endswith("]"):
-        return name, None
-    row, _, index = name[:-1].rpartition("[")
-    return row, int(index) - 1
+    found = re.fullmatch(r"(.+)\[(\d+)\]", name)
+    return (found[1], int(found[2])) if found else (name, None)
 
 
-def _changed(old: Quantity, value: Quantity | float | tuple[float, ...], index: int | None) -> Quantity:
-    if isinstance(value, Quantity) and index is None:
-        return value
-    number = value.value if isinstance(value, Quantity) else value
-    if index is not None and not isinstance(number, tuple):
-        items = list(old.values)
-        items[index] = float(number)
-        return old.with_value(tuple(items))
-    return old.with_value(number)
+def _changed(
+    name: str, old: Quantity, value: Quantity | float | tuple[float, ...], index: int | None
+) -> Quantity:
+    if index is None:
+        return value if isinstance(value, Quantity) else old.with_value(value)
+    if not isinstance(old.value, tuple) or not 1 <= index <= len(old.value):
+        row = name.rpartition("[")[0]
+        items = range(1, len(old.value) + 1) if isinstance(old.value, tuple) else ()
+        raise unknown_name("parameter", name, [f"{row}[{i}]" for i in items] or [row])
+    if isinstance(value, Quantity) and not same_dimension(value.unit, old.unit):
+        raise UnitError(f"{name} = {value}", f"the others of the row are in '{old.unit}'")
+    number = value.number if isinstance(value, Quantity) else value
+    return old.with_value(tuple(number if i == index else v for i, v in enumerate(old.value, start=1)))  # type: ignore[misc]

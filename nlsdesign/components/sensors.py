@@ -106,6 +106,7 @@ class DelayedForceSensor(ForceSensor):
     """Load cell behind a transport delay τ, as its (2,2) Padé approximation.
 
     e^(−sτ) ≈ (1 − sτ/2 + s²τ²/12)/(1 + sτ/2 + s²τ²/12). Phase error below (ωτ)⁵/720: 4e-5 rad at ωτ = 0.5.
+    The states are a, which rests at the value, and b = τ·ȧ; the delayed value is v − b.
     Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
     """
 
@@ -119,8 +120,8 @@ class DelayedForceSensor(ForceSensor):
     def read(self, scope: Scope, value: Expression) -> Expression:
         """Return the delayed reading."""
         tau = scope.parameter("delay")
-        first = scope.state("lag", "N*s", f"first inner state of the delay of {scope.path}")
-        second = scope.state("lag_rate", "N", f"second inner state of the delay of {scope.path}")
-        scope.derive(first, second)
-        scope.derive(second, value - 12 * first / tau**2 - 6 * second / tau)
-        return super().read(scope, value - 12 * second / tau)
+        lag = scope.state("lag", "N", f"lagging value inside the delay of {scope.path}")
+        change = scope.state("lag_change", "N", f"its change over one delay, in {scope.path}")
+        scope.derive(lag, change / tau)
+        scope.derive(change, (12 * (value - lag) - 6 * change) / tau)
+        return super().read(scope, value - change)

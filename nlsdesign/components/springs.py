@@ -93,8 +93,12 @@ class StrainStiffening(Elastic):
     −∞ there: design on :class:`SmoothStrainStiffening`. Source: Austin et al. 2015, eq. (1), Table I.
     """
 
-    modulus: Quantity = parameter("Pa", "moduli that engage one after the other", minimum=0.0, maximum=1e12)
-    knots: Quantity = parameter("1", "strains at which the moduli engage", minimum=0.0, maximum=20.0)
+    modulus: Quantity = parameter(
+        "Pa", "moduli that engage one after the other", minimum=0.0, maximum=1e12, row=True
+    )
+    knots: Quantity = parameter(
+        "1", "strains at which the moduli engage", minimum=0.0, maximum=20.0, row=True
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -119,8 +123,12 @@ class SmoothStrainStiffening(Elastic):
     by at most w·ln 2·Σkᵢ. A knot at zero is not rounded: rubber in tension has no corner there.
     """
 
-    modulus: Quantity = parameter("Pa", "moduli that engage one after the other", minimum=0.0, maximum=1e12)
-    knots: Quantity = parameter("1", "strains at which the moduli engage", minimum=0.0, maximum=20.0)
+    modulus: Quantity = parameter(
+        "Pa", "moduli that engage one after the other", minimum=0.0, maximum=1e12, row=True
+    )
+    knots: Quantity = parameter(
+        "1", "strains at which the moduli engage", minimum=0.0, maximum=20.0, row=True
+    )
     width: Quantity = parameter("1", "strain over which a knot is rounded", minimum=1e-6, maximum=1.0)
 
     def __post_init__(self) -> None:

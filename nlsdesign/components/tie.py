@@ -27,6 +27,15 @@ class Tie(Part):
     element: Element
     between: tuple[str, ...]
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.element, Element):
+            raise ArrangementError("tie", f"holds an element, not a {type(self.element).__name__}")
+        if not 1 <= len(self.between) <= 2:
+            raise ArrangementError(
+                "tie", f"has {len(self.between)} ends; an element has two", next_step="name one or two bodies"
+            )
+
     def children(self) -> Mapping[str, Part]:
         """Return the parts of the element: the tie adds no level to the names."""
         return self.element.children()
@@ -48,9 +57,8 @@ class Tie(Part):
         ArrangementError
             If the part is not an element.
         """
-        if not isinstance(part, Element):
-            raise ArrangementError("tie", f"holds an element, not a {type(part).__name__}")
-        return replace(self, element=part)
+        # The kind is checked where the copy is made.
+        return replace(self, element=part)  # type: ignore[arg-type]
 
     def parameters(self) -> dict[str, Quantity]:
         """Return the numbers of the element."""
@@ -67,8 +75,4 @@ def tie(element: Element, *between: str) -> Tie:
     *between
         One or two names of bodies.
     """
-    if not 1 <= len(between) <= 2:
-        raise ArrangementError(
-            "tie", "an element has one body at each end", next_step="name one or two bodies"
-        )
     return Tie(element=element, between=between)

@@ -2,6 +2,7 @@
 
 from .diagnose import diagnose
 from .effects import ALL, Candidate, Effect, Unknown
+from .predict import predict
 from .verdict import Course, NamedEffect, RecordGap, Verdict, write_verdict
 
 __all__ = [
@@ -14,5 +15,6 @@ __all__ = [
     "Unknown",
     "Verdict",
     "diagnose",
+    "predict",
     "write_verdict",
 ]

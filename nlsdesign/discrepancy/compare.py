@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,13 +13,14 @@ from numpy.typing import NDArray
 from ..identification.driven import DrivenBlock
 from ..identification.evidence import Bench, Evidence
 from ..identification.fit import Fit, Parameter, declared_parameter, fit, predicted_cost
-from ..identification.measurement import Role
+from ..identification.residuals import effective_size
 from ..model import Assembly, Variable
 from .cuts import blocks_of
 from .effects.candidate import Candidate, Unknown
 
 Array = NDArray[np.float64]
 
+_LONGEST_ROW = 12
 _FULL_STARTS = 3
 """So many starts are fitted to the end; where there are more, the best by a linear look ahead."""
 
@@ -41,6 +43,8 @@ class Hypothesis:
         Sum of squared residuals in units of the noise floor by block and record.
     rows
         Number of residuals by block and record.
+    worth
+        How many independent residuals these are worth, coloured as they are.
     coarse
         Whether it was fitted to thinned records only.
     """
@@ -51,6 +55,7 @@ class Hypothesis:
     fits: Mapping[tuple[str, ...], Fit]
     chi2: Mapping[tuple[str, str], float]
     rows: Mapping[tuple[str, str], int]
+    worth: Mapping[tuple[str, str], float]
     coarse: bool = False
 
     @property
@@ -97,7 +102,7 @@ class Comparison:
         assembly
             As declared.
         """
-        blank = Hypothesis(assembly, (), {}, {}, {}, {})
+        blank = Hypothesis(assembly, (), {}, {}, {}, {}, {})
         return self._refitted(blank, _groups(self._driven(blank)))
 
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
@@ -151,7 +156,7 @@ class Comparison:
     def _driven(self, hypothesis: Hypothesis) -> list[DrivenBlock]:
         found = []
         for block in blocks_of(hypothesis.assembly, self.bench.records.signals):
-            spread = [v.name for v in block.model.parameters if v.spread > 0.0]
+            spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
             found.append(DrivenBlock(block, list(dict.fromkeys([*spread, *own]))))
         return found
@@ -164,7 +169,7 @@ class Comparison:
         self, before: Hypothesis, groups: Sequence[Sequence[DrivenBlock]], new: Sequence[Unknown] = ()
     ) -> Hypothesis:
         values, fits = dict(before.values), dict(before.fits)
-        chi2, rows = dict(before.chi2), dict(before.rows)
+        chi2, rows, worth = dict(before.chi2), dict(before.rows), dict(before.worth)
         for group in groups:
             best, evidence = self._best_fit(before, group, new)
             values |= best.values
@@ -174,7 +179,8 @@ class Comparison:
                 key = each.driven.block.name, each.record.name
                 residual = each.residual(values)[0]
                 chi2[key], rows[key] = float(residual @ residual), len(residual)
-        return replace(before, values=values, fits=fits, chi2=chi2, rows=rows)
+                worth[key] = effective_size(residual)
+        return replace(before, values=values, fits=fits, chi2=chi2, rows=rows, worth=worth)
 
     def _best_fit(
         self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
@@ -216,23 +222,10 @@ class Comparison:
         )  # fmt: skip
 
 
-def chi2_of(hypothesis: Hypothesis, bench: Bench, block: str, *roles: Role) -> tuple[float, int]:
-    """Return the sum of squared residuals of a block over some records, and their number.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    bench
-        Knows the roles of the records.
-    block
-        Name of the block.
-    *roles
-        Of the records.
-    """
-    names = [r.name for r in bench.records.of(*roles)]
-    keys = [k for k in hypothesis.chi2 if k[0] == block and k[1] in names]
-    return sum(hypothesis.chi2[k] for k in keys), sum(hypothesis.rows[k] for k in keys)
+def _refittable(parameters: Sequence[Variable]) -> list[Variable]:
+    """Return the numbers with a spread; long rows are tables of a shape, which are not refitted point by point."""
+    lengths = Counter(v.name.partition("[")[0] for v in parameters)
+    return [v for v in parameters if v.spread > 0.0 and lengths[v.name.partition("[")[0]] <= _LONGEST_ROW]
 
 
 def _groups(blocks: Sequence[DrivenBlock]) -> list[list[DrivenBlock]]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..identification.evidence import Evidence
+from ..identification.evidence import STRIDE, Evidence
+from ..identification.filters import derivative
+from ..identification.residuals import Binned, shapes
 from .compare import Comparison, Hypothesis
 from .verdict import Course, RecordGap
 
@@ -57,3 +60,31 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
 
 def _key(evidence: Evidence) -> tuple[str, str]:
     return evidence.driven.block.name, evidence.record.name
+
+
+def shapes_of(
+    before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str
+) -> dict[str, tuple[Binned, Binned]]:
+    """Return the residual of a block over every measured signal, before and after, from all records.
+
+    Parameters
+    ----------
+    before, after, comparison, block
+        As above.
+    """
+    found = [_shapes(h, comparison, block) for h in (before, after)]
+    return {name: (found[0][name], found[1][name]) for name in found[0] if name in found[1]}
+
+
+def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[str, Binned]:
+    bench = comparison.bench
+    mine = [e for e in comparison.evidence(hypothesis) if e.driven.block.name == block]
+    error = np.concatenate([e.residual(hypothesis.values)[0] * e.floor.sigma for e in mine])
+
+    def gathered(signal: str, order: int) -> NDArray[np.float64]:
+        rows = [derivative(e.record.trace[signal], e.record.step, order=order)[e.floor.places] for e in mine]
+        return np.concatenate(rows)
+
+    signals = {s: gathered(s, 0) for s in bench.records.signals}
+    motion = next((s for s in bench.records.signals if bench.noise.rounded[s]), bench.records.signals[0])
+    return shapes(error, signals, gathered(motion, 1), STRIDE * mine[0].record.step)

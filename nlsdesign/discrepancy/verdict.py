@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deck import write_text
+from ..identification.residuals import Binned
 from ..model import Assembly
 
 Array = NDArray[np.float64]
@@ -110,6 +111,11 @@ class Verdict:
         The refitted assembly without them.
     course
         A held-out record over time.
+    unidentified
+        What the records cannot tell, in words.
+    shapes
+        Residual of the summed-up block before and after, over every measured signal, frequency, time and
+        direction.
     """
 
     verdict: str
@@ -121,6 +127,8 @@ class Verdict:
     actuator: Assembly
     declared: Assembly
     course: Course
+    unidentified: tuple[str, ...] = ()
+    shapes: Mapping[str, tuple[Binned, Binned]] = field(default_factory=dict)
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.
@@ -199,6 +207,7 @@ class Verdict:
                 "held_out": {"before": self.rms("before", "held_out"), "after": self.rms("after", "held_out")},
             },
             "runners_up": [{"name": n, "share": s} for n, s in self.runners_up],
+            "unidentified": list(self.unidentified),
             "model": model,
         }
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from ..errors import ConvergenceError
+
 Array = NDArray[np.float64]
 Rows = Callable[[Array], tuple[Array, Array]]
 
@@ -48,7 +50,7 @@ def minimise(rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations:
     box
         Lower and upper bounds.
     evaluations
-        At most so many.
+        At most so many; a point where there is no response counts as a bad one.
     enough
         Ends when the predicted gain is below this.
     """
@@ -62,7 +64,11 @@ def minimise(rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations:
         gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
         if gain < enough * (1.0 if damping <= 1.0 else 1e-2):
             return Minimum(x, cost, True)
-        trial, trial_slope = rows(x + step)
+        try:
+            trial, trial_slope = rows(x + step)
+        except ConvergenceError:
+            damping *= 10.0
+            continue
         new = 0.5 * float(trial @ trial)
         if np.isfinite(new) and new < cost:
             good = (cost - new) / gain

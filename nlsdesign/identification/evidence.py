@@ -79,6 +79,13 @@ class Floor:
     sigma: Array
     raw_sigma: Array
 
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Index of the sample in the middle of each row."""
+        first, behind = self.filter.indptr[:-1], self.filter.indptr[1:]
+        result: NDArray[np.int64] = self.filter.indices[(first + behind) // 2].astype(np.int64)
+        return result
+
 
 def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
     """Return filter and noise floor of a block on a record.
@@ -104,8 +111,8 @@ def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
         slow = (speed < SLOW * level).astype(float)
         matrix = matrix[np.flatnonzero(matrix @ slow < 1e-3)]
     variance, raw = _variances(block, record, noise, inputs)
-    centre = matrix.indices[(matrix.indptr[:-1] + matrix.indptr[1:]) // 2]
-    return Floor(matrix, np.sqrt(variance[centre]), np.sqrt(raw))
+    floor = Floor(matrix, np.zeros(0), np.sqrt(raw))
+    return replace(floor, sigma=np.sqrt(variance[floor.places]))
 
 
 def _inputs(block: Block, record: Record) -> Array:
@@ -198,6 +205,7 @@ class Bench:
         self.records = records
         self.noise = estimate_noise(records)
         self.floors: dict[tuple[str, str], Floor] = {}
+        self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str], tuple[Record, Floor]] = {}
         for block in blocks:
             for record in records.records:
@@ -233,6 +241,17 @@ class Bench:
                 seen, floor = self._thinned(name, record) if thin else (record, self.floors[name, record.name])
                 found.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
         return found
+
+    def typical_floor(self, block: str) -> float:
+        """Return the noise floor of a block over all records, root mean square, in its unit.
+
+        Parameters
+        ----------
+        block
+            Name of the block.
+        """
+        rows = np.concatenate([f.sigma for (name, _), f in self.floors.items() if name == block])
+        return float(np.sqrt(np.mean(rows**2)))
 
     def _thinned(self, block: str, record: Record) -> tuple[Record, Floor]:
         key = block, record.name

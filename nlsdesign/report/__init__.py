@@ -1,6 +1,7 @@
 """Reports: sections composed into one self-contained file of HTML."""
 
 from .cam import CamSection
+from .diagnosis import verdict_sections
 from .mathml import EquationsSection
 from .page import report_text, write_report
 from .sections import (
@@ -32,5 +33,6 @@ __all__ = [
     "comparison_table",
     "numbers_table",
     "report_text",
+    "verdict_sections",
     "write_report",
 ]

@@ -1,6 +1,7 @@
 """Simulation of flat models over time."""
 
 from .integrate import simulate
+from .signals import Sine, sine
 from .trace import Trace
 
-__all__ = ["Trace", "simulate"]
+__all__ = ["Sine", "Trace", "simulate", "sine"]

@@ -1,27 +1,27 @@
 """Simulation of a flat model over time.
 
-Continuous models go through CVODES (variable order, variable step, analytic Jacobian from CasADi);
-discrete ones are stepped. Inputs are traces (linear between samples) or functions of time.
+Continuous models are integrated explicitly, and implicitly where they turn out to be stiff; discrete ones
+are stepped. Inputs are samples (lines between them) or functions of time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Mapping
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, ValueRangeError, unknown_name
-from ..model import FlatModel, Variable
+from ..model import FlatModel
+from .drives import Drive, Drives, drives_of
+from .runge_kutta import TooStiffError, integrate_explicitly
+from .stiff import integrate_implicitly
 from .trace import Trace
 
 Array = NDArray[np.float64]
-Drive: TypeAlias = Callable[[float], float] | Array | float
 
 RESIDUAL_LIMIT = 1e-6
-"""Largest remainder of an implicit equation, relative to the typical size of its terms."""
+"""Largest remainder of an implicit equation, relative to its terms and to 1 Pa, N or N·m."""
 
 
 def simulate(
@@ -43,12 +43,13 @@ def simulate(
         Strictly ascending sample times in s, shape (n,). A discrete model needs multiples of its sample time.
     inputs
         By name: a function of time, samples of shape (n,), or a constant. Others rest at their start value.
+        A function is asked at least twelve times between two times; a shorter pulse may be missed.
     start
         States at the first time, by name; others at their start value.
     hold
         Whether inputs are held from one sample to the next instead of running linearly between them.
     tolerance
-        Relative tolerance of the integrator; the absolute one is that times the nominal size.
+        Error allowed per step, relative to the state and to its nominal size.
 
     Returns
     -------
@@ -59,17 +60,19 @@ def simulate(
     ------
     UnknownNameError
         If an input or state does not exist.
+    ValueRangeError
+        If the times do not ascend, or an input has no finite number at one of them.
     ConvergenceError
         If the integrator stops early, or an implicit equation was not solved.
     """
     times = _checked_times(times)
-    u = _input_samples(model, times, inputs or {})
+    drives = drives_of(model, times, inputs or {}, hold=hold)
     x0 = _start(model, start or {})
     if model.sample_time is not None:
-        x = _stepped(model, times, u, x0)
+        x = _stepped(model, times, drives.samples, x0)
     else:
-        x = _integrated(model, times, u, x0, hold=hold, tolerance=tolerance)
-    return _evaluated(model, times, x, u)
+        x = _integrated(model, drives, x0, tolerance)
+    return _evaluated(model, times, x, drives.samples)
 
 
 def _checked_times(times: Array) -> Array:
@@ -89,54 +92,15 @@ def _start(model: FlatModel, start: Mapping[str, float]) -> Array:
     return x
 
 
-def _input_samples(model: FlatModel, times: Array, drives: Mapping[str, Drive]) -> Array:
-    names = [v.name for v in model.inputs]
-    for name in drives:
-        if name not in names:
-            raise unknown_name("input", name, names)
-    rows = [_samples(v, times, drives.get(v.name, v.start)) for v in model.inputs]
-    return np.array(rows).reshape(len(names), len(times))
-
-
-def _samples(variable: Variable, times: Array, drive: Drive) -> Array:
-    if callable(drive):
-        row = np.array([float(drive(float(t))) for t in times])
-    else:
-        row = np.broadcast_to(np.asarray(drive, dtype=float), times.shape).copy()
-    if not np.all(np.isfinite(row)):
-        raise ValueRangeError(
-            f"input '{variable.name}'", f"is not finite at t = {times[~np.isfinite(row)][0]:g} s"
-        )
-    return row
-
-
-def _integrated(
-    model: FlatModel, times: Array, u: Array, x0: Array, *, hold: bool, tolerance: float
-) -> Array:
+def _integrated(model: FlatModel, drives: Drives, x0: Array, tolerance: float) -> Array:
     if not model.states:
-        return np.zeros((0, len(times)))
-    s = model.symbols()
-    slope, begin = ca.SX.sym("slope", s.input.shape), ca.SX.sym("begin")
-    running = s.input + slope * (s.time - begin)
-    scale = ca.DM([v.nominal for v in model.states])
-    scaled = ca.SX.sym("scaled", s.state.shape)
-    points = ca.vertcat(s.state, s.input)
-    rate = ca.substitute(s.derivative, points, ca.vertcat(scaled * scale, running)) / scale
-    dae = {"x": scaled, "t": s.time, "p": s.parameter, "u": ca.vertcat(s.input, slope, begin), "ode": rate}
-    options = {"reltol": tolerance, "abstol": tolerance, "max_num_steps": 200_000}
-    steps = np.diff(times)
-    slopes = np.zeros_like(u[:, :-1]) if hold else np.diff(u, axis=1) / steps
-    driven = np.vstack([u[:, :-1], slopes, times[None, :-1]])
+        return np.zeros((0, len(drives.times)))
     try:
-        solver = ca.integrator("solver", "cvodes", dae, float(times[0]), times[1:].tolist(), options)
-        found = solver(x0=x0 / np.array(scale).ravel(), p=model.start(model.parameters), u=driven)["xf"]
-    except RuntimeError as error:
-        raise ConvergenceError(
-            f"simulation of {model.name}",
-            f"the integrator stopped: {str(error).strip().splitlines()[-1][:200]}",
-            next_step="check the inputs for jumps beyond the range of the laws, or start nearer to rest",
-        ) from error
-    x: Array = np.hstack([x0[:, None], np.array(found) * np.array(scale)])
+        x = integrate_explicitly(model, drives, x0, tolerance)
+    except TooStiffError as found:
+        first = found.interval
+        rest = integrate_implicitly(model, drives, first, found.states[:, -1], tolerance)
+        x = np.hstack([found.states[:, :-1], rest])
     if not np.all(np.isfinite(x)):
         raise ConvergenceError(f"simulation of {model.name}", "a state is not finite")
     return x
@@ -160,8 +124,8 @@ def _evaluated(model: FlatModel, times: Array, x: Array, u: Array) -> Trace:
     w = np.zeros((0, len(times)))
     if model.tables:
         w = np.array([model.look_up(list(x[:, k]), list(u[:, k])) for k in range(len(times))]).T
-    p = np.repeat(model.start(model.parameters)[:, None], len(times), axis=1)
-    _, y, s, r = model.equations.map(len(times))(times[None, :], x, u, p, w)
+    # Many columns of the others against one of the parameters: CasADi runs through them.
+    _, y, s, r = model.equations(times[None, :], x, u, model.start(model.parameters), w)
     _check_residuals(model, times, np.array(r))
     signals: dict[str, Array] = {}
     for group, rows in ((model.signals, s), (model.outputs, y), (model.inputs, u), (model.states, x)):

@@ -1,24 +1,24 @@
 """The published actuator on the rig, and the records that the study of the published actuator reads.
 
-Numbers as in ``models/decks/austin2015_figure_consistent.toml``, typed again; the cam follows from energy:
-with the torque 4.35 N·m (θ/rad)^2.09 of Fig. 8 and the equilibrium force F* of both elements together,
-
-    ∫₀^δ F* = ∫₀^θ τ   gives δ(θ),   h(θ) = τ(θ) / F*(δ(θ)).
+Numbers as in ``models/decks/austin2015_figure_consistent.toml``, typed again; the cam is milled as declared:
+the control values of its lever arm h, a uniform cubic B-spline over the angle, are read from that file, and
+the extension is the integral of h.
 
 The rig knows one force; here it is that of both elements, and a record of one element holds half of it.
 """
 
 from __future__ import annotations
 
+import tomllib
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from .actuators import Actuator, Cam, Drivetrain, Rubber, Sensors
 from .records import make_records
 
-COEFFICIENT, EXPONENT = 4.35, 2.09  # N·m and 1, Fig. 8
 HIDDEN = {"coulomb_friction": 0.07, "second_relaxation": 1.0}
 """The declared dry friction (0.02 N·m), and a second relaxation of the rubber that nobody declared."""
 SEED = 2015
@@ -34,24 +34,24 @@ RUBBER = Rubber(
 
 
 @cache
-def _profile() -> tuple[np.ndarray, np.ndarray]:
-    """Extension and angle of equal energy on a fine grid, shapes (n,)."""
-    extension = np.concatenate([[0.0], np.geomspace(1e-9, 8e-3, 40_000)])
-    force = RUBBER.equilibrium(extension)
-    energy = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(extension))])
-    return extension, (energy * (EXPONENT + 1.0) / COEFFICIENT) ** (1.0 / (EXPONENT + 1.0))
+def _lever_arm_spline() -> tuple[BSpline, BSpline]:
+    """Return lever arm and extension over the angle."""
+    deck = Path(__file__).resolve().parents[2] / "models" / "decks" / "austin2015_figure_consistent.toml"
+    cam = tomllib.loads(deck.read_text(encoding="utf8"))["spring"]["cam"]
+    assert (cam["lever_arm"]["unit"], cam["last_angle"]["unit"]) == ("mm", "deg")
+    values = 1e-3 * np.array(cam["lever_arm"]["value"])
+    step = np.radians(cam["last_angle"]["value"]) / (len(values) - 3)
+    lever_arm = BSpline(step * (np.arange(len(values) + 4) - 3.0), values, 3)
+    return lever_arm, lever_arm.antiderivative()
 
 
 def _extension(angle: np.ndarray) -> np.ndarray:
-    extension, turned = _profile()
-    return np.interp(angle, turned, extension)
+    integral = _lever_arm_spline()[1]
+    return integral(angle) - integral(0.0)
 
 
 def _lever_arm(angle: np.ndarray) -> np.ndarray:
-    angle = np.asarray(angle, dtype=float)
-    force = RUBBER.equilibrium(_extension(angle))
-    torque = COEFFICIENT * angle**EXPONENT
-    return np.divide(torque, force, out=np.zeros_like(torque), where=force > 0.0)
+    return _lever_arm_spline()[0](angle)
 
 
 PUBLISHED = Actuator(

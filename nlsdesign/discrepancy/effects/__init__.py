@@ -2,13 +2,21 @@
 
 from .cable import cable_compliance, cable_slack, cam_angle_offset
 from .candidate import Candidate, Effect, Unknown, wrapped
-from .friction import backlash, coulomb_friction, quadratic_drag, stribeck_friction, torque_ripple
+from .friction import (
+    backlash,
+    coulomb_friction,
+    load_dependent_friction,
+    quadratic_drag,
+    stribeck_friction,
+    torque_ripple,
+)
 from .rubber import rate_independent_hysteresis, second_relaxation
 from .sensing import current_sensor_bias, force_sensor_bias, force_sensor_delay, force_sensor_gain
 
 ALL: tuple[Effect, ...] = (
     coulomb_friction,
     stribeck_friction,
+    load_dependent_friction,
     quadratic_drag,
     torque_ripple,
     backlash,
@@ -37,6 +45,7 @@ __all__ = [
     "force_sensor_bias",
     "force_sensor_delay",
     "force_sensor_gain",
+    "load_dependent_friction",
     "quadratic_drag",
     "rate_independent_hysteresis",
     "second_relaxation",

@@ -9,10 +9,13 @@ from ...components import (
     Backlash,
     CoulombFriction,
     Element,
+    LoadFriction,
     QuadraticDrag,
     StribeckFriction,
+    Through,
     Tie,
     TorqueRipple,
+    TorsionSpring,
     tie,
 )
 from ...components.bodies import Free
@@ -158,6 +161,39 @@ def torque_ripple(assembly: Assembly) -> Sequence[Candidate]:
     return found
 
 
+def load_dependent_friction(assembly: Assembly) -> Sequence[Candidate]:
+    """Friction in proportion to the torque that a spring puts on its drive.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for name in _springs(assembly, LoadFriction):
+        edited = wrapped(
+            assembly, name, "driven", lambda n, e: LoadFriction(members=((n, e),), ratio=_number(0.01, "1"))
+        )
+        found.append(
+            Candidate(
+                "load_dependent_friction", name, edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),),
+                "a torque against the motion in proportion to the load", "Coulomb 1785; gear efficiency",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _springs(assembly: Assembly, wrapper: type[Element]) -> list[str]:
+    """Return ties of angle and torque that hold a spring and are not wrapped in this way already."""
+    found = []
+    for name, part in assembly.parts:
+        if isinstance(part, Tie) and part.element.domain == ROTATION and not isinstance(part.element, wrapper):
+            inside = [p for path, p in assembly.walk() if path == name or path.startswith(f"{name}.")]
+            if any(isinstance(p.element if isinstance(p, Tie) else p, Through | TorsionSpring) for p in inside):
+                found.append(name)
+    return found
+
+
 def backlash(assembly: Assembly) -> Sequence[Candidate]:
     """Play between a freely turning body and a spring tied to it.
 
@@ -167,10 +203,7 @@ def backlash(assembly: Assembly) -> Sequence[Candidate]:
         As declared.
     """
     found = []
-    for name, part in assembly.parts:
-        springy = isinstance(part, Tie) and part.element.domain == ROTATION and not part.element.needs_rate
-        if not springy or isinstance(assembly.element(name), Backlash):
-            continue
+    for name in _springs(assembly, Backlash):
         edited = wrapped(
             assembly, name, "behind_play", lambda n, e: Backlash(members=((n, e),), gap=_number(0.01, "rad"))
         )

@@ -1,0 +1,18 @@
+"""Run all benchmarks: ``python -m benchmarks``."""
+
+from __future__ import annotations
+
+import importlib
+
+NAMES = ("observer_step", "bench_simulation")
+
+
+def main() -> None:
+    """Run one benchmark after the other."""
+    for name in NAMES:
+        print(f"== {name}", flush=True)
+        importlib.import_module(f"benchmarks.{name}").main()
+
+
+if __name__ == "__main__":
+    main()

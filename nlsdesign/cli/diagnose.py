@@ -1,0 +1,89 @@
+"""``nlsdesign diagnose`` and ``nlsdesign simulate``: bench records against a deck."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ..components.declare import declare
+from ..deck import load_deck
+from ..discrepancy import diagnose as find_what_is_missing
+from ..discrepancy import predict, write_verdict
+from ..errors import unknown_name
+from ..identification import load_records
+from ..model import flatten
+from ..progress import Steps
+from ..report import verdict_sections, write_report
+from ..simulation import Trace
+from .output import deck_option, json_option, out_option, show_json, show_table
+
+_file = click.Path(path_type=Path, dir_okay=False)
+_mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
+
+
+@click.command()
+@deck_option
+@click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of CSV files.")
+@click.option("--hold-out", multiple=True, help="Glob of record names that no fit may see; repeatable.")
+@_mapping
+@out_option("out/diagnosis")
+@json_option
+def diagnose(
+    deck_name: str, records: Path, hold_out: tuple[str, ...], mapping: Path | None, out: Path, as_json: bool
+) -> None:
+    """Refit, locate, name and add what the deck lacks; judge it on held-out records."""
+    actuator = declare(load_deck(deck_name))
+    measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
+    steps = Steps()
+    with steps.step("diagnosis"):
+        verdict = find_what_is_missing(actuator, measured, progress=steps.note)
+    out.mkdir(parents=True, exist_ok=True)
+    write_verdict(verdict, out)
+    title = f"{actuator.name}: what is missing"
+    report = write_report(out / "report.html", *verdict_sections(verdict), title=title)
+    if as_json:
+        show_json(verdict.to_dict(str(out / "model.toml")))
+        return
+    click.echo(str(verdict))
+    click.echo(f"report: {report}")
+
+
+@click.command()
+@deck_option
+@click.option("--record", type=_file, required=True, help="CSV file with measured signals.")
+@_mapping
+@click.option("--out", type=_file, required=True, help="CSV file to write.")
+@json_option
+def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
+    """Drive the model with a measured record and write what it predicts of the measured signals."""
+    actuator = declare(load_deck(deck_name))
+    found = load_records(record.parent, flatten(actuator), mapping=mapping)
+    names = {each.name: each for each in found.records}
+    if record.stem not in names:
+        raise unknown_name("record", record.stem, names)
+    predicted = predict(actuator, found, record.stem)
+    predicted.write_csv(out)
+    rows = agreement_rows(names[record.stem].trace, predicted)
+    if as_json:
+        show_json({"file": out, "rms": {name: float(rms) for name, rms, _ in rows}})
+        return
+    show_table(f"{record.name} against {actuator.name}", ("signal", "rms error", "unit"), rows)
+    click.echo(f"written: {out}")
+
+
+def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
+    """Return name, rms error and unit of each predicted signal; one that must vanish is its own error.
+
+    Parameters
+    ----------
+    measured, predicted
+        At the same times.
+    """
+    rows = []
+    for name, values in predicted.signals.items():
+        error = values - measured[name] if name in measured else values
+        rows.append((name, f"{float(np.sqrt(np.mean(error**2))):.4g}", predicted.units[name]))
+    return rows

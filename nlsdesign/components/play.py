@@ -1,0 +1,103 @@
+"""Wrappers that shift or swallow motion: backlash, a slack cable, a turned cam."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..errors import ArrangementError
+from ..quantity import Quantity
+from ..symbolic import Expression, positive_part
+from .element import ROTATION, TRANSLATION, Combination, Domain, Scope, observed_effort
+from .part import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shifting(Combination):
+    """Base of wrappers that change the motion of the elements inside; virtual work gives the effort outside.
+
+    With inner motion m(x), the effort outside is m'(x)·Σ(efforts inside), so no energy comes from nowhere.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self._inner != self._wanted:
+            raise ArrangementError(type(self).__name__, f"acts on {self._wanted.motion} and {self._wanted.effort}")
+
+    @property
+    def _wanted(self) -> Domain:
+        return ROTATION
+
+    @property
+    def needs_rate(self) -> bool:
+        """True if any element inside needs the rate."""
+        return any(member.needs_rate for _, member in self.members)
+
+    def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
+        """Return the inner motion and its derivative with respect to the outer one."""
+        raise NotImplementedError
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return m'(x)·Σ(efforts at m(x))."""
+        inner, slope = self.shifted(scope, motion)
+        efforts = [observed_effort(m, scope.child(n), inner, slope * rate) for n, m in self.members]
+        return slope * sum(efforts[1:], start=efforts[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Backlash(Shifting):
+    """Play between drive and cam: the cam follows when half the gap g is used up.
+
+    φ = ⟨θ − g/2⟩ − ⟨−θ − g/2⟩ with rounded corners of width w. The cam side has no inertia here: its spring
+    keeps it in contact, so the play shows as a dead angle. Source: e.g. Nordin and Gutman 2002.
+    """
+
+    gap: Quantity = parameter("rad", "angle from stop to stop", minimum=0.0, maximum=1.0)
+    width: Quantity = parameter(
+        "rad", "angle over which a stop is rounded", minimum=1e-7, maximum=0.1, default=5e-4
+    )
+
+    def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
+        """Return the cam's angle and its derivative."""
+        half, width = scope.parameter("gap") / 2, scope.parameter("width")
+        inner = positive_part(motion - half, width) - positive_part(-motion - half, width)
+        return inner, _step(motion - half, width) + _step(-motion - half, width)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slack(Shifting):
+    """A cable too long by s: the element inside is stretched by ⟨e − s⟩, rounded over w.
+
+    Permanent set of the rubber looks the same.
+    """
+
+    length: Quantity = parameter("m", "extension that stretches nothing", minimum=0.0, maximum=1.0)
+    width: Quantity = parameter(
+        "m", "extension over which the corner is rounded", minimum=1e-8, maximum=1e-2, default=1e-5
+    )
+
+    @property
+    def _wanted(self) -> Domain:
+        return TRANSLATION
+
+    def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
+        """Return the extension left and its derivative."""
+        left, width = motion - scope.parameter("length"), scope.parameter("width")
+        return positive_part(left, width), _step(left, width)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turned(Shifting):
+    """A cam that sits on its shaft turned by θ₀, or an encoder whose zero is off: φ = θ − θ₀."""
+
+    offset: Quantity = parameter("rad", "angle at which the elements inside see zero", minimum=-6.3, maximum=6.3)
+
+    def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
+        """Return the angle left and one."""
+        return motion - scope.parameter("offset"), ca.SX(1)
+
+
+def _step(value: Expression, width: Expression) -> Expression:
+    """Return the derivative of the smooth positive part."""
+    return (1 + ca.tanh(value / (2 * width))) / 2

@@ -1,0 +1,52 @@
+"""The pages of a diagnosis: what disagrees, where, what is missing, how sure, and the gap."""
+
+from __future__ import annotations
+
+from ..discrepancy.verdict import Verdict
+from ..figures import CandidateShare, HeldOut, RecordError, candidate_shares, gap_bars, held_out_series
+from .sections import Chapter, FigureSection, Section, TableSection
+from .verdict import VerdictSection
+
+
+def verdict_sections(verdict: Verdict) -> list[Section]:
+    """Return the sections of a report on a diagnosis.
+
+    Parameters
+    ----------
+    verdict
+        As found.
+    """
+    gaps = [g for g in verdict.gaps if g.block == verdict.block]
+    errors = [RecordError(g.record, g.before, g.after, g.noise_floor, g.role == "held_out") for g in gaps]
+    course = verdict.course
+    series = HeldOut(
+        course.time, course.measured, course.before, course.after, course.quantity, course.unit, course.noise
+    )
+    chosen = {effect.name for effect in verdict.effects}
+    parts: list[Section] = [
+        TableSection("Where", ("finding",), tuple((text,) for text in verdict.where)),
+        FigureSection(
+            f"Error of each record: {verdict.block}", gap_bars(errors, unit=gaps[0].unit),
+            caption="Refitted declared model before, model with the added effect after; line: noise floor.",
+            means="Records marked as held out were seen by no fit.",
+        ),
+        FigureSection(
+            f"A held-out record: {course.record}", held_out_series(series),
+            caption="Measured, and predicted before and after.",
+        ),
+    ]  # fmt: skip
+    if verdict.runners_up:
+        shares = [CandidateShare(name, share, name in chosen) for name, share in verdict.runners_up]
+        parts.append(
+            FigureSection(
+                "What was tried first", candidate_shares(shares),
+                caption="Share of the excess over the noise that each effect alone explains.",
+            )
+        )  # fmt: skip
+    columns = ("block", "record", "role", "before", "after", "noise floor")
+    parts.append(TableSection("All blocks and records", columns, tuple(verdict.rows()), folded=True))
+    words = verdict.words()
+    return [
+        Chapter("Diagnosis", "Bench records against the declared model."),
+        VerdictSection("Verdict", verdict.verdict, words, parts=tuple(parts)),
+    ]

@@ -1,0 +1,124 @@
+"""What drives the inputs of a model: samples, functions of time, constants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ValueRangeError, unknown_name
+from ..model import FlatModel
+
+Array = NDArray[np.float64]
+Drive: TypeAlias = Callable[[float], float] | Array | float
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Inputs over time: lines between samples, and functions that are asked wherever they are needed.
+
+    Parameters
+    ----------
+    times
+        Sample times, shape (n,).
+    samples
+        All inputs at the sample times, shape (inputs, n).
+    slopes
+        Their slopes from each sample to the next, shape (inputs, n − 1).
+    functions
+        Functions of time by the name and number of the input.
+    """
+
+    times: Array
+    samples: Array
+    slopes: Array
+    functions: Mapping[tuple[str, int], Callable[[float], float]]
+
+    def at(self, interval: int, moments: Array, out: Array | None = None) -> Array:
+        """Return all inputs at moments within one interval between samples.
+
+        Parameters
+        ----------
+        interval
+            Number of the sample at its beginning.
+        moments
+            Times, shape (m,).
+        out
+            Where to write, shape (m, inputs); a new array otherwise.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (m, inputs).
+
+        Raises
+        ------
+        ValueRangeError
+            If a function gives no finite number.
+        """
+        found = np.empty((len(moments), len(self.samples))) if out is None else out
+        if len(self.functions) < len(self.samples):
+            since = moments - self.times[interval]
+            np.multiply(since[:, None], self.slopes[:, interval], out=found)
+            found += self.samples[:, interval]
+        for (name, number), function in self.functions.items():
+            values = [float(function(t)) for t in moments.tolist()]
+            if not math.isfinite(sum(values)):
+                raise _not_finite(name, moments, np.array(values))
+            found[:, number] = values
+        return found
+
+
+def drives_of(model: FlatModel, times: Array, given: Mapping[str, Drive], *, hold: bool) -> Drives:
+    """Return the inputs of a model over time.
+
+    Parameters
+    ----------
+    model
+        Its inputs that are not given rest at their start values.
+    times
+        Sample times, shape (n,).
+    given
+        By name: a function of time, samples of shape (n,), or a constant.
+    hold
+        Whether inputs, functions too, are held from one sample to the next.
+
+    Raises
+    ------
+    UnknownNameError
+        If an input does not exist.
+    ValueRangeError
+        If there are not n samples, or one is not finite.
+    """
+    names = [v.name for v in model.inputs]
+    for name in given:
+        if name not in names:
+            raise unknown_name("input", name, names)
+    rows = [_samples(v.name, times, given.get(v.name, v.start)) for v in model.inputs]
+    samples = np.array(rows, dtype=float).reshape(len(names), len(times))
+    slopes = np.zeros_like(samples[:, 1:]) if hold else np.diff(samples, axis=1) / np.diff(times)
+    functions = {(n, names.index(n)): drive for n, drive in given.items() if callable(drive) and not hold}
+    return Drives(times, samples, slopes, functions)
+
+
+def _samples(name: str, times: Array, drive: Drive) -> Array:
+    if callable(drive):
+        row = np.array([float(drive(float(t))) for t in times])
+    else:
+        given = np.asarray(drive, dtype=float)
+        if given.ndim and given.shape != times.shape:
+            raise ValueRangeError(
+                f"input '{name}'", f"has samples of shape {given.shape}, times are {len(times)}"
+            )
+        row = np.broadcast_to(given, times.shape).copy()
+    if not np.all(np.isfinite(row)):
+        raise _not_finite(name, times, row)
+    return row
+
+
+def _not_finite(name: str, times: Array, values: Array) -> ValueRangeError:
+    return ValueRangeError(f"input '{name}'", f"is not finite at t = {times[~np.isfinite(values)][0]:g} s")

@@ -1,0 +1,56 @@
+"""Signals over time for the inputs of models and FMUs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Sine:
+    """offset + amplitude·sin(2π·frequency·t + phase).
+
+    Parameters
+    ----------
+    amplitude, offset
+        In the unit of the input.
+    frequency
+        In Hz.
+    phase
+        In rad.
+    """
+
+    amplitude: float
+    frequency: float
+    offset: float = 0.0
+    phase: float = 0.0
+
+    def __call__(self, time: float) -> float:
+        """Return the value at a time.
+
+        Parameters
+        ----------
+        time
+            In s.
+        """
+        return self.offset + self.amplitude * math.sin(2.0 * math.pi * self.frequency * time + self.phase)
+
+
+def sine(name: str, amplitude: float, frequency: float, *, offset: float = 0.0) -> dict[str, Sine]:
+    """Return a sine for one input, as ``simulate`` and ``cosimulate`` take it.
+
+    Parameters
+    ----------
+    name
+        Full name of the input.
+    amplitude, offset
+        In the unit of the input.
+    frequency
+        In Hz.
+
+    Examples
+    --------
+    >>> sine("plant.motor.current", 1.0, 2.0)["plant.motor.current"](0.125)
+    1.0
+    """
+    return {name: Sine(amplitude, frequency, offset)}

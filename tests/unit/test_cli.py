@@ -1,0 +1,111 @@
+"""The command line: exit status, one clear message, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.cli import main
+
+DECK = "austin2015_figure_consistent"
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run the command line in an empty folder; returns exit status, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["nlsdesign", *words])
+        try:
+            main()
+            status = 0
+        except SystemExit as leaving:
+            status = int(leaving.code or 0)
+        out, err = capsys.readouterr()
+        return status, out, err
+
+    return call
+
+
+def spoilt(root: Path, folder: Path, old: str, new: str) -> str:
+    """Write a deck in which one piece of text is another, and return its path."""
+    text = (root / "models" / "decks" / f"{DECK}.toml").read_text(encoding="utf8")
+    assert old in text
+    (folder / "spoilt.toml").write_text(text.replace(old, new, 1), encoding="utf8")
+    return str(folder / "spoilt.toml")
+
+
+SPOILT = {
+    "misspelt field": ("viscosity =", "viscositi =", "did you mean 'viscosity'?"),
+    "missing unit": ('unit = "Pa*s", ', "", "has no unit"),
+    "millimetres for metres": ('value = 12.5, unit = "mm"', 'value = 12.5, unit = "m"', "was 'mm' meant?"),
+    "unknown component": ('"LinearElastic"', '"LinearElastik"', "did you mean 'LinearElastic'?"),
+    "unknown body": ('between = ["motor", "load"]', 'between = ["motor", "lode"]', "did you mean 'load'?"),
+    "impossible arrangement": ('between = ["motor", "load"]', 'between = ["load"]', "can never move"),
+}
+
+
+@pytest.mark.parametrize("case", SPOILT)
+@pytest.mark.parametrize("command", [("deck", "check"), ("observer", "--out", "o", "--deck")])
+def test_bad_deck_is_named_and_nothing_is_written(
+    case: str, command: tuple[str, ...], run: Run, root: Path, tmp_path: Path
+) -> None:
+    old, new, hint = SPOILT[case]
+    path = spoilt(root, tmp_path, old, new)
+    status, out, err = run(*command, path)
+    assert status == 2
+    assert out == ""
+    assert err.startswith("error: spoilt.toml")
+    assert hint in err
+    assert len(err.strip().splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["spoilt.toml"]
+
+
+def test_good_deck_passes(run: Run) -> None:
+    status, out, err = run("deck", "check", DECK, "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    assert found["numbers"] == 20
+    assert 0.0 < found["assumed"] < 0.5
+
+
+def test_unknown_deck_names_the_nearest(run: Run) -> None:
+    status, _, err = run("deck", "show", "austin2015_soft")
+    assert status == 2
+    assert "did you mean 'austin2015_soft_spring'?" in err
+
+
+def test_infeasible_limits_are_named(run: Run, tmp_path: Path) -> None:
+    words = [
+        "--maximum",
+        "5 N*m",
+        "--angle",
+        "53 deg",
+        "--minimum-radius",
+        "30 mm",
+        "--maximum-radius",
+        "5 mm",
+    ]
+    status, _, err = run("design", "--deck", DECK, *words)
+    assert status == 2
+    assert "MinimumRadiusOfCurvature" in err
+    assert "MaximumCamRadius" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_number_without_unit_is_refused(run: Run) -> None:
+    status, _, err = run("design", "--deck", DECK, "--maximum", "5", "--angle", "53 deg")
+    assert status == 2
+    assert "has no unit" in err
+
+
+def test_unknown_study_is_named(run: Run) -> None:
+    status, _, err = run("study", "run", "austin2014")
+    assert status == 2
+    assert "did you mean 'austin2015'?" in err
