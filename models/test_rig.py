@@ -78,10 +78,13 @@ def test_rig_deck(rig_toml: Path, cam_csv: Path) -> Assembly:
         load=Fixed(),
         spring=tie(through(_cam(cam_csv), cable=pull_only(rubber=_rubber(numbers))), "motor", "load"),
         bearing=tie(
-            TorsionDashpot(damping=numbers("drivetrain", "b_Nm_s_per_rad", "N*m*s/rad", _SPREAD_OF_BEARING)), "motor"
+            TorsionDashpot(damping=numbers("drivetrain", "b_Nm_s_per_rad", "N*m*s/rad", _SPREAD_OF_BEARING)),
+            "motor",
         ),
         motor_encoder=Encoder(of="motor.angle", quantum=numbers("sensors", "theta_quantum_rad", "rad")),
-        current_sensor=CurrentSensor(of="motor.current", noise=numbers("sensors", "current_noise_std_A", "A")),
+        current_sensor=CurrentSensor(
+            of="motor.current", noise=numbers("sensors", "current_noise_std_A", "A")
+        ),
         force_sensor=ForceSensor(of="spring.cable.force", noise=numbers("sensors", "force_noise_std_N", "N")),
     )
 

@@ -29,7 +29,9 @@ def with_bench_sensors(actuator: Any) -> Any:
         .with_part("load_cell", nls.ForceSensor(of="spring.cable.force", noise=cell))
         .with_part("ammeter", nls.CurrentSensor(of="motor.current", noise=meter))
     )
-    return bench.with_values({name: replace(q, spread=0.0) for name, q in bench.quantities().items() if geometry(name)})
+    return bench.with_values(
+        {name: replace(q, spread=0.0) for name, q in bench.quantities().items() if geometry(name)}
+    )
 
 
 def geometry(name: str) -> bool:

@@ -24,7 +24,9 @@ class StribeckFriction(CoulombFriction):
     """
 
     breakaway: Quantity = parameter("N*m", "friction beyond sliding at low speed", minimum=0.0, maximum=1e6)
-    stribeck_speed: Quantity = parameter("rad/s", "speed at which 37 % of that is left", minimum=1e-6, maximum=1e4)
+    stribeck_speed: Quantity = parameter(
+        "rad/s", "speed at which 37 % of that is left", minimum=1e-6, maximum=1e4
+    )
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the friction torque."""

@@ -25,8 +25,12 @@ class SlidingFillers(Element):
     smooth form of one).
     """
 
-    modulus: Quantity = parameter("Pa", "modulus Eₜ of all sliders together from rest", minimum=0.0, maximum=1e12)
-    yield_stress: Quantity = parameter("Pa", "stress of all sliders together while sliding", minimum=1e-6, maximum=1e12)
+    modulus: Quantity = parameter(
+        "Pa", "modulus Eₜ of all sliders together from rest", minimum=0.0, maximum=1e12
+    )
+    yield_stress: Quantity = parameter(
+        "Pa", "stress of all sliders together while sliding", minimum=1e-6, maximum=1e12
+    )
 
     @property
     def domain(self) -> Domain:

@@ -23,7 +23,9 @@ class Shifting(Combination):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self._inner != self._wanted:
-            raise ArrangementError(type(self).__name__, f"acts on {self._wanted.motion} and {self._wanted.effort}")
+            raise ArrangementError(
+                type(self).__name__, f"acts on {self._wanted.motion} and {self._wanted.effort}"
+            )
 
     @property
     def _wanted(self) -> Domain:
@@ -91,7 +93,9 @@ class Slack(Shifting):
 class Turned(Shifting):
     """A cam that sits on its shaft turned by θ₀, or an encoder whose zero is off: φ = θ − θ₀."""
 
-    offset: Quantity = parameter("rad", "angle at which the elements inside see zero", minimum=-6.3, maximum=6.3)
+    offset: Quantity = parameter(
+        "rad", "angle at which the elements inside see zero", minimum=-6.3, maximum=6.3
+    )
 
     def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
         """Return the angle left and one."""

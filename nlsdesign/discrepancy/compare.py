@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 _LONGEST_ROW = 12
 _FULL_STARTS = 3
+_EVALUATIONS, _COARSE_EVALUATIONS, _COARSE_TOLERANCE = 40, 20, 3e-4
 """So many starts are fitted to the end; where there are more, the best by a linear look ahead."""
 
 
@@ -151,7 +152,9 @@ class Comparison:
             Fitted.
         """
         records = self.bench.records.records
-        return [e for b in self._driven(hypothesis) for e in self.bench.evidence(b, records, hypothesis.values)]
+        return [
+            e for b in self._driven(hypothesis) for e in self.bench.evidence(b, records, hypothesis.values)
+        ]
 
     def _driven(self, hypothesis: Hypothesis) -> list[DrivenBlock]:
         found = []
@@ -199,12 +202,16 @@ class Comparison:
         ]
         begin = {p.name: p.start for p in choices[0]}
         everything = [
-            e for b in group for e in self.bench.evidence(b, self.bench.records.records, begin, coarse=before.coarse)
+            e
+            for b in group
+            for e in self.bench.evidence(b, self.bench.records.records, begin, coarse=before.coarse)
         ]
         seen = [e for e in everything if e.record.role == "fit"]
         if len(choices) > _FULL_STARTS:
             choices = sorted(choices, key=lambda ps: predicted_cost(seen, ps))[:_FULL_STARTS]
-        return min((fit(seen, ps) for ps in choices), key=lambda f: f.cost), everything
+        limits = (_COARSE_EVALUATIONS, _COARSE_TOLERANCE) if before.coarse else (_EVALUATIONS, 0.0)
+        fits = (fit(seen, ps, evaluations=limits[0], tolerance=limits[1]) for ps in choices)
+        return min(fits, key=lambda f: f.cost), everything
 
     def _scale(self, unknown: Unknown) -> float:
         return self._sizes.get(unknown.of, 1.0) if unknown.of else 1.0
@@ -217,9 +224,16 @@ class Comparison:
         begin = variable.start if start is None else start
         log = unknown.lower > 0.0
         return Parameter(
-            variable.name, variable.unit, begin, begin, float("inf"), max(low, variable.minimum),
-            min(high, variable.maximum), "log" if log else "linear", 1.0 if log else 0.1 * (high - low),
-        )  # fmt: skip
+            variable.name,
+            variable.unit,
+            begin,
+            begin,
+            float("inf"),
+            max(low, variable.minimum),
+            min(high, variable.maximum),
+            "log" if log else "linear",
+            1.0 if log else 0.1 * (high - low),
+        )
 
 
 def _refittable(parameters: Sequence[Variable]) -> list[Variable]:
@@ -265,4 +279,3 @@ def _with_unknowns(added: Sequence[Candidate], unknowns: Sequence[Unknown]) -> t
         own, left = left[: len(each.unknowns)], left[len(each.unknowns) :]
         result.append(replace(each, unknowns=tuple(own)))
     return tuple(result)
-

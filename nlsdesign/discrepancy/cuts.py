@@ -63,21 +63,28 @@ def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
     moving = [k for k in known if k.truth in states and _speed_of(k.truth) in states]
     efforts = [k for k in known if k.truth not in states | inputs]
     driven = [k for k in known if k.truth in inputs]
-    found = [_reading_block(assembly, model, effort, moving + driven) for effort in efforts if moving + driven]
+    found = [
+        _reading_block(assembly, model, effort, moving + driven) for effort in efforts if moving + driven
+    ]
     opened = cut(model, [e.truth for e in efforts]) if efforts else model
     found += [_balance_block(assembly, opened, body, moving + driven + efforts) for body in moving]
     if not found:
         raise MeasurementError(
-            "records", "measure no motion that drives the model, or nothing to compare it with",
+            "records",
+            "measure no motion that drives the model, or nothing to compare it with",
             next_step=f"measure for instance an angle and a force; measured are: {', '.join(signals)}",
-        )  # fmt: skip
+        )
     return found
 
 
 def _known(assembly: Assembly, signal: str) -> _Known:
     owner, _, last = signal.rpartition(".")
     sensors = assembly.sensors()
-    return _Known(sensors[owner].of, signal, owner) if last == "reading" and owner in sensors else _Known(signal, signal, None)
+    return (
+        _Known(sensors[owner].of, signal, owner)
+        if last == "reading" and owner in sensors
+        else _Known(signal, signal, None)
+    )
 
 
 def _speed_of(motion: str) -> str:
@@ -94,7 +101,9 @@ def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Se
     return _driven(assembly, model, given, (name, f"{name}.unbalanced", None))
 
 
-def _driven(assembly: Assembly, model: FlatModel, given: Sequence[_Known], what: tuple[str, str, str | None]) -> Block:
+def _driven(
+    assembly: Assembly, model: FlatModel, given: Sequence[_Known], what: tuple[str, str, str | None]
+) -> Block:
     """Return the block whose prescribed variables follow from readings."""
     name, output, target = what
     s = model.symbols()
@@ -137,7 +146,10 @@ def _driven(assembly: Assembly, model: FlatModel, given: Sequence[_Known], what:
                 instead.append(inferred(known, 1))
     if target is None:
         body = next(k for k in given if k.truth.rpartition(".")[0] == name and k.truth in states)
-        result, variable = _unbalanced(model, s.derivative, s.parameter, name), Variable(output, _effort_unit(model, name), f"sum of all efforts on {name}")
+        result, variable = (
+            _unbalanced(model, s.derivative, s.parameter, name),
+            Variable(output, _effort_unit(model, name), f"sum of all efforts on {name}"),
+        )
         result = _inertia(model, s.parameter, name) * inferred(body, 2) - result
         drive = next((k for k in given if k.truth in inputs and k.truth.startswith(f"{name}.")), None)
     else:
@@ -148,18 +160,34 @@ def _driven(assembly: Assembly, model: FlatModel, given: Sequence[_Known], what:
     rows = ca.substitute([derivative, result], [ca.vertcat(*old)], [ca.vertcat(*instead)])
     resting = [i for i, n in enumerate(inputs) if not any(n in (k.truth, _speed_of(k.truth)) for k in given)]
     columns = [
-        s.time, ca.vertcat(*[s.state[i] for i in kept]),
-        ca.vertcat(*[e for _, e in new.values()], *[s.input[i] for i in resting]), s.parameter, s.table,
-    ]  # fmt: skip
+        s.time,
+        ca.vertcat(*[s.state[i] for i in kept]),
+        ca.vertcat(*[e for _, e in new.values()], *[s.input[i] for i in resting]),
+        s.parameter,
+        s.table,
+    ]
     if target is None and drive is not None:
         rows[1] = _in_drive_units(rows[1], reading(drive, 0), s.parameter, model)
-    equations = ca.Function("equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], ca.SX(0, 1), ca.SX(0, 1)])
+    equations = ca.Function(
+        "equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], ca.SX(0, 1), ca.SX(0, 1)]
+    )
     pruned = replace(
-        model, equations=equations, states=tuple(model.states[i] for i in kept), signals=(), outputs=(variable,),
+        model,
+        equations=equations,
+        states=tuple(model.states[i] for i in kept),
+        signals=(),
+        outputs=(variable,),
         inputs=(*[v for v, _ in new.values()], *[model.inputs[i] for i in resting]),
-    )  # fmt: skip
-    return Block(name, without_idle_states(pruned, [output]), drives, output, target, READING_WIDTH if target else BALANCE_WIDTH,
-                 None if target else f"{body.signal}.rate")
+    )
+    return Block(
+        name,
+        without_idle_states(pruned, [output]),
+        drives,
+        output,
+        target,
+        READING_WIDTH if target else BALANCE_WIDTH,
+        None if target else f"{body.signal}.rate",
+    )
 
 
 def _inertia(model: FlatModel, parameter: Expression, body: str) -> Expression:
@@ -176,7 +204,9 @@ def _unbalanced(model: FlatModel, derivative: Expression, parameter: Expression,
     return _inertia(model, parameter, body) * derivative[place]
 
 
-def _in_drive_units(balance: Expression, drive: Expression, parameter: Expression, model: FlatModel) -> Expression:
+def _in_drive_units(
+    balance: Expression, drive: Expression, parameter: Expression, model: FlatModel
+) -> Expression:
     """Return the balance as the error of the measured drive, times the declared torque (or force) per drive.
 
     A balance can be made small by making all its factors small; an error of a measured signal cannot.

@@ -89,7 +89,9 @@ def _verdict(
     steps = outcome.steps if word == "named" else ()
     named = {step.chosen.added[-1].effect for step in steps}
     tried = [(c.effect, share) for c, share in outcome.ranking]
-    runners_up = [pair for pair in tried if pair[0] in named] + [pair for pair in tried if pair[0] not in named]
+    runners_up = [pair for pair in tried if pair[0] in named] + [
+        pair for pair in tried if pair[0] not in named
+    ]
     return Verdict(
         word,
         tuple(_named(better, step, place) for place, step in enumerate(steps)),
@@ -128,7 +130,10 @@ def sourced(hypothesis: Hypothesis) -> Assembly:
     known = fitted.quantities()
     rows = {name.partition("[")[0] for name in hypothesis.values}
     return fitted.with_values(
-        {n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {known[n].source}") for n in rows}
+        {
+            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {known[n].source}")
+            for n in rows
+        }
     )
 
 
@@ -143,6 +148,12 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         if p.name in own
     }
     return NamedEffect(
-        mine.effect, mine.location, numbers, step.aliases, step.share_fit, step.share_held_out, mine.signature,
+        mine.effect,
+        mine.location,
+        numbers,
+        step.aliases,
+        step.share_fit,
+        step.share_held_out,
+        mine.signature,
         mine.source,
-    )  # fmt: skip
+    )

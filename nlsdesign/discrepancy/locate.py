@@ -87,7 +87,9 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str) -> Excess:
     return Excess(block, bench.units[block], floor, fitted, held, chi2, rows, is_open)
 
 
-def _sums(hypothesis: Hypothesis, bench: Bench, block: str, roles: Sequence[Role]) -> tuple[float, int, float]:
+def _sums(
+    hypothesis: Hypothesis, bench: Bench, block: str, roles: Sequence[Role]
+) -> tuple[float, int, float]:
     """Return sum of squares, number of residuals, and how many independent ones these are worth."""
     names = {r.name for r in bench.records.of(*roles)}
     keys = [k for k in hypothesis.chi2 if k[0] == block and k[1] in names]

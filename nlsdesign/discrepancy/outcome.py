@@ -26,7 +26,10 @@ def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tu
     found = []
     for each in comparison.evidence(before):
         sigma = each.floor.sigma
-        then, now = each.residual(before.values)[0] * sigma, later[_key(each)].residual(after.values)[0] * sigma
+        then, now = (
+            each.residual(before.values)[0] * sigma,
+            later[_key(each)].residual(after.values)[0] * sigma,
+        )
         unit = each.driven.block.model.outputs[0].unit
         rms = [float(np.sqrt(np.mean(np.square(row)))) for row in (then, now, sigma)]
         name = each.driven.block.name
@@ -53,9 +56,15 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
     measured = trace[target] if target else np.zeros(len(trace))
     output = worst.driven.block.model.outputs[0]
     return Course(
-        worst.record.name, target or output.description, output.unit, trace.time, measured,
-        worst.predicted(before.values), later.predicted(after.values), float(np.mean(worst.floor.raw_sigma)),
-    )  # fmt: skip
+        worst.record.name,
+        target or output.description,
+        output.unit,
+        trace.time,
+        measured,
+        worst.predicted(before.values),
+        later.predicted(after.values),
+        float(np.mean(worst.floor.raw_sigma)),
+    )
 
 
 def _key(evidence: Evidence) -> tuple[str, str]:

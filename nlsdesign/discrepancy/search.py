@@ -130,9 +130,7 @@ def _best_step(
     equal = [(h, after) for h, after in able if total_excess(after) <= least + margin]
     chosen, after = min(equal, key=lambda pair: (len(pair[0].added[-1].unknowns), total_excess(pair[1])))
     size = len(chosen.added[-1].unknowns)
-    aliases = [
-        h.added[-1].effect for h, _ in equal if h is not chosen and len(h.added[-1].unknowns) <= size
-    ]
+    aliases = [h.added[-1].effect for h, _ in equal if h is not chosen and len(h.added[-1].unknowns) <= size]
     return Step(chosen, *_best_shares(before, after), tuple(dict.fromkeys(aliases)), tuple(tried))
 
 

@@ -27,7 +27,8 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> dict[str, float]:
     model, sensors = flatten(actuator), actuator.sensors()
     measured = {s: max(float(np.max(np.abs(r.trace[s]))) for r in records.records) for s in records.signals}
     truth = {
-        sensors[owner].of if (owner := s.rpartition(".")[0]) in sensors else s: size for s, size in measured.items()
+        sensors[owner].of if (owner := s.rpartition(".")[0]) in sensors else s: size
+        for s, size in measured.items()
     }
     state = [truth.get(v.name, v.start) for v in model.states]
     inputs = [truth.get(v.name, v.start) for v in model.inputs]
@@ -57,8 +58,7 @@ def suspicions_of(comparison: Comparison, base: Hypothesis) -> list[Finding]:
             found.append(
                 Finding(
                     f"{evidence.record.source}: column '{head}'",
-                    f"is {ratio:.3g} times what the refitted model predicts from the motion"
-                    + _hint(ratio),
+                    f"is {ratio:.3g} times what the refitted model predicts from the motion" + _hint(ratio),
                 )
             )
     return found

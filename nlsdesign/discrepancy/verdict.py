@@ -142,7 +142,11 @@ class Verdict:
         """
         gaps = [g for g in self.gaps if g.block == self.block and g.role == role]
         total = sum(g.rows for g in gaps)
-        return float(np.sqrt(sum(getattr(g, which) ** 2 * g.rows for g in gaps) / total)) if total else float("nan")
+        return (
+            float(np.sqrt(sum(getattr(g, which) ** 2 * g.rows for g in gaps) / total))
+            if total
+            else float("nan")
+        )
 
     @property
     def held_out_ratio(self) -> float:
@@ -191,10 +195,15 @@ class Verdict:
                     "name": e.name,
                     "location": e.location,
                     "parameters": [
-                        {"name": n, "value": v, "unit": u, "standard_error": s} for n, (v, u, s) in e.parameters.items()
+                        {"name": n, "value": v, "unit": u, "standard_error": s}
+                        for n, (v, u, s) in e.parameters.items()
                     ],
                     "aliases": list(e.aliases),
-                    "evidence": {"share_fit": e.share_fit, "share_held_out": e.share_held_out, "signature": e.signature},
+                    "evidence": {
+                        "share_fit": e.share_fit,
+                        "share_held_out": e.share_held_out,
+                        "signature": e.signature,
+                    },
                 }
                 for e in self.effects
             ],
@@ -204,7 +213,10 @@ class Verdict:
                 "block": self.block,
                 "noise_floor": self.rms("noise_floor", "held_out"),
                 "fit": {"before": self.rms("before", "fit"), "after": self.rms("after", "fit")},
-                "held_out": {"before": self.rms("before", "held_out"), "after": self.rms("after", "held_out")},
+                "held_out": {
+                    "before": self.rms("before", "held_out"),
+                    "after": self.rms("after", "held_out"),
+                },
             },
             "runners_up": [{"name": n, "share": s} for n, s in self.runners_up],
             "unidentified": list(self.unidentified),
@@ -214,7 +226,14 @@ class Verdict:
     def rows(self) -> Sequence[tuple[str, ...]]:
         """Return a table of the gap: block, record, role, before, after, noise floor."""
         return [
-            (g.block, g.record, g.role, f"{g.before:.3g} {g.unit}", f"{g.after:.3g} {g.unit}", f"{g.noise_floor:.3g} {g.unit}")
+            (
+                g.block,
+                g.record,
+                g.role,
+                f"{g.before:.3g} {g.unit}",
+                f"{g.after:.3g} {g.unit}",
+                f"{g.noise_floor:.3g} {g.unit}",
+            )
             for g in self.gaps
         ]
 

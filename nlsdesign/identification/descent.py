@@ -38,7 +38,9 @@ class Minimum(NamedTuple):
     converged: bool
 
 
-def minimise(rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations: int, enough: float = ENOUGH) -> Minimum:
+def minimise(
+    rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations: int, share: float = 0.0
+) -> Minimum:
     """Return the minimum of half a sum of squares within bounds.
 
     Parameters
@@ -51,8 +53,8 @@ def minimise(rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations:
         Lower and upper bounds.
     evaluations
         At most so many; a point where there is no response counts as a bad one.
-    enough
-        Ends when the predicted gain is below this.
+    share
+        Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
     """
     low, high = box
     x, damping = start, _FIRST_DAMPING
@@ -62,7 +64,7 @@ def minimise(rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations:
         gradient, curvature = slope.T @ residual, slope.T @ slope
         step = _step(gradient, curvature, damping, (x, low, high))
         gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
-        if gain < enough * (1.0 if damping <= 1.0 else 1e-2):
+        if gain < max(ENOUGH, share * cost) * (1.0 if damping <= 1.0 else 1e-2):
             return Minimum(x, cost, True)
         try:
             trial, trial_slope = rows(x + step)

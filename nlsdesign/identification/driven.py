@@ -151,9 +151,10 @@ class DrivenBlock:
         found = self._output(n, [states, given.at, p])
         if not np.all(np.isfinite(found)):
             raise ConvergenceError(
-                f"block '{self.block.name}'", "its response is not finite",
+                f"block '{self.block.name}'",
+                "its response is not finite",
                 next_step="narrow the bounds of the parameters",
-            )  # fmt: skip
+            )
         return Response(found[0], found[1:].T)
 
     def _states(self, given: Samples, p: Array) -> Array:
@@ -235,7 +236,9 @@ def _equations(block: Block, free: Sequence[str]) -> _Equations:
     aliases = [ca.SX.sym(f"bare_{k}") for k in range(len(bare))]
     core = ca.substitute(core, ca.vertcat(*bare), ca.vertcat(*aliases)) if bare else core
     symbols, parts = [*symbols, *aliases], [*parts, *bare]
-    digest = ca.Function("digest", [s.input, rates], [ca.densify(ca.vertcat(*parts)) if parts else ca.SX(0, 1)])
+    digest = ca.Function(
+        "digest", [s.input, rates], [ca.densify(ca.vertcat(*parts)) if parts else ca.SX(0, 1)]
+    )
     n = s.state.numel()
     digested = ca.SX(ca.vertcat(*symbols)) if symbols else ca.SX(0, 1)
     return _Equations(s.state, digested, p, now, core[:n], core[n:], digest)
@@ -292,7 +295,9 @@ def _walk_functions(e: _Equations, stages: Sequence[Stage]) -> tuple[ca.Function
     prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
     slope, everything = _sensitivities(e)
     along = ca.SX.sym("along", table.numel(), e.parameter.numel())
-    new_slope = ca.jacobian(new, e.state) @ slope + ca.jacobian(new, e.parameter) + ca.jacobian(new, symbol) @ along
+    new_slope = (
+        ca.jacobian(new, e.state) @ slope + ca.jacobian(new, e.parameter) + ca.jacobian(new, symbol) @ along
+    )
     constant = ca.vertcat(free, symbol, ca.vec(along), _column([ca.vec(w) for w in matrices]), h)
     column = ca.cse(ca.densify(ca.vertcat(new, ca.vec(new_slope))))
     return prepare, ca.Function("step", [everything, e.digested, right, constant], [column])

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from ..errors import MeasurementError
+from ..simulation import Trace
 from .block import Block
 from .driven import DrivenBlock, Samples
 from .filters import derivative, noise_gain, rate_noise_gain, smoothing
 from .measurement import Record, RecordSet
-from ..simulation import Trace
 from .residuals import noise_of, quantum_of
 
 Array = NDArray[np.float64]
@@ -54,7 +54,9 @@ def estimate_noise(records: RecordSet) -> Noise:
     level, rounded = {}, {}
     for column in records.columns:
         white = float(np.median([noise_of(r.trace[column.signal]) for r in records.records]))
-        quantum = column.quantum or float(np.median([quantum_of(r.trace[column.signal]) for r in records.records]))
+        quantum = column.quantum or float(
+            np.median([quantum_of(r.trace[column.signal]) for r in records.records])
+        )
         rounding = quantum / np.sqrt(12.0)
         level[column.signal] = max(white, rounding)
         rounded[column.signal] = white < 2.0 * rounding
@@ -127,7 +129,9 @@ def _inputs(block: Block, record: Record) -> Array:
 
 def _variances(block: Block, record: Record, noise: Noise, inputs: Array) -> tuple[Array, Array]:
     s, model = block.model.symbols(), block.model
-    slope = ca.Function("slope", [s.state, s.input, s.parameter, s.table], [ca.densify(ca.jacobian(s.output, s.input))])
+    slope = ca.Function(
+        "slope", [s.state, s.input, s.parameter, s.table], [ca.densify(ca.jacobian(s.output, s.input))]
+    )
     few = np.arange(0, inputs.shape[1], STRIDE)
     start, values = model.start(model.states), model.start(model.parameters)
     flat = slope.map(len(few))(start, inputs[:, few], values, np.zeros(0)).full()
@@ -213,11 +217,19 @@ class Bench:
                 if len(floor.sigma) >= _LEAST_ROWS:
                     self.floors[block.name, record.name] = floor
             if not any(name == block.name for name, _ in self.floors):
-                raise MeasurementError(f"block '{block.name}'", "no record moves enough to say anything about it",
-                                       next_step="record a motion of several noise levels")  # fmt: skip
+                raise MeasurementError(
+                    f"block '{block.name}'",
+                    "no record moves enough to say anything about it",
+                    next_step="record a motion of several noise levels",
+                )
 
     def evidence(
-        self, driven: DrivenBlock, records: Sequence[Record], values: Mapping[str, float], *, coarse: bool = False
+        self,
+        driven: DrivenBlock,
+        records: Sequence[Record],
+        values: Mapping[str, float],
+        *,
+        coarse: bool = False,
     ) -> list[Evidence]:
         """Return what records say about a block.
 
@@ -238,7 +250,9 @@ class Bench:
         for record in records:
             if (name, record.name) in self.floors:
                 thin = coarse and driven.block.target is not None
-                seen, floor = self._thinned(name, record) if thin else (record, self.floors[name, record.name])
+                seen, floor = (
+                    self._thinned(name, record) if thin else (record, self.floors[name, record.name])
+                )
                 found.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
         return found
 
@@ -258,7 +272,9 @@ class Bench:
         if key not in self._thin:
             k = self._skip(record)
             trace = record.trace
-            thin = Trace(trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name)
+            thin = Trace(
+                trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
+            )
             raw = self.floors[key].raw_sigma[::k]
             one = scipy.sparse.csr_array(scipy.sparse.identity(len(thin)))
             self._thin[key] = replace(record, trace=thin), Floor(one, raw, raw)

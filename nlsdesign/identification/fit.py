@@ -86,15 +86,28 @@ def declared_parameter(variable: Variable, start: float | None = None) -> Parame
     if value > 0.0:
         factor = math.exp(_REACH * width)
         return Parameter(
-            variable.name, variable.unit, begin, value, width / math.sqrt(3.0),
-            max(value / factor, variable.minimum), min(value * factor, variable.maximum), "log",
-        )  # fmt: skip
+            variable.name,
+            variable.unit,
+            begin,
+            value,
+            width / math.sqrt(3.0),
+            max(value / factor, variable.minimum),
+            min(value * factor, variable.maximum),
+            "log",
+        )
     size = abs(value) or 1.0
     reach = _REACH * variable.spread * size
     return Parameter(
-        variable.name, variable.unit, begin, value, variable.spread / math.sqrt(3.0),
-        max(value - reach, variable.minimum), min(value + reach, variable.maximum), "linear", size,
-    )  # fmt: skip
+        variable.name,
+        variable.unit,
+        begin,
+        value,
+        variable.spread / math.sqrt(3.0),
+        max(value - reach, variable.minimum),
+        min(value + reach, variable.maximum),
+        "linear",
+        size,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +177,13 @@ class Fit:
         return found
 
 
-def fit(evidence: Sequence[Evidence], parameters: Sequence[Parameter], *, evaluations: int = _EVALUATIONS) -> Fit:
+def fit(
+    evidence: Sequence[Evidence],
+    parameters: Sequence[Parameter],
+    *,
+    evaluations: int = _EVALUATIONS,
+    tolerance: float = 0.0,
+) -> Fit:
     """Fit parameters to everything that the records say.
 
     Parameters
@@ -175,6 +194,8 @@ def fit(evidence: Sequence[Evidence], parameters: Sequence[Parameter], *, evalua
         What is free; each must be free in at least one block or have a prior.
     evaluations
         Bound on the number of evaluations.
+    tolerance
+        Ends too when the predicted gain is below this share of the cost: enough to tell a bad hypothesis.
 
     Raises
     ------
@@ -183,7 +204,7 @@ def fit(evidence: Sequence[Evidence], parameters: Sequence[Parameter], *, evalua
     """
     rows = _Rows(evidence, parameters)
     low, high, start = _box(parameters)
-    found = minimise(rows, start, (low, high), evaluations=evaluations)
+    found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance)
     if not np.isfinite(found.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
     residual, slope = rows(found.x)
@@ -246,7 +267,9 @@ class _Rows:
 
 
 def _box(parameters: Sequence[Parameter]) -> tuple[Array, Array, Array]:
-    low = np.array([p.inward(p.lower) if p.scale == "linear" or p.lower > 0.0 else -np.inf for p in parameters])
+    low = np.array(
+        [p.inward(p.lower) if p.scale == "linear" or p.lower > 0.0 else -np.inf for p in parameters]
+    )
     high = np.array([p.inward(p.upper) for p in parameters])
     start = np.array([p.inward(p.start) for p in parameters])
     inside: Array = np.clip(start, low + 1e-9, high - 1e-9)

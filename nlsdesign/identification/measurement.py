@@ -173,7 +173,9 @@ def load_records(
     tables = {file: read_table(file) for file in files}
     runs = {file: table for file, table in tables.items() if _is_run(table[0], given)}
     if not runs:
-        raise MeasurementError(str(folder), "no CSV file has a column of time", next_step="name it 't_s' or 'time [s]'")
+        raise MeasurementError(
+            str(folder), "no CSV file has a column of time", next_step="name it 't_s' or 'time [s]'"
+        )
     first = next(iter(runs))
     chosen = given or default_mapping(runs[first][0], model, first.name)
     _check_signals(first.name, chosen.columns, model)
@@ -223,9 +225,11 @@ def split(
     for glob in (*held_out, *selection):
         if not fnmatch.filter(names, glob):
             raise MeasurementError(
-                f"held-out records '{glob}'", "no record has such a name", did_you_mean=nearest(glob, names),
+                f"held-out records '{glob}'",
+                "no record has such a name",
+                did_you_mean=nearest(glob, names),
                 next_step=f"records are: {', '.join(names)}",
-            )  # fmt: skip
+            )
     roles: dict[str, Role] = {n: "held_out" for n in chosen} | {n: "selection" for n in compared}
     if len(roles) == len(names):
         raise MeasurementError("records", "none is left for fitting", next_step="hold out fewer records")
@@ -240,11 +244,13 @@ def _cut_in_time(record: Record) -> tuple[Record, ...]:
     ]
     return tuple(
         replace(
-            record, name=name, role=role,  # type: ignore[arg-type]
+            record,
+            name=name,
+            role=role,  # type: ignore[arg-type]
             trace=Trace(trace.time[part], {n: v[part] for n, v in trace.signals.items()}, trace.units, name),
         )
         for name, part, role in parts
-    )  # fmt: skip
+    )
 
 
 def read_mapping(path: Path) -> ColumnMap:
@@ -271,11 +277,15 @@ def read_mapping(path: Path) -> ColumnMap:
     columns = tuple(_mapped(path, head, table) for head, table in tables.get("columns", {}).items())
     time = tables.get("time", {"column": "t_s"})
     if not columns:
-        raise MeasurementError(path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."')
+        raise MeasurementError(
+            path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."'
+        )
     return ColumnMap(
-        Column(str(time.get("column", "t_s")), "time", str(time.get("unit", "s"))), columns,
-        tuple(tables.get("held_out", ())), tuple(tables.get("selection", ())),
-    )  # fmt: skip
+        Column(str(time.get("column", "t_s")), "time", str(time.get("unit", "s"))),
+        columns,
+        tuple(tables.get("held_out", ())),
+        tuple(tables.get("selection", ())),
+    )
 
 
 def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
@@ -290,7 +300,9 @@ def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
     try:
         factor = parse_unit(table["unit"]).factor
     except UnitError as error:
-        raise MeasurementError(where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean) from None
+        raise MeasurementError(
+            where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean
+        ) from None
     noise, quantum = float(table.get("noise", 0.0)) * factor, float(table.get("quantum", 0.0)) * factor
     return Column(head, str(table["signal"]), str(table["unit"]), noise, quantum)
 
@@ -324,15 +336,18 @@ def default_mapping(heads: Sequence[str], model: FlatModel, file: str) -> Column
     for column in columns:
         if sum(other.signal == column.signal for other in columns) > 1:
             raise MeasurementError(
-                f"{file}: column '{column.name}'", f"is not the only one that could be '{column.signal}'",
+                f"{file}: column '{column.name}'",
+                f"is not the only one that could be '{column.signal}'",
                 next_step="write a records.toml that maps each column to its signal",
-            )  # fmt: skip
+            )
     return ColumnMap(Column(times[0][0], "time", times[0][1]), tuple(columns))
 
 
 def _name_and_unit(head: str) -> tuple[str, str | None]:
     match = _BRACKETED.match(head)
-    name, unit = (match["name"], match["unit"]) if match else (head.rpartition("_")[0], head.rpartition("_")[2])
+    name, unit = (
+        (match["name"], match["unit"]) if match else (head.rpartition("_")[0], head.rpartition("_")[2])
+    )
     try:
         parse_unit(unit)
     except UnitError:
@@ -344,7 +359,9 @@ def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str)
     everything = {v.name: v for v in model.states + model.inputs + model.signals}
     if unit is None:
         raise MeasurementError(
-            f"{file}: column '{head}'", "names no unit", next_step="write for instance 'force_N', or map it in records.toml"
+            f"{file}: column '{head}'",
+            "names no unit",
+            next_step="write for instance 'force_N', or map it in records.toml",
         )
     if name in everything:
         return name
@@ -373,18 +390,22 @@ def _check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> No
         where = f"{file}: column '{column.name}'"
         if column.signal not in everything:
             raise MeasurementError(
-                where, f"is mapped to '{column.signal}', which the model does not have",
+                where,
+                f"is mapped to '{column.signal}', which the model does not have",
                 did_you_mean=nearest(column.signal, everything),
-            )  # fmt: skip
+            )
         variable = everything[column.signal]
         if not same_dimension(column.unit, variable.unit):
             raise MeasurementError(
-                where, f"is in {column.unit}, but {column.signal} is measured in {variable.unit}",
+                where,
+                f"is in {column.unit}, but {column.signal} is measured in {variable.unit}",
                 next_step="mend the unit or the mapping",
-            )  # fmt: skip
+            )
 
 
-def _record(file: Path, heads: Sequence[str], table: Array, mapping: ColumnMap) -> tuple[Record, list[Finding]]:
+def _record(
+    file: Path, heads: Sequence[str], table: Array, mapping: ColumnMap
+) -> tuple[Record, list[Finding]]:
     needed = [mapping.time, *mapping.columns]
     for column in needed:
         if column.name not in heads:
@@ -396,7 +417,9 @@ def _record(file: Path, heads: Sequence[str], table: Array, mapping: ColumnMap) 
     time = raw[mapping.time.name] * parse_unit(mapping.time.unit).factor
     note = check_time(file.name, mapping.time.name, time)
     grid = np.linspace(time[0], time[-1], len(time))
-    signals = {c.signal: np.interp(grid, time, raw[c.name]) * parse_unit(c.unit).factor for c in mapping.columns}
+    signals = {
+        c.signal: np.interp(grid, time, raw[c.name]) * parse_unit(c.unit).factor for c in mapping.columns
+    }
     if not note:
         signals = {c.signal: raw[c.name] * parse_unit(c.unit).factor for c in mapping.columns}
     units = {c.signal: _si(c.unit) for c in mapping.columns}

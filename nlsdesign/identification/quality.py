@@ -60,7 +60,9 @@ def read_table(file: Path) -> tuple[list[str], Array]:
     with file.open(newline="", encoding="utf8") as stream:
         rows = [row for row in csv.reader(stream) if row]
     if len(rows) < 1 + _LEAST_ROWS:
-        raise MeasurementError(file.name, f"has {max(len(rows) - 1, 0)} rows of numbers; at least {_LEAST_ROWS} are needed")
+        raise MeasurementError(
+            file.name, f"has {max(len(rows) - 1, 0)} rows of numbers; at least {_LEAST_ROWS} are needed"
+        )
     heads = [head.strip() for head in rows[0]]
     try:
         return heads, np.array(rows[1:], dtype=float)
@@ -71,7 +73,9 @@ def read_table(file: Path) -> tuple[list[str], Array]:
 def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> MeasurementError:
     for number, row in enumerate(rows, start=_FIRST_ROW):
         if len(row) != len(heads):
-            return MeasurementError(f"{file}: row {number}", f"has {len(row)} cells, the heads are {len(heads)}")
+            return MeasurementError(
+                f"{file}: row {number}", f"has {len(row)} cells, the heads are {len(heads)}"
+            )
         for head, cell in zip(heads, row, strict=True):
             try:
                 float(cell)
@@ -99,9 +103,10 @@ def check_columns(file: str, columns: Mapping[str, Array]) -> None:
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise MeasurementError(
-                f"{file}: column '{head}', {_rows(_first_run(bad))}", f"is not a finite number ({len(bad)} in all)",
+                f"{file}: column '{head}', {_rows(_first_run(bad))}",
+                f"is not a finite number ({len(bad)} in all)",
                 next_step="cut the record before or after these rows",
-            )  # fmt: skip
+            )
 
 
 def check_time(file: str, head: str, time: Array) -> str:
@@ -142,7 +147,11 @@ def check_time(file: str, head: str, time: Array) -> str:
             next_step="split the record into one file before and one after the gap",
         )
     uneven = float(np.max(np.abs(steps - usual))) / usual
-    return "" if uneven <= _JITTER else f" (interpolated to a uniform grid, steps varied by {100 * uneven:.1f} %)"
+    return (
+        ""
+        if uneven <= _JITTER
+        else f" (interpolated to a uniform grid, steps varied by {100 * uneven:.1f} %)"
+    )
 
 
 def suspicions(file: str, head: str, values: Array) -> list[Finding]:
@@ -164,7 +173,11 @@ def suspicions(file: str, head: str, values: Array) -> list[Finding]:
     for extreme, word in ((values.max(), "largest"), (values.min(), "smallest")):
         run = _longest_run(values == extreme)
         if len(run) >= _CLIPPED_RUN:
-            return [Finding(f"{place}, {_rows(run)}", f"rests on its {word} value {extreme:g}: clipped or saturated")]
+            return [
+                Finding(
+                    f"{place}, {_rows(run)}", f"rests on its {word} value {extreme:g}: clipped or saturated"
+                )
+            ]
     return []
 
 

@@ -152,7 +152,9 @@ def spectrum(residual: Array, step: float, bins: int = 60) -> Binned:
     return binned(power, np.fft.rfftfreq(len(residual), step), bins)
 
 
-def shapes(residual: Array, signals: Mapping[str, Array], speed: Array | None, step: float) -> dict[str, Binned]:
+def shapes(
+    residual: Array, signals: Mapping[str, Array], speed: Array | None, step: float
+) -> dict[str, Binned]:
     """Return the residual over every measured signal, over frequency, and over the signals by direction.
 
     Parameters

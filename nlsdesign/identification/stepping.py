@@ -49,9 +49,13 @@ def stages_of(derivative: Expression, state: Expression, moving: Expression) -> 
     coupled = np.array([[depends(derivative[i], state[j]) for j in range(n)] for i in range(n)])
     count, label = connected_components(coupled, directed=True, connection="strong")
     groups = [[i for i in range(n) if label[i] == k] for k in range(count)]
-    acts_on = {k: {m for m in range(count) if m != k and coupled[np.ix_(groups[m], groups[k])].any()}
-               for k in range(count)}  # fmt: skip
-    order = TopologicalSorter({k: {m for m in acts_on if k in acts_on[m]} for k in range(count)}).static_order()
+    acts_on = {
+        k: {m for m in range(count) if m != k and coupled[np.ix_(groups[m], groups[k])].any()}
+        for k in range(count)
+    }
+    order = TopologicalSorter(
+        {k: {m for m in acts_on if k in acts_on[m]} for k in range(count)}
+    ).static_order()
     found = []
     for k in order:
         inside = ca.vertcat(*[state[i] for i in groups[k]])
@@ -120,7 +124,11 @@ def rosenbrock_step(
     x, left, right, h = state, ends[0], ends[1], length
     if w is not None:
         return _stages(rate, (x, left, right), w, h)
-    begin, end, at = ca.SX.sym("begin", left.shape), ca.SX.sym("end", right.shape), ca.SX.sym("at", state.shape)
+    begin, end, at = (
+        ca.SX.sym("begin", left.shape),
+        ca.SX.sym("end", right.shape),
+        ca.SX.sym("at", state.shape),
+    )
     part, own = ca.SX.sym("part"), rate(at, begin)
     new = _stages(rate, (at, begin, end), ca.jacobian(own, at), part)
     step = ca.Function("part", [at, begin, end, part], [new], {"allow_free": True})
@@ -153,4 +161,6 @@ def is_short(expression: Expression) -> bool:
     expression
         Right-hand side of a stage.
     """
-    return bool(ca.Function("f", [ca.vertcat(*ca.symvar(expression))], [expression]).n_instructions() < _SHORT)
+    return bool(
+        ca.Function("f", [ca.vertcat(*ca.symvar(expression))], [expression]).n_instructions() < _SHORT
+    )

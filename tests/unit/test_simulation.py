@@ -198,6 +198,41 @@ def test_stiff_models_are_handed_over(drive: str) -> None:
 
 
 @pytest.mark.parametrize("hold", [False, True])
+def test_both_methods_agree_with_several_inputs(hold: bool) -> None:
+    """A mass between a force and a moving grip: three inputs, none of which may be taken for another."""
+    inside = parallel(k=Spring(stiffness=40.0), c=Dashpot(damping=0.5))
+    made = assembly("m", mass=Mass(mass=1.3), grip=DrivenPoint(), link=tie(inside, "mass", "grip"))
+    model, times, draw = flatten(made), np.linspace(0.0, 1.0, 21), np.random.default_rng(6)
+    given = {v.name: draw.normal(size=21) for v in model.inputs}
+    drives = drives_of(model, times, given, hold=hold)
+    explicit = integrate_explicitly(model, drives, np.array([0.1, 0.0]), 1e-10)
+    implicit = integrate_implicitly(model, drives, 0, np.array([0.1, 0.0]), 1e-10)
+    for one, other in zip(explicit, implicit, strict=True):
+        assert np.max(np.abs(one - other)) < 1e-7 * np.max(np.abs(one))
+
+
+def test_time_itself_may_stand_in_the_equations() -> None:
+    """ẋ = t·cos t, x = t·sin t + cos t − 1; by both methods."""
+    t, x = ca.SX.sym("t"), ca.SX.sym("x")
+    none = [ca.SX.sym(n, 0) for n in "upw"]
+    model = FlatModel(
+        "clock",
+        "",
+        (Variable("x", "1", "x"),),
+        (),
+        (),
+        (),
+        (),
+        ca.Function("e", [t, x, *none], [t * ca.cos(t), ca.SX(0, 1), ca.SX(0, 1), ca.SX(0, 1)]),
+    )
+    times = np.linspace(0.0, 6.0, 13)
+    expected = times * np.sin(times) + np.cos(times) - 1.0
+    assert simulate(model, times)["x"] == pytest.approx(expected, abs=1e-9)
+    other = integrate_implicitly(model, drives_of(model, times, {}, hold=False), 0, np.zeros(1), 1e-9)
+    assert other[0] == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize("hold", [False, True])
 def test_both_methods_agree_where_both_work(hold: bool) -> None:
     model = flatten(swing(damping=0.05))
     times = np.linspace(0.0, 1.0, 41)

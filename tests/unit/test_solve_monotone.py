@@ -111,6 +111,16 @@ def test_the_derivative_is_that_of_the_implicit_function(whole: float) -> None:
     assert float(found(whole)[2]) == pytest.approx(central, rel=1e-4, abs=1e-5)
 
 
+def test_the_derivative_is_right_where_the_guess_is_the_root() -> None:
+    """At rest nothing is left to iterate; the half that the guess says must not be taken for the share."""
+    unknown, e = symbol("z"), symbol("e")
+    root = solve_monotone(
+        lambda z: 3.0 * z + 5.0 * z**3 - 20.0 * (e - z) - 700.0 * (e - z) ** 3, unknown, e / 2
+    )
+    slope = ca.Function("slope", [e], [ca.jacobian(root, e)])
+    assert float(slope(0.0)) == pytest.approx(20.0 / 23.0, rel=1e-12)
+
+
 @pytest.mark.parametrize("whole", [-1.0, -1e-3, 0.0])
 def test_two_slack_cables_share_without_a_nan(whole: float) -> None:
     """Both flat: any share will do; value and derivative stay finite."""

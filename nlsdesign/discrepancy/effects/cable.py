@@ -24,7 +24,10 @@ def stretched(assembly: Assembly) -> list[str]:
         element = part.element if isinstance(part, Tie) else part
         if isinstance(element, Through):
             inner = f"{path}.{element.behind[0]}"
-            while isinstance(assembly[inner], PullOnly | InextensibleCable | Slack) and len(assembly[inner].children()) == 1:
+            while (
+                isinstance(assembly[inner], PullOnly | InextensibleCable | Slack)
+                and len(assembly[inner].children()) == 1
+            ):
                 inner = f"{inner}.{next(iter(assembly[inner].children()))}"
             found.append(inner)
     return found
@@ -55,10 +58,14 @@ def cable_compliance(assembly: Assembly) -> Sequence[Candidate]:
         name = f"{path.rpartition('.')[0]}.elastic.stiffness"
         found.append(
             Candidate(
-                "cable_compliance", path, edited, (Unknown(name, (3e4, 3e5), 1e3, 1e7),),
-                "force that falls short the more, the larger it is, without loss", "Hooke 1678",
+                "cable_compliance",
+                path,
+                edited,
+                (Unknown(name, (3e4, 3e5), 1e3, 1e7),),
+                "force that falls short the more, the larger it is, without loss",
+                "Hooke 1678",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -79,11 +86,14 @@ def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
         of = f"{path}.extension"
         found.append(
             Candidate(
-                "cable_slack", path, edited,
+                "cable_slack",
+                path,
+                edited,
                 (Unknown(f"{path.rpartition('.')[0]}.slack.length", (0.02, 0.1), 1e-4, 0.8, of),),
-                "no force until a certain extension, the same at any speed", "geometry",
+                "no force until a certain extension, the same at any speed",
+                "geometry",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -102,14 +112,21 @@ def cam_angle_offset(assembly: Assembly) -> Sequence[Candidate]:
         if isinstance(part.element, Turned):
             continue
         edited = wrapped(
-            assembly, name, "turned", lambda n, e: Turned(members=((n, e),), offset=Quantity(0.0, "rad", SOURCE))
+            assembly,
+            name,
+            "turned",
+            lambda n, e: Turned(members=((n, e),), offset=Quantity(0.0, "rad", SOURCE)),
         )
         found.append(
             Candidate(
-                "cam_angle_offset", name, edited, (Unknown(f"{name}.offset", (-0.02, 0.02), -0.5, 0.5),),
-                "more force on one side than at the same angle on the other", "geometry",
+                "cam_angle_offset",
+                name,
+                edited,
+                (Unknown(f"{name}.offset", (-0.02, 0.02), -0.5, 0.5),),
+                "more force on one side than at the same angle on the other",
+                "geometry",
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -101,7 +101,12 @@ def wrapped(assembly: Assembly, path: str, name: str, wrapper: Callable[[str, El
 
 def _reading_on(assembly: Assembly, old: str, new: str) -> Assembly:
     parts = [
-        (n, replace(p, of=new + p.of[len(old) :]) if isinstance(p, Sensor) and p.of.startswith(old + ".") else p)
+        (
+            n,
+            replace(p, of=new + p.of[len(old) :])
+            if isinstance(p, Sensor) and p.of.startswith(old + ".")
+            else p,
+        )
         for n, p in assembly.parts
     ]
     return replace(assembly, parts=tuple(parts))

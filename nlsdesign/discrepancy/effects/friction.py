@@ -32,7 +32,9 @@ def _turning(assembly: Assembly) -> list[tuple[str, str]]:
 
 
 def _has(assembly: Assembly, body: str, kind: type[Element]) -> bool:
-    return any(isinstance(p, Tie) and body in p.between and isinstance(p.element, kind) for _, p in assembly.parts)
+    return any(
+        isinstance(p, Tie) and body in p.between and isinstance(p.element, kind) for _, p in assembly.parts
+    )
 
 
 def _number(value: float, unit: str) -> Quantity:
@@ -60,16 +62,22 @@ def coulomb_friction(assembly: Assembly) -> Sequence[Candidate]:
             continue
         element = CoulombFriction(sliding_torque=_number(0.01, "N*m"))
         edited, unknowns = _tied(
-            assembly, "dry_friction", body, element,
+            assembly,
+            "dry_friction",
+            body,
+            element,
             lambda part, of=torque: (Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),),
-        )  # fmt: skip
+        )
         found.append(
             Candidate(
-                "coulomb_friction", body, edited, unknowns,
+                "coulomb_friction",
+                body,
+                edited,
+                unknowns,
                 "a constant torque against the motion, that jumps where the speed changes sign",
                 "Coulomb 1785; Armstrong-Hélouvry 1991",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -86,23 +94,31 @@ def stribeck_friction(assembly: Assembly) -> Sequence[Candidate]:
         if _has(assembly, body, CoulombFriction):
             continue
         element = StribeckFriction(
-            sliding_torque=_number(0.01, "N*m"), breakaway=_number(0.01, "N*m"), stribeck_speed=_number(0.2, "rad/s")
+            sliding_torque=_number(0.01, "N*m"),
+            breakaway=_number(0.01, "N*m"),
+            stribeck_speed=_number(0.2, "rad/s"),
         )
         edited, unknowns = _tied(
-            assembly, "dry_friction", body, element,
+            assembly,
+            "dry_friction",
+            body,
+            element,
             lambda part, of=torque: (
                 Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),
                 Unknown(f"{part}.breakaway", (0.05,), 1e-4, 2.0, of),
                 Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0),
             ),
-        )  # fmt: skip
+        )
         found.append(
             Candidate(
-                "stribeck_friction", body, edited, unknowns,
+                "stribeck_friction",
+                body,
+                edited,
+                unknowns,
                 "a torque against the motion that is largest just off standstill",
                 "Stribeck 1902; Armstrong-Hélouvry 1991",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -124,10 +140,14 @@ def quadratic_drag(assembly: Assembly) -> Sequence[Candidate]:
         )
         found.append(
             Candidate(
-                "quadratic_drag", body, edited, unknowns,
-                "a torque against the motion that grows with the square of the speed", "any text on fluids",
+                "quadratic_drag",
+                body,
+                edited,
+                unknowns,
+                "a torque against the motion that grows with the square of the speed",
+                "any text on fluids",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -144,20 +164,26 @@ def torque_ripple(assembly: Assembly) -> Sequence[Candidate]:
     for body, torque in _turning(assembly):
         element = TorqueRipple(sine=_number(0.0, "N*m"), cosine=_number(0.0, "N*m"), order=_number(1.0, "1"))
         edited, unknowns = _tied(
-            assembly, "ripple", body, element,
+            assembly,
+            "ripple",
+            body,
+            element,
             lambda part, of=torque: (
                 Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, of),
                 Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, of),
                 Unknown(f"{part}.order", orders, 2.0, 150.0),
             ),
-        )  # fmt: skip
+        )
         found.append(
             Candidate(
-                "torque_ripple", body, edited, unknowns,
+                "torque_ripple",
+                body,
+                edited,
+                unknowns,
                 "a torque that repeats over the angle, the same forward and backward, at any speed",
                 "Hanselman 2003",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -176,10 +202,14 @@ def load_dependent_friction(assembly: Assembly) -> Sequence[Candidate]:
         )
         found.append(
             Candidate(
-                "load_dependent_friction", name, edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),),
-                "a torque against the motion in proportion to the load", "Coulomb 1785; gear efficiency",
+                "load_dependent_friction",
+                name,
+                edited,
+                (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),),
+                "a torque against the motion in proportion to the load",
+                "Coulomb 1785; gear efficiency",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -187,9 +217,15 @@ def _springs(assembly: Assembly, wrapper: type[Element]) -> list[str]:
     """Return ties of angle and torque that hold a spring and are not wrapped in this way already."""
     found = []
     for name, part in assembly.parts:
-        if isinstance(part, Tie) and part.element.domain == ROTATION and not isinstance(part.element, wrapper):
+        if (
+            isinstance(part, Tie)
+            and part.element.domain == ROTATION
+            and not isinstance(part.element, wrapper)
+        ):
             inside = [p for path, p in assembly.walk() if path == name or path.startswith(f"{name}.")]
-            if any(isinstance(p.element if isinstance(p, Tie) else p, Through | TorsionSpring) for p in inside):
+            if any(
+                isinstance(p.element if isinstance(p, Tie) else p, Through | TorsionSpring) for p in inside
+            ):
                 found.append(name)
     return found
 
@@ -209,9 +245,12 @@ def backlash(assembly: Assembly) -> Sequence[Candidate]:
         )
         found.append(
             Candidate(
-                "backlash", name, edited, (Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),),
+                "backlash",
+                name,
+                edited,
+                (Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),),
                 "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
                 "Nordin and Gutman 2002",
             )
-        )  # fmt: skip
+        )
     return found

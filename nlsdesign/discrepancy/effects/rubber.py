@@ -10,7 +10,9 @@ from .candidate import SOURCE, Candidate, Unknown
 
 
 def _specimens(assembly: Assembly, taken: str) -> list[str]:
-    return [path for path, part in assembly.walk() if isinstance(part, Specimen) and taken not in part.children()]
+    return [
+        path for path, part in assembly.walk() if isinstance(part, Specimen) and taken not in part.children()
+    ]
 
 
 def second_relaxation(assembly: Assembly) -> Sequence[Candidate]:
@@ -30,14 +32,17 @@ def second_relaxation(assembly: Assembly) -> Sequence[Candidate]:
         inner = f"{path}.second_relaxing"
         found.append(
             Candidate(
-                "second_relaxation", path, assembly.with_part(inner, branch),
+                "second_relaxation",
+                path,
+                assembly.with_part(inner, branch),
                 (
                     Unknown(f"{inner}.spring.modulus", (3e5,), 1e3, 1e8),
                     Unknown(f"{inner}.dashpot.viscosity", (3e4, 3e5, 2e6), 1e2, 1e10),
                 ),
-                "force that creeps towards rest with a time constant of its own", "Maxwell 1867; Prony series",
+                "force that creeps towards rest with a time constant of its own",
+                "Maxwell 1867; Prony series",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -55,7 +60,9 @@ def rate_independent_hysteresis(assembly: Assembly) -> Sequence[Candidate]:
         inner = f"{path}.fillers"
         found.append(
             Candidate(
-                "rate_independent_hysteresis", path, assembly.with_part(inner, law),
+                "rate_independent_hysteresis",
+                path,
+                assembly.with_part(inner, law),
                 (
                     Unknown(f"{inner}.modulus", (1e6,), 1e4, 1e9),
                     Unknown(f"{inner}.yield_stress", (1e5,), 1e3, 1e8),
@@ -63,5 +70,5 @@ def rate_independent_hysteresis(assembly: Assembly) -> Sequence[Candidate]:
                 "loops of force over extension as wide when slow as when fast, and no creep at rest",
                 "Iwan 1967; Bouc 1967, Wen 1976",
             )
-        )  # fmt: skip
+        )
     return found
