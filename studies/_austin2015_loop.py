@@ -12,9 +12,8 @@ WIRES = {
     "observer.motor.current": "controller.motor.current",
     "controller.motor.angle": "plant.motor_encoder.reading",
     "controller.spring.torque": "observer.spring.torque",
-    "plant.motor.current": "controller.motor.current",
+    "plant.motor.current": nls.Late("controller.motor.current"),  # one sample to compute
 }
-LATE = ("plant.motor.current",)  # the controller has one sample to compute
 
 
 def exported(model: Any, observer: Any, out: Path, stop: float) -> dict[str, Any]:
@@ -28,7 +27,6 @@ def exported(model: Any, observer: Any, out: Path, stop: float) -> dict[str, Any
     run = nls.cosimulate(
         fmus=fmus,
         wires=WIRES,
-        late=LATE,
         order=("observer", "controller", "plant"),
         stop=stop,
         inputs=desired,

@@ -16,9 +16,9 @@ from .element import TRANSLATION, Combination, Scope, observed_effort
 class InextensibleCable(Combination):
     """A cable that does not stretch: 0 ≤ F ⟂ y − e ≥ 0, with y the extension of what it pulls.
 
-    The elements inside have y = max(e, y₀), where ΣF(y₀) = 0 at their present memory: taut at y = e, or slack at
-    the length at which they rest. So a piece that recovers slowly is met again where it has recovered to.
-    Memory that is driven by the rate stands still while the cable is slack. Continuous, with a corner at contact.
+    The elements inside have y = max(e, y₀), where ΣF(y₀) = 0 at their present memory: taut at y = e, or slack
+    at the length at which they rest. So a piece that recovers slowly is met again where it has recovered to.
+    Memory that is driven by the rate stands still while the cable is slack. Continuous, with a corner.
     Source: complementarity, e.g. Acary and Brogliato 2008.
     """
 

@@ -237,7 +237,7 @@ class Comparison:
 
 
 def _refittable(parameters: Sequence[Variable]) -> list[Variable]:
-    """Return the numbers with a spread; long rows are tables of a shape, which are not refitted point by point."""
+    """Return the numbers with a spread; long rows are tables of a shape, not refitted point by point."""
     lengths = Counter(v.name.partition("[")[0] for v in parameters)
     return [v for v in parameters if v.spread > 0.0 and lengths[v.name.partition("[")[0]] <= _LONGEST_ROW]
 

@@ -101,6 +101,35 @@ def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Se
     return _driven(assembly, model, given, (name, f"{name}.unbalanced", None))
 
 
+class _Readings:
+    """What readings of sensors say of the variables of a model, as symbols that they drive."""
+
+    def __init__(self, assembly: Assembly, model: FlatModel, parameter: Expression) -> None:
+        self._sensors, self._model, self._parameter = assembly.sensors(), model, parameter
+        self.drives: dict[str, Drive] = {}
+        self.new: dict[str, tuple[Variable, Expression]] = {}
+
+    def reading(self, known: _Known, order: int) -> Expression:
+        """Return the symbol of a reading or of one of its derivatives."""
+        label = known.signal + (".rate", ".acceleration")[order - 1] if order else known.signal
+        if label not in self.new:
+            late = self._sensors[known.sensor].late_by if known.sensor else None
+            self.drives[label] = Drive(known.signal, order, f"{known.sensor}.{late}" if late else None)
+            self.new[label] = Variable(label, "", f"measured {known.signal}"), ca.SX.sym(label)
+        return self.new[label][1]
+
+    def inferred(self, known: _Known, order: int) -> Expression:
+        """Return what the sensor must have seen, or its derivative."""
+        value = self.reading(known, 0)
+        if known.sensor is not None:
+            numbers = _SensorNumbers(self._model, self._parameter, known.sensor)
+            value = self._sensors[known.sensor].infer(numbers, value)
+        if order == 0:
+            return value
+        # A reading is a static function of what it reads, so rates follow by its slope.
+        return ca.jacobian(value, self.reading(known, 0)) * self.reading(known, order)
+
+
 def _driven(
     assembly: Assembly, model: FlatModel, given: Sequence[_Known], what: tuple[str, str, str | None]
 ) -> Block:
@@ -108,28 +137,9 @@ def _driven(
     name, output, target = what
     s = model.symbols()
     states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
-    drives: dict[str, Drive] = {}
-    new: dict[str, tuple[Variable, Expression]] = {}
+    readings = _Readings(assembly, model, s.parameter)
+    inferred = readings.inferred
     old, instead = [], []
-
-    def reading(known: _Known, order: int) -> Expression:
-        label = known.signal + (".rate", ".acceleration")[order - 1] if order else known.signal
-        if label not in new:
-            late = assembly.sensors()[known.sensor].late_by if known.sensor else None
-            drives[label] = Drive(known.signal, order, f"{known.sensor}.{late}" if late else None)
-            new[label] = Variable(label, "", f"measured {known.signal}"), ca.SX.sym(label)
-        return new[label][1]
-
-    def inferred(known: _Known, order: int) -> Expression:
-        value = reading(known, 0)
-        if known.sensor is not None:
-            numbers = _SensorNumbers(model, s.parameter, known.sensor)
-            value = assembly.sensors()[known.sensor].infer(numbers, value)
-        if order == 0:
-            return value
-        # A reading is a static function of what it reads, so rates follow by its slope.
-        return ca.jacobian(value, reading(known, 0)) * reading(known, order)
-
     prescribed: list[str] = []
     for known in given:
         if known.truth in states:
@@ -162,12 +172,12 @@ def _driven(
     columns = [
         s.time,
         ca.vertcat(*[s.state[i] for i in kept]),
-        ca.vertcat(*[e for _, e in new.values()], *[s.input[i] for i in resting]),
+        ca.vertcat(*[e for _, e in readings.new.values()], *[s.input[i] for i in resting]),
         s.parameter,
         s.table,
     ]
     if target is None and drive is not None:
-        rows[1] = _in_drive_units(rows[1], reading(drive, 0), s.parameter, model)
+        rows[1] = _in_drive_units(rows[1], readings.reading(drive, 0), s.parameter, model)
     equations = ca.Function(
         "equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], ca.SX(0, 1), ca.SX(0, 1)]
     )
@@ -177,12 +187,12 @@ def _driven(
         states=tuple(model.states[i] for i in kept),
         signals=(),
         outputs=(variable,),
-        inputs=(*[v for v, _ in new.values()], *[model.inputs[i] for i in resting]),
+        inputs=(*[v for v, _ in readings.new.values()], *[model.inputs[i] for i in resting]),
     )
     return Block(
         name,
         without_idle_states(pruned, [output]),
-        drives,
+        readings.drives,
         output,
         target,
         READING_WIDTH if target else BALANCE_WIDTH,

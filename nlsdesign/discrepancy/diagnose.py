@@ -1,15 +1,19 @@
 """The whole chain: refit, locate, name, add, refit, judge on records that no fit has seen, abstain.
 
-Each hypothesis is fitted to the same records in the same way; what decides is the share of a block's excess over
-the noise that an effect explains, on the fitted and on the held-out records. An effect that explains little is
-not added, however significant; if what remains is large, the verdict is ``unknown``.
+Each hypothesis is fitted to the same records in the same way; what decides is the share of a block's excess
+over the noise that an effect explains, on the fitted and on the held-out records. An effect that explains
+little is not added, however significant; if what remains is large, the verdict is ``unknown``.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from ..components import Assembly
+from ..components.declare import write_deck
+from ..deck import write_text
 from ..identification.evidence import Bench
 from ..identification.measurement import RecordSet
 from .compare import Comparison, Hypothesis
@@ -115,7 +119,8 @@ def _where(before: Excess, after: Excess) -> str:
         )
     ratio, later = before.held_out / before.floor, after.held_out / after.floor
     state = "open" if before.open else "closed"
-    return f"{before.block} ({state}): {ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
+    told = f"{ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
+    return f"{before.block} ({state}): {told}"
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:
@@ -157,3 +162,20 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         mine.signature,
         mine.source,
     )
+
+
+def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
+    """Write ``verdict.json`` and the deck of the better model, ``model.toml``.
+
+    Parameters
+    ----------
+    verdict
+        As found.
+    folder
+        Is made where it does not exist.
+    """
+    deck, file = folder / "model.toml", folder / "verdict.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    write_deck(verdict.actuator, deck)
+    write_text(file, json.dumps(verdict.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
+    return [file, deck]

@@ -31,9 +31,11 @@ def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tu
             later[_key(each)].residual(after.values)[0] * sigma,
         )
         unit = each.driven.block.model.outputs[0].unit
-        rms = [float(np.sqrt(np.mean(np.square(row)))) for row in (then, now, sigma)]
+        first, last, floor = (float(np.sqrt(np.mean(np.square(row)))) for row in (then, now, sigma))
         name = each.driven.block.name
-        found.append(RecordGap(name, each.record.name, each.record.role, *rms, len(sigma), unit))
+        found.append(
+            RecordGap(name, each.record.name, each.record.role, first, last, floor, len(sigma), unit)
+        )
     return tuple(found)
 
 

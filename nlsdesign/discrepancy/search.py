@@ -13,12 +13,14 @@ from .locate import Excess, excesses, explained, total_excess
 LEAST_SHARE = 0.5
 """An effect must explain this share of the excess of some open block, on fit and on held-out records."""
 LEAST_SECOND = 0.05
-"""A further effect must explain this share of what that block lacked at first: forms are never quite right."""
+"""A further effect must explain this share of what that block lacked at first: forms are never exact."""
 CLOSED_SHARE = 0.75
 """A block of which so much is explained counts as named, even if its form is not quite right."""
 SAME = 0.02
-"""Hypotheses whose excess differs by less than this share of the first excess explain as much."""
-_NOISE = 20.0
+"""A simpler hypothesis is taken if its excess is more by less than this share of the first excess."""
+ALIAS = 0.003
+"""Hypotheses whose excess differs by less than this share of the first excess cannot be told apart."""
+_NOISE = 50.0
 _MOST_EFFECTS = 3
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deck import write_text
 from ..identification.residuals import Binned
 from ..model import Assembly
 
@@ -165,7 +162,7 @@ class Verdict:
         said = {
             "none": "The refitted model explains the records down to their noise; nothing is missing.",
             "unknown": "Something is missing that no effect of the catalogue explains.",
-            "data_suspect": "The records contradict what any passive system could do; look at the data first.",
+            "data_suspect": "The records show what no passive system could do; look at the data first.",
             "named": "",
         }[self.verdict]
         for effect in self.effects:
@@ -173,7 +170,8 @@ class Verdict:
                 f"{name.rpartition('.')[2]} = {value:.4g} ± {error:.2g} {unit}"
                 for name, (value, unit, error) in effect.parameters.items()
             )
-            said += f"`{effect.name}` at `{effect.location}`: {numbers}. It explains {100 * effect.share_held_out:.0f} % "
+            said += f"`{effect.name}` at `{effect.location}`: {numbers}. "
+            said += f"It explains {100 * effect.share_held_out:.0f} % "
             said += "of the excess over the noise on records that no fit has seen. "
             if effect.aliases:
                 said += f"As good an explanation: {', '.join(effect.aliases)}. "
@@ -239,22 +237,3 @@ class Verdict:
 
     def __str__(self) -> str:
         return "\n".join([f"verdict: {self.verdict}", self.words(), *self.where])
-
-
-def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
-    """Write ``verdict.json`` and the deck of the better model, ``model.toml``.
-
-    Parameters
-    ----------
-    verdict
-        As found.
-    folder
-        Is made where it does not exist.
-    """
-    from ..components.declare import write_deck
-
-    deck, file = folder / "model.toml", folder / "verdict.json"
-    folder.mkdir(parents=True, exist_ok=True)
-    write_deck(verdict.actuator, deck)
-    write_text(file, json.dumps(verdict.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
-    return [file, deck]

@@ -3,6 +3,7 @@
 from .c_code import CSource, export_c
 from .compile import ALL_PLATFORMS, PLATFORMS, host_platform
 from .cosimulation import CoSimulation, cosimulate
+from .cosimulation_system import Late
 from .fmu import export_fmu
 from .running import CompiledStep
 
@@ -12,6 +13,7 @@ __all__ = [
     "CSource",
     "CoSimulation",
     "CompiledStep",
+    "Late",
     "cosimulate",
     "export_c",
     "export_fmu",

@@ -4,8 +4,8 @@ Order. Without ``order`` all inputs are read before any instance steps (Jacobi):
 how the instances are listed, and whatever a *sampled* instance computes at a communication point reaches the
 others one step later. With ``order`` each instance sees what those before it have computed in the same step
 (Gauss-Seidel): sensors, observer and controller before the plant give a loop without computing delay; a wire
-in ``late`` keeps it, as when the plant gets the current that was computed one sample ago. The result says for
-every wire by how many steps it is late.
+from a :class:`Late` source keeps it, as when the plant gets the current of one sample
+ago. The result says for every wire by how many steps it is late.
 """
 
 from __future__ import annotations
@@ -77,7 +77,6 @@ def cosimulate(
     stop: float,
     step: float | None = None,
     order: Sequence[str] = (),
-    late: Sequence[str] = (),
     parameters: Mapping[str, float] | None = None,
 ) -> CoSimulation:
     """Simulate FMUs together.
@@ -87,7 +86,8 @@ def cosimulate(
     fmus
         FMU by name of the instance.
     wires
-        Source by target, for instance ``{"observer.motor.angle": "plant.motor.angle"}``.
+        Source by target, for instance ``{"observer.motor.angle": "plant.motor.angle"}``; a source wrapped in
+        :class:`Late` is read as it was before the step, whatever the order.
     inputs
         Signals from outside by input, held over each communication step.
     stop
@@ -96,8 +96,6 @@ def cosimulate(
         Communication step in s; by default the shortest sample time of the instances.
     order
         Instances in the order in which they step, see the head of this module.
-    late
-        Wire targets that read what their source showed before the step, whatever the order.
     parameters
         Parameters and start values by ``instance.variable``.
 
@@ -117,13 +115,10 @@ def cosimulate(
     if not (math.isfinite(stop) and stop > 0.0):
         raise ValueRangeError(f"stop={stop}", "must be a positive number of seconds")
     _check_order(order, fmus)
-    for name in late:
-        if name not in wires:
-            raise unknown_name("late wire", name, wires)
     with _instances(fmus) as instances:
         _check_ends(instances, wires, inputs, parameters or {})
         length = _communication_step(instances, step)
-        system = System(instances, wires, inputs, tuple(order), tuple(late))
+        system = System(instances, wires, inputs, tuple(order))
         for target, value in (parameters or {}).items():
             instance, variable = split_name(target)
             instances[instance].set({variable: value})

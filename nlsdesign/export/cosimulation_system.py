@@ -27,6 +27,10 @@ def split_name(name: str) -> tuple[str, str]:
     return instance, variable
 
 
+class Late(str):
+    """A wire's source that is read as it was before the step: its reader works with what is one step old."""
+
+
 class System:
     """Instances, wires between them and signals from outside.
 
@@ -40,8 +44,6 @@ class System:
         Signal by input.
     order
         Order of stepping; empty if all inputs are read before any instance steps.
-    late
-        Wire targets that read what their source showed before the step, whatever the order.
     """
 
     def __init__(
@@ -50,11 +52,10 @@ class System:
         wires: Mapping[str, str],
         inputs: Mapping[str, Signal],
         order: tuple[str, ...],
-        late: tuple[str, ...] = (),
     ) -> None:
         self._instances = instances
         self._order = order
-        self._late = frozenset(late)
+        self._late = frozenset(target for target, source in wires.items() if isinstance(source, Late))
         self._wires = {name: _of(name, wires) for name in instances}
         self._inputs = {
             name: {variable: _function(signal) for variable, signal in _of(name, inputs).items()}

@@ -54,7 +54,7 @@ class Batch:
             given[0] = np.array(arrays[0], dtype=float)
         for i, rows in enumerate(given):
             if rows.size:
-                self._buffer.set_arg(i, memoryview(rows))
+                self._buffer.set_arg(i, memoryview(rows))  # type: ignore[arg-type, call-arg]
         for begin in range(0, count, _CHUNK):
             size = min(_CHUNK, count - begin)
             for i, array in enumerate(arrays):
@@ -62,7 +62,7 @@ class Batch:
                     given[i][:size] = array[:, begin : begin + size].T
                     given[i][size:] = given[i][size - 1]
             chunk = result[begin : begin + _CHUNK]
-            self._buffer.set_res(0, memoryview(chunk))
+            self._buffer.set_res(0, memoryview(chunk))  # type: ignore[arg-type, call-arg]
             self._trigger()
             if self._chained:
                 given[0][:] = chunk[-1]

@@ -88,7 +88,7 @@ class DrivenBlock:
         self._fixed = block.model.values
         e = _equations(block, self.free)
         self._digest, self._size = Batch(e.digest), e.state.numel()
-        self._late = [d.late_by for d in _late_drives(block, self.free)]
+        self._late = [str(d.late_by) for d in _late_drives(block, self.free)]
         self._output = Batch(_output_function(e))
         if self._size:
             stages = stages_of(e.derivative, e.state, e.digested)
@@ -166,7 +166,7 @@ class DrivenBlock:
         return np.column_stack([start, self._walk(n - 1, [start, begin, end, constant])])
 
     def _ends(self, inputs: Array, rates: Array, at: Array, step: float) -> tuple[Array, Array]:
-        """Return what is known at both ends of every step; rates are those of the straight line in between."""
+        """Return what is known at both ends of every step; rates are those of the line in between."""
         names, drives = [v.name for v in self.block.model.inputs], self.block.drives
         sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
         s = self.block.model.symbols()

@@ -27,7 +27,7 @@ SLOW = 10.0
 """A moving block says nothing where its speed is below so many times the noise of the speed."""
 _LEAST_ROWS = 20
 _COARSE_SHARE, _COARSEST = 0.04, 12
-"""The coarse look skips samples while no motion changes by more than this share of its range, up to so many."""
+"""The coarse look skips samples while no motion changes by more than this share of its range."""
 
 
 @dataclass(frozen=True)

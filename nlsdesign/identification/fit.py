@@ -155,7 +155,7 @@ class Fit:
         return result
 
     def strain(self) -> dict[str, float]:
-        """Return how far each parameter has moved from its declared value, in standard deviations of the prior."""
+        """Return how far each parameter has moved from its declared value, in prior standard deviations."""
         return {
             p.name: (p.inward(self.values[p.name]) - p.inward(p.centre)) / p.sigma
             for p in self.parameters
@@ -287,5 +287,5 @@ def _covariance(residual: Array, slope: Array, priors: int) -> Array:
     else:
         colour, size = 1.0, 1.0
     information = data.T @ data / (colour * size) + slope[:priors].T @ slope[:priors]
-    result: Array = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+    result: Array = np.asarray(np.linalg.pinv(information, rcond=1e-12, hermitian=True), dtype=np.float64)
     return result

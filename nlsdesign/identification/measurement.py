@@ -230,7 +230,8 @@ def split(
                 did_you_mean=nearest(glob, names),
                 next_step=f"records are: {', '.join(names)}",
             )
-    roles: dict[str, Role] = {n: "held_out" for n in chosen} | {n: "selection" for n in compared}
+    roles: dict[str, Role] = dict.fromkeys(compared, "selection")
+    roles.update(dict.fromkeys(chosen, "held_out"))
     if len(roles) == len(names):
         raise MeasurementError("records", "none is left for fitting", next_step="hold out fewer records")
     return tuple(replace(r, role=roles.get(r.name, "fit")) for r in records)

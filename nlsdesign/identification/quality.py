@@ -143,7 +143,7 @@ def check_time(file: str, head: str, time: Array) -> str:
     if len(gaps):
         raise MeasurementError(
             f"{file}: column '{head}', {_rows(gaps[:1] + 1)}",
-            f"there is a gap of {steps[gaps[0]]:g} s where samples lie {usual:g} s apart ({len(gaps)} in all)",
+            f"there is a gap of {steps[gaps[0]]:g} s; samples lie {usual:g} s apart ({len(gaps)} in all)",
             next_step="split the record into one file before and one after the gap",
         )
     uneven = float(np.max(np.abs(steps - usual))) / usual

@@ -54,7 +54,7 @@ def autocorrelation(residual: Array, lags: int) -> Array:
     """
     centred = residual - residual.mean()
     size = 1 << int(np.ceil(np.log2(2 * len(centred))))
-    power = np.abs(np.fft.rfft(centred, size)) ** 2
+    power: Array = np.abs(np.fft.rfft(centred, size)) ** 2
     found = np.fft.irfft(power, size)[: lags + 1]
     result: Array = found / found[0] if found[0] > 0.0 else np.eye(1, lags + 1)[0]
     return result
@@ -148,8 +148,8 @@ def spectrum(residual: Array, step: float, bins: int = 60) -> Binned:
         Number of bands.
     """
     window = np.hanning(len(residual))
-    power = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / np.sum(window**2)
-    return binned(power, np.fft.rfftfreq(len(residual), step), bins)
+    power: Array = np.abs(np.fft.rfft((residual - residual.mean()) * window)) ** 2 / np.sum(window**2)
+    return binned(power, np.asarray(np.fft.rfftfreq(len(residual), step), dtype=np.float64), bins)
 
 
 def shapes(
@@ -170,7 +170,7 @@ def shapes(
     """
     found = {f"over {name}": binned(residual, values) for name, values in signals.items()}
     found["over frequency"] = spectrum(residual, step)
-    found["over time"] = binned(residual, np.arange(len(residual)) * step)
+    found["over time"] = binned(residual, np.arange(len(residual), dtype=np.float64) * np.float64(step))
     if speed is not None:
         found["over speed"] = binned(residual, speed)
         for word, mask in (("forward", speed > 0.0), ("backward", speed < 0.0)):

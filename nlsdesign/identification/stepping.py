@@ -7,7 +7,8 @@ step; between samples b runs linearly:
     x⁺ = φ₀(Ah)·x + h·(φ₁ − φ₂)(Ah)·b₀ + h·φ₂(Ah)·b₁
 
 Any other takes a Rosenbrock step with a matrix W ≈ ∂f/∂x, second order whatever W is, L-stable if W is near:
-the present derivative where that is cheap, else that at the start of the record. Source: Hochbruck and Ostermann 2010 (φ functions); Verwer et al. 1999 (ROS2).
+the present derivative where that is cheap, else that at the start of the record.
+Source: Hochbruck and Ostermann 2010 (φ functions); Verwer et al. 1999 (ROS2).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _GAMMA = 1.0 - 0.5**0.5
 
 
 class Stage(NamedTuple):
-    """Indices of states that act on each other, and whether they do so linearly with constant coefficients."""
+    """States that act on each other, and whether they do so linearly with constant coefficients."""
 
     states: list[int]
     linear: bool
@@ -95,7 +96,7 @@ def exact_step(matrix: Expression, length: Expression) -> Expression:
         phi2 = (phi1 @ phi1 + 2 * phi2) / 4
         phi1 = (phi0 + one) @ phi1 / 2
         phi0 = phi0 @ phi0
-    return ca.horzcat(phi0, length * (phi1 - phi2), length * phi2)
+    return ca.SX(ca.horzcat(phi0, length * (phi1 - phi2), length * phi2))
 
 
 def rosenbrock_step(

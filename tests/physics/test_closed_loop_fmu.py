@@ -9,7 +9,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 import nlsdesign as nls
 
@@ -18,7 +17,7 @@ WIRES = {
     "observer.motor.current": "controller.motor.current",
     "controller.motor.angle": "plant.motor_encoder.reading",
     "controller.spring.torque": "observer.spring.torque",
-    "plant.motor.current": "controller.motor.current",
+    "plant.motor.current": nls.Late("controller.motor.current"),
 }
 
 
@@ -29,9 +28,8 @@ def test_co_simulated_loop_is_that_of_one_piece(tmp_path: Path) -> None:
     parts = {"plant": plant, "observer": observer, "controller": controller}
     fmus = {name: nls.export_fmu(model, tmp_path / f"{name}.fmu") for name, model in parts.items()}
     desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
-    late = ("plant.motor.current",)
     order = ("observer", "controller", "plant")
-    together = nls.cosimulate(fmus=fmus, wires=WIRES, inputs=desired, stop=0.6, order=order, late=late)
+    together = nls.cosimulate(fmus=fmus, wires=WIRES, inputs=desired, stop=0.6, order=order)
     assert together.delays["plant.motor.current"] == 1
     assert together.delays["controller.spring.torque"] == 0
     encoder = {target: source for target, source in WIRES.items() if "encoder" in source}
@@ -40,8 +38,3 @@ def test_co_simulated_loop_is_that_of_one_piece(tmp_path: Path) -> None:
         apart = np.abs(together[name] - whole[name][: len(together.time)])
         # Both integrators keep 1e-6 of the range over one sample; the stable loop does not let that grow.
         assert np.max(apart) <= 5e-6 * nominal, name
-
-
-def test_a_late_wire_must_exist() -> None:
-    with pytest.raises(nls.errors.UnknownNameError, match="late wire"):
-        nls.cosimulate(fmus={}, wires={}, inputs={}, stop=0.1, late=("plant.motor.curent",))

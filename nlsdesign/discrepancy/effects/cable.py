@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ...components import Assembly, InextensibleCable, PullOnly, Slack, StretchyCable, Tie, Turned
 from ...components.element import ROTATION, TRANSLATION, Element
@@ -52,9 +52,7 @@ def cable_compliance(assembly: Assembly) -> Sequence[Candidate]:
         if _inside(assembly, path, StretchyCable) or assembly.element(path).needs_rate:
             continue
         stiffness = Quantity(1e5, "N/m", SOURCE)
-        edited = wrapped(
-            assembly, path, "elastic", lambda n, e, k=stiffness: StretchyCable(members=((n, e),), stiffness=k)
-        )
+        edited = wrapped(assembly, path, "elastic", _stretchy(stiffness))
         name = f"{path.rpartition('.')[0]}.elastic.stiffness"
         found.append(
             Candidate(
@@ -82,7 +80,7 @@ def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
         if _inside(assembly, path, Slack) or assembly[path].domain != TRANSLATION:  # type: ignore[attr-defined]
             continue
         length = Quantity(1e-4, "m", SOURCE)
-        edited = wrapped(assembly, path, "slack", lambda n, e, s=length: Slack(members=((n, e),), length=s))
+        edited = wrapped(assembly, path, "slack", _slack(length))
         of = f"{path}.extension"
         found.append(
             Candidate(
@@ -136,3 +134,11 @@ def _holds_cam(assembly: Assembly, name: str) -> bool:
         for path, p in assembly.walk()
         if path == name or path.startswith(name + ".")
     )
+
+
+def _stretchy(stiffness: Quantity) -> Callable[[str, Element], Element]:
+    return lambda name, element: StretchyCable(members=((name, element),), stiffness=stiffness)
+
+
+def _slack(length: Quantity) -> Callable[[str, Element], Element]:
+    return lambda name, element: Slack(members=((name, element),), length=length)

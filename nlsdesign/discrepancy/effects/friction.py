@@ -66,7 +66,7 @@ def coulomb_friction(assembly: Assembly) -> Sequence[Candidate]:
             "dry_friction",
             body,
             element,
-            lambda part, of=torque: (Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),),
+            _sliding(torque),
         )
         found.append(
             Candidate(
@@ -103,11 +103,7 @@ def stribeck_friction(assembly: Assembly) -> Sequence[Candidate]:
             "dry_friction",
             body,
             element,
-            lambda part, of=torque: (
-                Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),
-                Unknown(f"{part}.breakaway", (0.05,), 1e-4, 2.0, of),
-                Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0),
-            ),
+            _stribeck(torque),
         )
         found.append(
             Candidate(
@@ -168,11 +164,7 @@ def torque_ripple(assembly: Assembly) -> Sequence[Candidate]:
             "ripple",
             body,
             element,
-            lambda part, of=torque: (
-                Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, of),
-                Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, of),
-                Unknown(f"{part}.order", orders, 2.0, 150.0),
-            ),
+            _ripple(torque, orders),
         )
         found.append(
             Candidate(
@@ -254,3 +246,23 @@ def backlash(assembly: Assembly) -> Sequence[Candidate]:
             )
         )
     return found
+
+
+def _sliding(of: str) -> Callable[[str], tuple[Unknown, ...]]:
+    return lambda part: (Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),)
+
+
+def _stribeck(of: str) -> Callable[[str], tuple[Unknown, ...]]:
+    return lambda part: (
+        Unknown(f"{part}.sliding_torque", (0.05,), 1e-4, 2.0, of),
+        Unknown(f"{part}.breakaway", (0.05,), 1e-4, 2.0, of),
+        Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0),
+    )
+
+
+def _ripple(of: str, orders: tuple[float, ...]) -> Callable[[str], tuple[Unknown, ...]]:
+    return lambda part: (
+        Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, of),
+        Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, of),
+        Unknown(f"{part}.order", orders, 2.0, 150.0),
+    )

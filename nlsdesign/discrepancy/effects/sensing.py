@@ -34,7 +34,7 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
                 name,
                 assembly.with_part(name, late),
                 (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
-                "force that follows the motion late, the more the faster it is; as much in the torque balance",
+                "force that follows the motion late, the more the faster; as much in the torque balance",
                 "Golub and Van Loan (Padé table)",
             )
         )
