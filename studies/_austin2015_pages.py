@@ -16,6 +16,13 @@ ABSTRACT = (
 )
 
 
+RECORDS = (
+    "There are no public bench records of this actuator. These come from a rig simulation that shares no model "
+    "code with the package (`tests/rig`): servoed motor, encoder, ammeter and load cell with noise, dry friction "
+    "as declared, numbers within their declared spread, and a rubber that relaxes more slowly than declared."
+)
+
+
 def write_pages(done: dict[str, Any]) -> dict[str, float]:
     """Write the report and return the numbers of the study.
 
@@ -33,6 +40,7 @@ def write_pages(done: dict[str, Any]) -> dict[str, float]:
         *observer_pages(done, results),
         *loop_pages(done, results),
         *nls.verdict_sections(done["verdict"]),
+        nls.TextSection("Where the records come from", RECORDS),
         *file_pages(done),
     ]
     title = "A cam-rubber actuator, from deck to report"
