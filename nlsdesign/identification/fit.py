@@ -19,6 +19,8 @@ from .residuals import autocorrelation
 Array = NDArray[np.float64]
 
 _EVALUATIONS = 40
+_OPEN_END = 1e-6
+"""Least information on the fitted scale."""
 _REACH = 2.0
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
@@ -173,7 +175,8 @@ class Fit:
             named = [(self.parameters[i].name, axis[i]) for i in order if abs(axis[i]) > 0.3]
             first = np.sign(named[0][1])
             words = [f"{n} {'up' if a * first > 0 else 'down'}" for n, a in named]
-            found.append(f"{' with '.join(words)}: known to {100 * deviation:.0f} % only")
+            known = f"known to {100 * deviation:.0f} % only" if deviation < 3.0 else "not known at all"
+            found.append(f"{' with '.join(words)}: {known}")
         return found
 
 
@@ -287,5 +290,7 @@ def _covariance(residual: Array, slope: Array, priors: int) -> Array:
     else:
         colour, size = 1.0, 1.0
     information = data.T @ data / (colour * size) + slope[:priors].T @ slope[:priors]
-    result: Array = np.asarray(np.linalg.pinv(information, rcond=1e-12, hermitian=True), dtype=np.float64)
+    # What the records leave open altogether gets a large variance, not an infinite one.
+    strength, axes = np.linalg.eigh(information)
+    result: Array = np.asarray((axes / np.maximum(strength, _OPEN_END)) @ axes.T, dtype=np.float64)
     return result
