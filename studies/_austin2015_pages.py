@@ -18,9 +18,9 @@ ABSTRACT = (
 
 RECORDS = (
     "There are no public bench records of this actuator. These come from a rig simulation that shares no "
-    "model code with the package (`tests/rig`): servoed motor, encoder, ammeter and load cell with noise, dry "
-    "friction as declared, numbers within their declared spread, and a second, slower relaxation of the rubber "
-    "that the deck does not declare."
+    "model code with the package (`tests/rig`): servoed motor, encoder, ammeter and load cell with noise, "
+    "dry friction as declared, numbers within their declared spread, and a second, slower relaxation of the "
+    "rubber that the deck does not declare."
 )
 
 
