@@ -1,0 +1,38 @@
+"""Sets of records of the independent rig, with the deck that its makers declare, and their diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from models.test_rig import test_rig_deck
+from nlsdesign.components import Assembly, InextensibleCable
+from nlsdesign.discrepancy import Verdict, diagnose
+from nlsdesign.identification import RecordSet, load_records
+from nlsdesign.model import flatten
+from tests.rig import ACTUATORS, make_records, write_set
+
+declared_rig = test_rig_deck
+
+
+def rig_set(
+    folder: Path, actuator: str, effects: Mapping[str, float], seed: int
+) -> tuple[Assembly, RecordSet]:
+    """Write a set as a bench leaves it, and read it back as a user would."""
+    write_set(folder, ACTUATORS[actuator], make_records(ACTUATORS[actuator], effects, seed))
+    declared = with_true_contact(declared_rig(folder / "rig.toml", folder / "cam.csv"))
+    return declared, load_records(folder, flatten(declared))
+
+
+def with_true_contact(declared: Assembly) -> Assembly:
+    """Return the rig with rubber that is free while its cable is slack, as this rig's makers say it is."""
+    members = declared.element("spring.cable").children()
+    return declared.with_part("spring.cable", InextensibleCable(members=tuple(members.items())))
+
+
+def verdict_of(folder: Path, actuator: str, effects: Mapping[str, float], seed: int) -> Verdict:
+    return diagnose(*rig_set(folder, actuator, effects, seed))
+
+
+def names(verdict: Verdict) -> list[str]:
+    return [effect.name for effect in verdict.effects]

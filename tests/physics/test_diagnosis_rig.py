@@ -1,0 +1,74 @@
+"""Diagnosis of records of a rig that shares no model code with the package: hidden effects are named.
+
+The rig draws its numbers anew for each seed within the declared spreads; seeds here were used for no threshold.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.components.declare import declare
+from nlsdesign.deck import load_deck
+from nlsdesign.discrepancy import diagnose, write_verdict
+from nlsdesign.identification import load_records
+from nlsdesign.model import flatten
+from tests.diagnosed import declared_rig, names, verdict_of
+from tests.rig import ACTUATORS, truth
+
+SINGLE = [
+    ("arm", "coulomb_friction", "dry_friction.sliding_torque", "friction"),
+    ("wrist", "second_relaxation", "second_relaxing.spring.modulus", "branch_modulus"),
+    ("wrist", "cable_compliance", "elastic.stiffness", "cable_stiffness"),
+    ("arm", "force_sensor_delay", "force_sensor.delay", "force_delay"),
+]
+
+
+@pytest.mark.parametrize(("actuator", "effect", "number", "field"), SINGLE, ids=[row[1] for row in SINGLE])
+def test_a_hidden_effect_is_named_and_the_gap_closes(
+    tmp_path: Path, actuator: str, effect: str, number: str, field: str
+) -> None:
+    seed = 77
+    found = verdict_of(tmp_path, actuator, {effect: 1.0}, seed)
+    assert found.verdict == "named"
+    assert names(found) == [effect]
+    assert found.rms("before", "held_out") > 2.0 * found.rms("noise_floor", "held_out")
+    assert found.held_out_ratio < 1.3
+    # The size of what was hidden; moduli and stiffnesses also lean on the other declared numbers.
+    _, hidden = truth(ACTUATORS[actuator], {effect: 1.0}, seed)
+    (value,) = [v for n, (v, _, _) in found.effects[0].parameters.items() if n.endswith(number)]
+    assert value == pytest.approx(getattr(hidden, field), rel=0.05)
+
+
+def test_nothing_is_invented_on_a_clean_set(tmp_path: Path) -> None:
+    found = verdict_of(tmp_path, "wrist", {}, 78)
+    assert found.verdict == "none"
+    assert found.effects == ()
+    assert 0.7 < found.held_out_ratio < 1.2
+
+
+def test_what_no_catalogue_knows_is_not_named(tmp_path: Path) -> None:
+    found = verdict_of(tmp_path, "arm", {"periodic_disturbance": 1.0}, 79)
+    assert found.verdict == "unknown"
+    assert found.effects == ()
+    assert found.block == "motor"
+    assert found.rms("before", "held_out") > 5.0 * found.rms("noise_floor", "held_out")
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("p06", ["force_sensor_delay"]), ("p07", []), ("p08", ["coulomb_friction", "second_relaxation"])],
+)
+def test_practice_records_get_the_right_verdict(
+    shared_folder: Path, tmp_path: Path, name: str, expected: list[str]
+) -> None:
+    folder = shared_folder / "practice"
+    rig = declared_rig(folder / "rig.toml", folder / "cam.csv")
+    found = diagnose(rig, load_records(folder / name, flatten(rig)))
+    assert names(found) == expected
+    assert found.verdict == ("named" if expected else "none")
+    assert found.held_out_ratio < 1.3
+    written = write_verdict(found, tmp_path)
+    assert {file.name for file in written} == {"verdict.json", "model.toml"}
+    assert declare(load_deck(tmp_path / "model.toml")) == found.actuator

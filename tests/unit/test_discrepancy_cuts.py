@@ -1,0 +1,90 @@
+"""Blocks cut at measured signals: driven by a simulation of the whole, their residual vanishes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nlsdesign.components import Assembly, Fixed, Inertia, TorsionSpring, assembly, tie
+from nlsdesign.components.declare import declare
+from nlsdesign.deck import load_deck
+from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.discrepancy.effects import current_sensor_bias, force_sensor_delay, force_sensor_gain
+from nlsdesign.errors import MeasurementError
+from nlsdesign.identification.driven import DrivenBlock
+from nlsdesign.identification.filters import smoothing
+from nlsdesign.identification.measurement import Record
+from nlsdesign.model import flatten
+from nlsdesign.simulation import simulate
+
+SIGNALS = ("motor_encoder.reading", "current_sensor.reading", "force_sensor.reading")
+TIME = np.arange(2000) * 0.001
+
+
+@pytest.fixture(scope="module")
+def rig() -> Assembly:
+    return declare(load_deck("test_rig"))
+
+
+def simulated(declared: Assembly) -> Record:
+    """The whole model under current, with readings free of rounding."""
+    fine = declared.with_values({"motor_encoder.quantum": 1e-9})
+    model = flatten(fine, outputs=list(SIGNALS))
+    current = 1.5 * (1.0 - np.cos(2 * np.pi * 1.5 * TIME))
+    return Record("run", simulate(model, TIME, inputs={"motor.current": current}))
+
+
+@pytest.mark.parametrize("change", ["none", "gain", "bias", "delay"])
+def test_both_blocks_vanish_on_records_of_the_model_itself(rig: Assembly, change: str) -> None:
+    edited = {
+        "none": rig,
+        "gain": force_sensor_gain(rig)[0].assembly.with_values({"force_sensor.gain": 1.2}),
+        "bias": current_sensor_bias(rig)[0].assembly.with_values({"current_sensor.bias": 0.3}),
+        "delay": force_sensor_delay(rig)[0].assembly.with_values({"force_sensor.delay": 0.006}),
+    }[change]
+    record = simulated(edited)
+    sizes = {"spring": np.max(record.trace["force_sensor.reading"]), "motor": 0.755 * 3.0}
+    for block in blocks_of(edited, SIGNALS):
+        driven = DrivenBlock(block, [])
+        output = driven.respond(driven.samples(record, {}), {}).output
+        error = (record.trace[block.target] if block.target else 0.0) - output
+        seen = smoothing(len(TIME), block.width, 5) @ error
+        assert np.sqrt(np.mean(seen**2)) < 2e-3 * sizes[block.name], block.name
+
+
+def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
+    record = simulated(rig.with_values({"motor.inertia": 0.012}))
+    found = {}
+    for block in blocks_of(rig, SIGNALS):
+        driven = DrivenBlock(block, [])
+        output = driven.respond(driven.samples(record, {}), {}).output
+        error = (record.trace[block.target] if block.target else 0.0) - output
+        found[block.name] = float(np.std(smoothing(len(TIME), block.width, 5) @ error))
+    # 0.003 kg·m² times the acceleration.
+    acceleration = np.gradient(np.gradient(record.trace["motor_encoder.reading"], 0.001), 0.001)
+    assert found["motor"] == pytest.approx(0.003 * np.std(acceleration[50:-50]), rel=0.05)
+    assert found["spring"] < 0.1
+
+
+def test_blocks_say_where_they_are_and_what_drives_them(rig: Assembly) -> None:
+    spring, motor = blocks_of(rig, SIGNALS)
+    assert (spring.name, spring.target, spring.unit) == ("spring", "force_sensor.reading", "N")
+    assert (motor.name, motor.target, motor.unit) == ("motor", None, "N*m")
+    assert {d.order for d in motor.drives.values() if d.signal == "motor_encoder.reading"} == {0, 1, 2}
+    assert motor.moving == "motor_encoder.reading.rate"
+    assert [v.name for v in motor.model.states] == []
+    assert [v.name for v in spring.model.states] == ["spring.cable.rubber.relaxing.dashpot.strain"]
+
+
+def test_a_positioning_drive_without_a_spring_has_one_block() -> None:
+    drive = assembly(
+        "drive", stage=Inertia(inertia=0.02), base=Fixed(), end=tie(TorsionSpring(stiffness=1e-3), "stage")
+    )
+    (block,) = blocks_of(drive, ["stage.angle", "stage.torque"])
+    assert block.name == "stage"
+    assert block.target is None
+
+
+def test_nothing_to_compare_is_said(rig: Assembly) -> None:
+    with pytest.raises(MeasurementError, match="measure no motion that drives the model"):
+        blocks_of(rig, ["force_sensor.reading"])

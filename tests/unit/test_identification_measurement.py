@@ -1,0 +1,226 @@
+"""Reading records: what is accepted, what is refused, and how the refusal is worded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlsdesign.components import (
+    Assembly,
+    CurrentSensor,
+    Encoder,
+    ForceSensor,
+    Inertia,
+    TorsionSpring,
+    assembly,
+    tie,
+)
+from nlsdesign.errors import MeasurementError
+from nlsdesign.identification import RecordSet, load_records
+from nlsdesign.model import FlatModel, flatten
+
+STEP, COUNT = 0.002, 400
+HEADS = ("t_s", "theta_deg", "torque_Nm")
+
+
+def wheel(**sensors: object) -> Assembly:
+    return assembly(
+        "wheel", wheel=Inertia(inertia=0.01), spring=tie(TorsionSpring(stiffness=3.0), "wheel"), **sensors
+    )
+
+
+@pytest.fixture
+def model() -> FlatModel:
+    return flatten(
+        wheel(
+            encoder=Encoder(of="wheel.angle", quantum=1e-3), cell=ForceSensor(of="spring.torque", noise=0.01)
+        )
+    )
+
+
+def table() -> np.ndarray:
+    time = np.arange(COUNT) * STEP
+    noise = np.random.default_rng(1).standard_normal(COUNT) * 0.01
+    angle = 20.0 * np.sin(2 * np.pi * 1.5 * time)
+    return np.column_stack([time, np.round(angle, 1), 3.0 * np.radians(angle) + noise])
+
+
+def write(folder: Path, name: str, rows: np.ndarray, heads: tuple[str, ...] = HEADS) -> Path:
+    lines = [",".join(heads), *(",".join(f"{v:.6f}" for v in row) for row in rows)]
+    file = folder / f"{name}.csv"
+    file.write_text("\n".join(lines) + "\n", encoding="utf8")
+    return file
+
+
+MAPPING = """
+held_out = ["c*"]
+[columns.theta_deg]
+signal = "encoder.reading"
+unit = "deg"
+[columns.torque_Nm]
+signal = "cell.reading"
+unit = "N*m"
+noise = 0.01
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in "abcd":
+        write(tmp_path, name, table())
+    (tmp_path / "records.toml").write_text(MAPPING, encoding="utf8")
+    return tmp_path
+
+
+def read(folder: Path, model: FlatModel) -> RecordSet:
+    return load_records(folder, model)
+
+
+def test_numbers_arrive_in_si_under_the_names_of_the_model(folder: Path, model: FlatModel) -> None:
+    records = read(folder, model)
+    first = records.records[0]
+    assert first.step == pytest.approx(STEP, rel=1e-12)
+    np.testing.assert_allclose(first.trace["encoder.reading"], np.radians(table()[:, 1]), atol=1e-9)
+    assert first.trace.units["encoder.reading"] == "rad"
+    assert records.column("cell.reading").noise == 0.01
+    assert [r.role for r in records.records] == ["fit", "fit", "held_out", "fit"]
+
+
+def test_without_a_rule_every_third_record_is_held_out(folder: Path, model: FlatModel) -> None:
+    (folder / "records.toml").write_text(MAPPING.replace('held_out = ["c*"]', ""), encoding="utf8")
+    assert [r.name for r in read(folder, model).of("held_out")] == ["b"]
+
+
+def test_a_single_record_is_cut_in_time(folder: Path, model: FlatModel) -> None:
+    for name in "bcd":
+        (folder / f"{name}.csv").unlink()
+    (folder / "records.toml").write_text(MAPPING.replace('held_out = ["c*"]', ""), encoding="utf8")
+    seen, unseen = read(folder, model).records
+    assert (seen.role, unseen.role) == ("fit", "held_out")
+    assert seen.trace.time[-1] < unseen.trace.time[0]
+    assert len(seen.trace) + len(unseen.trace) == COUNT
+
+
+def test_a_table_without_time_is_not_a_record(folder: Path, model: FlatModel) -> None:
+    write(folder, "cam", np.ones((60, 2)), ("theta_rad", "delta_m"))
+    assert len(read(folder, model).records) == 4
+
+
+def test_heads_with_units_need_no_mapping(tmp_path: Path) -> None:
+    rig = wheel(
+        encoder=Encoder(of="wheel.angle", quantum=1e-3),
+        cell=ForceSensor(of="spring.torque"),
+        meter=CurrentSensor(of="wheel.torque"),
+    )
+    write(tmp_path, "a", table(), ("time [s]", "theta_deg", "cell.reading [N*m]"))
+    found = load_records(tmp_path, flatten(rig))
+    assert found.signals == ("encoder.reading", "cell.reading")
+
+
+def test_an_ambiguous_head_asks_for_a_mapping(tmp_path: Path) -> None:
+    rig = wheel(left=Encoder(of="wheel.angle", quantum=1e-3), right=Encoder(of="wheel.angle", quantum=1e-3))
+    write(tmp_path, "a", table()[:, :2], ("t_s", "theta_rad"))
+    with pytest.raises(MeasurementError, match=r"theta_rad.*left.reading or right.reading.*records.toml"):
+        load_records(tmp_path, flatten(rig))
+
+
+def spoiled(change: Callable[[np.ndarray], None]) -> np.ndarray:
+    rows = table()
+    change(rows)
+    return rows
+
+
+def nan(rows: np.ndarray) -> None:
+    rows[100:103, 2] = np.nan
+
+
+def back(rows: np.ndarray) -> None:
+    rows[200:, 0] -= 0.1
+
+
+def still(rows: np.ndarray) -> None:
+    rows[50, 0] = rows[49, 0]
+
+
+def gap(rows: np.ndarray) -> None:
+    rows[300:, 0] += 0.05
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (nan, r"b\.csv: column 'torque_Nm', rows 102 to 104.*not a finite number \(3 in all\)"),
+        (back, r"b\.csv: column 't_s', row 202.*runs backwards"),
+        (still, r"b\.csv: column 't_s', row 52.*stands still"),
+        (gap, r"b\.csv: column 't_s', row 302.*gap of 0.052 s"),
+    ],
+)
+def test_a_spoiled_record_is_named_by_file_column_and_rows(
+    folder: Path, model: FlatModel, change: Callable[[np.ndarray], None], words: str
+) -> None:
+    write(folder, "b", spoiled(change))
+    with pytest.raises(MeasurementError, match=words):
+        read(folder, model)
+
+
+def test_a_word_in_place_of_a_number_is_named_by_cell(folder: Path, model: FlatModel) -> None:
+    text = (folder / "b.csv").read_text().splitlines()
+    text[7] = text[7].rpartition(",")[0] + ",high"
+    (folder / "b.csv").write_text("\n".join(text), encoding="utf8")
+    with pytest.raises(MeasurementError, match=r"b\.csv: column 'torque_Nm', row 8: 'high' is not a number"):
+        read(folder, model)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('unit = "deg"', 'unit = "m"', r"theta_deg.*is in m, but encoder.reading is measured in rad"),
+        ('"encoder.reading"', '"encoder.reding"', r"does not have; did you mean 'encoder.reading'"),
+        ("theta_deg]", "theta_grad]", r"column 'theta_grad': is missing; did you mean 'theta_deg'"),
+        ('unit = "deg"', "", r"columns.theta_deg: has no unit"),
+        ("noise", "nose", r"columns.torque_Nm.nose: no such field; did you mean 'noise'"),
+        ('["c*"]', '["sine*"]', r"'sine\*': no record has such a name"),
+        ('["c*"]', '["*"]', r"none is left for fitting"),
+    ],
+)
+def test_a_wrong_mapping_is_answered_with_the_nearest_right_one(
+    folder: Path, model: FlatModel, old: str, new: str, words: str
+) -> None:
+    (folder / "records.toml").write_text(MAPPING.replace(old, new), encoding="utf8")
+    with pytest.raises(MeasurementError, match=words):
+        read(folder, model)
+
+
+def test_a_folder_without_records_is_refused(tmp_path: Path, model: FlatModel) -> None:
+    with pytest.raises(MeasurementError, match="holds no CSV file"):
+        load_records(tmp_path / "nothing", model)
+
+
+def test_a_dead_and_a_saturated_channel_make_data_suspect(folder: Path, model: FlatModel) -> None:
+    rows = table()
+    rows[:, 1] = 4.0
+    write(folder, "a", rows)
+    rows = table()
+    rows[:, 2] = np.clip(rows[:, 2], -0.7, 0.7)
+    write(folder, "d", rows)
+    found = [str(f) for f in read(folder, model).findings]
+    assert len(found) == 2
+    assert "a.csv: column 'theta_deg'" in found[0]
+    assert "constant at 4" in found[0]
+    assert "d.csv: column 'torque_Nm'" in found[1]
+    assert "clipped" in found[1]
+
+
+def test_uneven_steps_are_interpolated_and_said(folder: Path, model: FlatModel) -> None:
+    rows = table()
+    rows[1:-1, 0] += 0.2 * STEP * np.sin(np.arange(1, COUNT - 1))
+    rows[:, 1] = np.degrees(0.5 * rows[:, 0])
+    write(folder, "a", rows)
+    first = read(folder, model).records[0]
+    assert "interpolated to a uniform grid" in first.source
+    np.testing.assert_allclose(np.diff(first.trace.time), STEP, rtol=1e-9)
+    # What was linear in time still is.
+    np.testing.assert_allclose(first.trace["encoder.reading"], 0.5 * first.trace.time, atol=1e-6)
