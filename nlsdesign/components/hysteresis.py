@@ -11,6 +11,7 @@ from ..symbolic import Expression
 from .element import MATERIAL, Domain, Element, Scope
 from .part import parameter
 
+_MOST_OVERSHOOT = 1.2
 _SHARES = (0.3, 0.6, 1.1, 2.0)
 """Yield stresses of the sliders relative to the mean one; their mean is one."""
 
@@ -49,7 +50,9 @@ class SlidingFillers(Element):
         total = ca.SX(0)
         for number, share in enumerate(_SHARES, start=1):
             stress = scope.state(f"slider_{number}", "Pa", f"stress of slider {number} of {scope.path}")
-            loading = ca.if_else(stress * rate > 0, (stress / (share * limit)) ** 4, 0)
+            # The law keeps the ratio below one; a numerical step that overshoots must not run away.
+            ratio = ca.fmin(ca.fabs(stress) / (share * limit), _MOST_OVERSHOOT)
+            loading = ca.if_else(stress * rate > 0, ratio**4, 0)
             scope.derive(stress, modulus * rate * (1 - loading))
             total += stress
         return total

@@ -185,6 +185,10 @@ class DrivenBlock:
         x = self.block.model.start(self.block.model.states)
         for _ in range(3):
             rate, slope, _ = (m.full() for m in self._rate(x, begin, p))
+            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
+                raise ConvergenceError(
+                    f"block '{self.block.name}'", "has no state of rest at the first sample"
+                )
             x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
         return x
 

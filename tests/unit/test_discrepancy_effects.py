@@ -16,19 +16,39 @@ from nlsdesign.components import (
     parallel,
     tie,
 )
-from nlsdesign.components.declare import declare, deck_text
+from nlsdesign.components.declare import deck_text, declare
 from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.discrepancy.effects import ALL, Candidate, Effect, Unknown, wrapped
 from nlsdesign.discrepancy.effects.cable import stretched
 from nlsdesign.model import flatten
 
-CATALOGUE = (
-    "coulomb_friction stribeck_friction load_dependent_friction quadratic_drag torque_ripple backlash drive_delay "
-    "current_sensor_bias torque_constant_saturation cable_compliance cable_slack cable_friction cam_angle_offset "
-    "cam_profile_error second_relaxation rate_independent_hysteresis stress_softening self_heating permanent_set "
-    "strain_stiffening force_sensor_bias force_sensor_gain force_sensor_delay force_sensor_drift "
-    "angle_sensor_eccentricity"
-).split()
+CATALOGUE = [
+    "coulomb_friction",
+    "stribeck_friction",
+    "load_dependent_friction",
+    "quadratic_drag",
+    "torque_ripple",
+    "backlash",
+    "drive_delay",
+    "current_sensor_bias",
+    "torque_constant_saturation",
+    "cable_compliance",
+    "cable_slack",
+    "cable_friction",
+    "cam_angle_offset",
+    "cam_profile_error",
+    "second_relaxation",
+    "rate_independent_hysteresis",
+    "stress_softening",
+    "self_heating",
+    "permanent_set",
+    "strain_stiffening",
+    "force_sensor_bias",
+    "force_sensor_gain",
+    "force_sensor_delay",
+    "force_sensor_drift",
+    "angle_sensor_eccentricity",
+]
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,7 @@ from nlsdesign.components import (
     through,
     tie,
 )
+from nlsdesign.discrepancy.cuts import blocks_of
 from nlsdesign.errors import ConvergenceError, UnknownNameError
 from nlsdesign.identification.block import Block
 from nlsdesign.identification.descent import minimise
@@ -34,7 +35,6 @@ from nlsdesign.identification.evidence import Bench
 from nlsdesign.identification.fit import Parameter, declared_parameter, fit, predicted_cost
 from nlsdesign.identification.measurement import Column, Record, RecordSet
 from nlsdesign.identification.stepping import exact_step, rosenbrock_step, stages_of
-from nlsdesign.discrepancy.cuts import blocks_of
 from nlsdesign.quantity import quantity
 from nlsdesign.simulation import Trace
 
