@@ -1,6 +1,7 @@
 """Diagnosis of records of a rig that shares no model code with the package: hidden effects are named.
 
-The rig draws its numbers anew for each seed within the declared spreads; seeds here were used for no threshold.
+The rig draws its numbers anew for each seed within the declared spreads; seeds here were used for no
+threshold.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def test_an_effect_is_not_added_twice_at_the_same_place(effect: Effect, rig: Ass
 def test_effects_stay_away_from_what_cannot_have_them() -> None:
     able = {effect.__name__ for effect in ALL if effect(bare())}
     assert able == {
-        "coulomb_friction", "stribeck_friction", "load_dependent_friction", "quadratic_drag", "torque_ripple", "backlash",
+        "coulomb_friction", "stribeck_friction", "load_dependent_friction", "quadratic_drag", "torque_ripple", "backlash",  # noqa: E501
     }  # fmt: skip
 
 

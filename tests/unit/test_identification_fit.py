@@ -156,7 +156,7 @@ def test_a_stretchy_cable_answers_like_the_implicit_equation_solved_by_bisection
 
 
 def test_unknown_names_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean 'cell.gain'"):
+    with pytest.raises(UnknownNameError, match=r"did you mean 'cell.gain'"):
         DrivenBlock(block_of(puller()), ["cell.gian"])
 
 
