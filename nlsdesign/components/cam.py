@@ -43,7 +43,10 @@ class Cam(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Pulley(Cam):
-    """Round pulley: δ = r·θ, for both signs of the angle; a rack or a gear is the same law."""
+    """Round pulley: δ = r·θ, for both signs of the angle; a rack or a gear is the same law.
+
+    Source: rolling without slip.
+    """
 
     radius: Quantity = parameter("m", "radius", minimum=1e-5, maximum=10.0)
 
@@ -65,6 +68,7 @@ class TwoSidedCam(Cam):
     cable changes sides. δ is even, h odd, and h ≡ dδ/dθ exactly. ``anchor_distance`` is the distance from
     the centre to the fixed end of the cable; it shapes the contour, not the law. Beyond the contour's end
     the lever arm stays what it was there, as on a round run-out; no stop is modelled.
+    Source: de Boor 1978 (B-splines); the cam is that of Austin et al. 2015, Fig. 2.
     """
 
     lever_arm: Quantity = parameter(

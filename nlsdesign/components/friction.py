@@ -37,7 +37,7 @@ class StribeckFriction(CoulombFriction):
 
 @dataclass(frozen=True, kw_only=True)
 class QuadraticDrag(Viscous):
-    """Drag of a fan or of churned oil: T = c·ω·|ω|."""
+    """Drag of a fan or of churned oil: T = c·ω·|ω|. Source: Newton 1687, book II."""
 
     drag: Quantity = parameter("N*m*s^2/rad^2", "drag coefficient", minimum=0.0, maximum=1e9)
 

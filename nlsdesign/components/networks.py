@@ -19,6 +19,7 @@ class Specimen(Combination):
     """A piece of material: ε = e/L₀, F = A₀·Σσ of the laws inside, which act in parallel.
 
     Nominal stress and nominal strain, as in the paper: A₀ and L₀ are those of the unstretched piece.
+    Source: Austin et al. 2015, eq. (1), with a = A₀/L₀.
     """
 
     area: Quantity = parameter("m^2", "cross-section of the unstretched piece", minimum=1e-8, maximum=1.0)
@@ -56,6 +57,8 @@ class Specimen(Combination):
 @dataclass(frozen=True, kw_only=True)
 class Through(Element):
     """An element behind a cam: e = e₀ + δ(θ), T = N·h(θ)·F(e), with h = dδ/dθ and N equal elements.
+
+    Source: virtual work, T·dθ = N·F·dδ, with an inextensible cable; Austin et al. 2015, eq. (4), without N.
 
     Parameters
     ----------
@@ -127,6 +130,7 @@ class PullOnly(Combination):
 
     While the cable is slack the element inside is still led by the extension, so its memory is that of a
     rod, not of a free piece: good for short slack times, see the known gaps.
+    Source: Signorini 1933 (unilateral contact); this rounding is the softplus of Dugas et al. 2001.
     """
 
     width: Quantity = parameter(

@@ -71,7 +71,7 @@ class Backlash(Shifting):
 class Slack(Shifting):
     """A cable too long by s: the element inside is stretched by ⟨e − s⟩, rounded over w.
 
-    Permanent set of the rubber looks the same.
+    Permanent set of the rubber looks the same. Source: geometry.
     """
 
     length: Quantity = parameter("m", "extension that stretches nothing", minimum=0.0, maximum=1.0)
@@ -91,7 +91,10 @@ class Slack(Shifting):
 
 @dataclass(frozen=True, kw_only=True)
 class Turned(Shifting):
-    """A cam that sits on its shaft turned by θ₀, or an encoder whose zero is off: φ = θ − θ₀."""
+    """A cam that sits on its shaft turned by θ₀, or an encoder whose zero is off: φ = θ − θ₀.
+
+    Source: geometry.
+    """
 
     offset: Quantity = parameter(
         "rad", "angle at which the elements inside see zero", minimum=-6.3, maximum=6.3

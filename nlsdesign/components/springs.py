@@ -121,6 +121,7 @@ class SmoothStrainStiffening(Elastic):
 
     σ = Σ kᵢ·(s(ε − εᵢ) − s(−εᵢ)) with s(v) = w·ln(1 + e^(v/w)); σ(0) = 0, and σ differs from the sharp law
     by at most w·ln 2·Σkᵢ. A knot at zero is not rounded: rubber in tension has no corner there.
+    Source: the law of Austin et al. 2015, eq. (1); softplus of Dugas et al. 2001.
     """
 
     modulus: Quantity = parameter(

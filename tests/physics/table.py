@@ -1,7 +1,9 @@
-"""The table of independent roads: for each component two ways to the same number, and the law between them."""
+"""The table of independent roads: for each component two ways to a number, and the law between them."""
 
 from __future__ import annotations
 
+import importlib
+from pathlib import Path
 from typing import NamedTuple
 
 from nlsdesign.components import Part
@@ -17,3 +19,10 @@ class Row(NamedTuple):
     law: str
     roads: tuple[str, str]
     test: str
+
+
+def rows() -> list[Row]:
+    """All rows, over all groups."""
+    here = Path(__file__).parent
+    names = sorted(path.stem for path in here.glob("table_*.py"))
+    return [row for name in names for row in importlib.import_module(f"tests.physics.{name}").ROWS]

@@ -1,0 +1,185 @@
+"""What holds for every component alike: units, words, sources, derivatives, pickle, print, deck, C.
+
+The components are taken from the public list of the room, so a new one is tested from its first day: it needs
+an example in ``tests/parts``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+import re
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nlsdesign.components as room
+from nlsdesign.components import (
+    MATERIAL,
+    ROTATION,
+    Assembly,
+    Body,
+    Cam,
+    Element,
+    GearedMotor,
+    Inertia,
+    Mass,
+    Part,
+    Pulley,
+    Sensor,
+    Spring,
+    Tie,
+    TorsionSpring,
+    assembly,
+    specimen,
+    through,
+    tie,
+)
+from nlsdesign.components.declare import declare, write_deck
+from nlsdesign.components.part import walk
+from nlsdesign.deck import load_deck
+from nlsdesign.errors import ExportError
+from nlsdesign.export.compile import compiler, run_compiler
+from nlsdesign.export.fmu import fmi_headers, fmu_texts
+from nlsdesign.model import FlatModel, flatten
+from nlsdesign.quantity import parse_unit
+from tests.parts import examples
+
+STEP = 1e-6
+"""Relative to the size of each variable, for the finite difference."""
+
+
+def public() -> list[type[Part]]:
+    """Every component that can be declared."""
+    found = [each for each in vars(room).values() if inspect.isclass(each) and issubclass(each, Part)]
+    return sorted((c for c in found if not inspect.isabstract(c) and c is not Part), key=lambda c: c.__name__)
+
+
+def around(part: Part) -> Assembly:
+    """The smallest system in which the part does something."""
+    if isinstance(part, Sensor):
+        spring = tie(through(Pulley(radius=0.01), rubber=Spring(stiffness=2500.0)), "motor")
+        motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055)
+        return assembly("bench", motor=motor, spring=spring, part=part)
+    if isinstance(part, Body):
+        spring = TorsionSpring(stiffness=3.4) if part.domain == ROTATION else Spring(stiffness=2500.0)
+        other = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
+        return assembly("bench", part=part, other=other, spring=tie(spring, "part", "other"))
+    if isinstance(part, Tie):
+        return assembly("bench", shaft=Inertia(inertia=6e-4), part=part)
+    if isinstance(part, Cam):
+        return around(through(part, rubber=Spring(stiffness=2500.0)))
+    assert isinstance(part, Element), f"{type(part).__name__} is no kind of component that is known here"
+    if part.domain == MATERIAL:
+        return around(specimen(area=1e-4, rest_length=0.0125, law=part))
+    body = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
+    return assembly("bench", body=body, part=tie(part, "body"))
+
+
+def flat(part: Part) -> FlatModel:
+    return flatten(around(part))
+
+
+@pytest.fixture(params=public(), ids=lambda c: c.__name__)
+def part(request: pytest.FixtureRequest) -> Part:
+    kind: type[Part] = request.param
+    known = examples()
+    assert kind in known, f"{kind.__name__} has no example in tests/parts"
+    return known[kind]
+
+
+def test_units_are_declared_and_symbols_described(part: Part) -> None:
+    for name, info in part.parameter_infos().items():
+        assert parse_unit(info.unit), name
+        assert info.description.strip(), name
+        assert info.minimum < info.maximum, name
+    model = flat(part)
+    for v in model.states + model.inputs + model.parameters + model.outputs + model.signals:
+        assert parse_unit(v.unit), v.name
+        assert v.description.strip(), v.name
+
+
+def test_the_law_is_stated_with_its_source(part: Part) -> None:
+    text = inspect.getdoc(type(part)) or ""
+    assert text, "has no words"
+    if isinstance(part, Element | Cam) and type(part).__name__ not in ("Parallel", "Series"):
+        assert re.search(r"\bSources?:", text), "names no source of its law"
+    if part.parameter_infos():
+        assert "=" in text or "·" in text or ":" in text, "shows no equation"
+
+
+def test_every_number_says_where_it_comes_from(part: Part) -> None:
+    for _, each in walk(part):
+        for name, info in type(each).parameter_infos().items():
+            default = next(f for f in each.__dataclass_fields__.values() if f.name == name).default
+            if hasattr(default, "source"):
+                assert default.source.startswith("assumed"), name
+            assert info.checked(name, getattr(each, name)) == getattr(each, name)
+
+
+def test_the_derivative_is_that_of_the_finite_difference(part: Part) -> None:
+    """CasADi's Jacobian of the rates over states, inputs and parameters at a point without a corner."""
+    model = flat(part)
+    s = model.symbols()
+    everything = ca.vertcat(s.state, s.input, s.parameter)
+    values = ca.vertcat(s.derivative, s.output, s.signal)
+    if isinstance(part, Sensor) and "quantum" in part.parameter_infos():
+        values = s.derivative  # a reading in whole counts has no derivative
+    law = ca.Function("law", [everything], [values])
+    jacobian = ca.Function("jacobian", [everything], [ca.jacobian(values, everything)])
+    moving = np.array([v.nominal for v in model.states + model.inputs]) * 0.0137
+    point = np.concatenate([moving, model.start(model.parameters)])
+    sizes = np.where(point == 0.0, 1.0, np.abs(point))
+    found = np.array(jacobian(point))
+    assert np.all(np.isfinite(found))
+    for column, size in enumerate(sizes):
+        ahead, behind = point.copy(), point.copy()
+        ahead[column] += STEP * size
+        behind[column] -= STEP * size
+        slope = (np.array(law(ahead)) - np.array(law(behind))).ravel() / (2 * STEP * size)
+        at = np.abs(np.array(law(point)).ravel())
+        roundoff = 1e-15 * (at + np.abs(found) @ sizes) / (STEP * size)
+        allowed = 1e-5 * np.abs(slope) + 100 * roundoff
+        assert np.all(np.abs(found[:, column] - slope) <= allowed), everything[column].name()
+
+
+def test_it_pickles_and_prints(part: Part) -> None:
+    assert pickle.loads(pickle.dumps(part)) == part
+    made = around(part)
+    assert pickle.loads(pickle.dumps(made)) == made
+    assert type(part).__name__ in part.title()
+    assert "part" in str(made)
+
+
+def test_a_deck_says_the_same(part: Part, tmp_path: Path) -> None:
+    made = around(part)
+    write_deck(made, tmp_path / "deck.toml")
+    again = declare(load_deck(tmp_path / "deck.toml"))
+    assert [(n, type(p)) for n, p in again.walk()] == [(n, type(p)) for n, p in made.walk()]
+    assert {n: q.values for n, q in again.quantities().items()} == {
+        n: q.values for n, q in made.quantities().items()
+    }
+
+
+def sources(part: Part, folder: Path) -> Path:
+    for name, content in fmu_texts(flat(part), version="3.0", step=1e-3).items():
+        if name.startswith("sources/"):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+    return folder / "sources"
+
+
+def test_it_becomes_c_that_compiles(part: Part, tmp_path: Path) -> None:
+    folder = sources(part, tmp_path)
+    text = (folder / "model.c").read_text(encoding="utf-8")
+    for v in flat(part).parameters:
+        assert f'"{v.name}' in text, v.name
+    try:
+        compiler()
+    except ExportError as missing:
+        pytest.skip(str(missing))
+    flags = ["-c", "-std=c99", "-Wall", "-Wextra", "-Werror", f"-I{fmi_headers()}"]
+    run_compiler([*flags, folder / "fmi3.c", "-o", tmp_path / "fmi3.o"], about=type(part).__name__)
+    assert (tmp_path / "fmi3.o").stat().st_size > 0
