@@ -13,6 +13,7 @@ from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
 from .play import Backlash, Slack, Turned
 from .sensors import CurrentSensor, DelayedForceSensor, Encoder, ForceSensor, Sensor
+from .slide import ConstantForce, LinearDrive, SlidingFriction
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
 from .tie import Tie, tie
 
@@ -24,6 +25,7 @@ __all__ = [
     "Backlash",
     "Body",
     "Cam",
+    "ConstantForce",
     "CoulombFriction",
     "CurrentSensor",
     "Dashpot",
@@ -39,6 +41,7 @@ __all__ = [
     "GearedMotor",
     "Inertia",
     "InextensibleCable",
+    "LinearDrive",
     "LinearElastic",
     "LoadFriction",
     "Mass",
@@ -51,6 +54,7 @@ __all__ = [
     "Series",
     "Slack",
     "SlidingFillers",
+    "SlidingFriction",
     "SmoothStrainStiffening",
     "Specimen",
     "Spring",
