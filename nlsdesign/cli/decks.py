@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import click
 
-from ..components.declare import deck_problems, declare
+from ..components.declare import deck_problems, declare, write_deck
 from ..deck import deck_names, load_deck
+from ..locations import bundled
 from ..quantity import Quantity, sources
 from .output import json_option, show_json, show_table
+
+_file = click.Path(path_type=Path, dir_okay=False, exists=True)
 
 
 @click.group()
@@ -62,6 +66,17 @@ def show(deck_name: str, as_json: bool) -> None:
         (n, _short(q), f"± {100 * q.spread:.0f} %" if q.spread else "", q.source) for n, q in numbers.items()
     ]
     show_table("Numbers", ("name", "value", "spread", "source"), rows)
+
+
+@deck.command("from-rig")
+@click.argument("rig_toml", metavar="RIG.TOML", type=_file)
+@click.argument("cam_csv", metavar="CAM.CSV", type=_file)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
+def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
+    """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
+    assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
+    write_deck(assembly, out)
+    click.echo(f"written: {out}, {len(assembly.quantities())} numbers; next: nlsdesign diagnose --deck {out}")
 
 
 def _short(given: Quantity) -> str:

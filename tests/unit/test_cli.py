@@ -109,3 +109,24 @@ def test_unknown_study_is_named(run: Run) -> None:
     status, _, err = run("study", "run", "austin2014")
     assert status == 2
     assert "did you mean 'austin2015'?" in err
+
+
+def test_another_rig_needs_only_what_its_makers_declare(
+    run: Run, root: Path, shared_folder: Path, tmp_path: Path
+) -> None:
+    rig = (shared_folder / "practice" / "rig.toml").read_text(encoding="utf8")
+    (tmp_path / "rig.toml").write_text(rig.replace("A0_m2 = 0.0001", "A0_m2 = 0.0002"), encoding="utf8")
+    cam = str(shared_folder / "practice" / "cam.csv")
+    status, out, _ = run("deck", "from-rig", "rig.toml", cam, "--out", "other.toml")
+    assert status == 0
+    assert "other.toml" in out
+    ours = (root / "models" / "decks" / "test_rig.toml").read_text(encoding="utf8").splitlines()
+    other = (tmp_path / "other.toml").read_text(encoding="utf8").splitlines()
+    assert [new for old, new in zip(ours, other, strict=True) if old != new] == [
+        next(line for line in other if line.startswith("area = "))
+    ]
+    (tmp_path / "rig.toml").write_text(rig.replace("k_Pa", "k_pascal"), encoding="utf8")
+    status, _, err = run("deck", "from-rig", "rig.toml", cam, "--out", "third.toml")
+    assert status == 2
+    assert "rubber.k_Pa" in err
+    assert not (tmp_path / "third.toml").exists()
