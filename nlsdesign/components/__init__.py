@@ -6,6 +6,7 @@ from .cable import StretchyCable
 from .cam import Cam, Pulley, TwoSidedCam, control_values
 from .contact import InextensibleCable
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
+from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .hysteresis import SlidingFillers
@@ -14,6 +15,8 @@ from .part import Part
 from .play import Backlash, Slack, Turned
 from .sensors import CurrentSensor, DelayedForceSensor, Encoder, ForceSensor, Sensor
 from .slide import ConstantForce, LinearDrive, SlidingFriction
+from .sampling import SampleAndHold, SampledEncoder, Tachometer
+from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
 from .tie import Tie, tie
 
@@ -31,6 +34,7 @@ __all__ = [
     "Dashpot",
     "DelayedForceSensor",
     "Domain",
+    "DriftingForceSensor",
     "Driven",
     "DrivenPoint",
     "Element",
@@ -50,6 +54,8 @@ __all__ = [
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "SampleAndHold",
+    "SampledEncoder",
     "Sensor",
     "Series",
     "Slack",
@@ -61,11 +67,14 @@ __all__ = [
     "StrainStiffening",
     "StretchyCable",
     "StribeckFriction",
+    "Tachometer",
     "Through",
     "Tie",
     "TorqueRipple",
+    "TorqueSensor",
     "TorsionDashpot",
     "TorsionSpring",
+    "TransportDelay",
     "Turned",
     "TwoSidedCam",
     "ViscousMaterial",

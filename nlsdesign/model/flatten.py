@@ -17,7 +17,7 @@ from ..components.element import observed_effort
 from ..components.part import Part
 from ..components.sensors import Sensor
 from ..components.tie import Tie
-from ..errors import ArrangementError, unknown_name
+from ..errors import ArrangementError, UnitError, nearest, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
 
@@ -209,16 +209,22 @@ def _write_mechanics(assembly: Assembly, ledger: Ledger) -> None:
 
 
 def _write_sensors(assembly: Assembly, ledger: Ledger) -> None:
-    for name, part in assembly.parts:
-        if isinstance(part, Sensor):
-            known = ledger.named()
-            if part.of not in known:
-                raise unknown_name(f"sensor '{name}' reads", part.of, known)
-            unit = _variable_of(ledger, part.of).unit
-            scope = PartScope(ledger, name)
-            scope.signal(
-                "reading", part.read(scope, known[part.of]), unit, f"reading of {name}, which sees {part.of}"
+    for name, part in assembly.sensors().items():
+        known = ledger.named()
+        if part.of not in known:
+            raise unknown_name(f"sensor '{name}' reads", part.of, known)
+        unit = _variable_of(ledger, part.of).unit
+        if not part.sees(unit):
+            fitting = [n for n in known if part.sees(_variable_of(ledger, n).unit)]
+            raise UnitError(
+                f"sensor '{name}' of '{part.of}'",
+                f"{type(part).__name__} reads {' or '.join(part.units)}, '{part.of}' is in {unit}",
+                did_you_mean=nearest(part.of, fitting),
+                next_step=f"read one of: {', '.join(fitting) or 'nothing here has such a unit'}",
             )
+        reading = part.read(PartScope(ledger, name), known[part.of], unit)
+        about = f"reading of {name}, which sees {part.of}"
+        PartScope(ledger, name).signal("reading", reading, part.reading_unit(unit), about)
 
 
 def _variable_of(ledger: Ledger, name: str) -> Variable:

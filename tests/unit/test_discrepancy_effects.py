@@ -8,9 +8,9 @@ import pytest
 
 from nlsdesign.components import (
     Assembly,
-    ForceSensor,
     Inertia,
     Spring,
+    TorqueSensor,
     TorsionSpring,
     assembly,
     parallel,
@@ -126,7 +126,7 @@ def test_a_wrapper_takes_its_place_among_its_neighbours() -> None:
         "two",
         wheel=Inertia(inertia=1e-3),
         spring=tie(both, "wheel"),
-        cell=ForceSensor(of="spring.left.torque"),
+        cell=TorqueSensor(of="spring.left.torque"),
     )
     found = wrapped(declared, "spring.left", "pair", lambda name, old: parallel(**{name: old}))
     assert [path for path, _ in found.walk()][:5] == [

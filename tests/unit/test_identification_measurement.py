@@ -10,10 +10,9 @@ import pytest
 
 from nlsdesign.components import (
     Assembly,
-    CurrentSensor,
     Encoder,
-    ForceSensor,
     Inertia,
+    TorqueSensor,
     TorsionSpring,
     assembly,
     tie,
@@ -36,7 +35,7 @@ def wheel(**sensors: object) -> Assembly:
 def model() -> FlatModel:
     return flatten(
         wheel(
-            encoder=Encoder(of="wheel.angle", quantum=1e-3), cell=ForceSensor(of="spring.torque", noise=0.01)
+            encoder=Encoder(of="wheel.angle", quantum=1e-3), cell=TorqueSensor(of="spring.torque", noise=0.01)
         )
     )
 
@@ -112,8 +111,8 @@ def test_a_table_without_time_is_not_a_record(folder: Path, model: FlatModel) ->
 def test_heads_with_units_need_no_mapping(tmp_path: Path) -> None:
     rig = wheel(
         encoder=Encoder(of="wheel.angle", quantum=1e-3),
-        cell=ForceSensor(of="spring.torque"),
-        meter=CurrentSensor(of="wheel.torque"),
+        cell=TorqueSensor(of="spring.torque"),
+        meter=TorqueSensor(of="wheel.torque"),
     )
     write(tmp_path, "a", table(), ("time [s]", "theta_deg", "cell.reading [N*m]"))
     found = load_records(tmp_path, flatten(rig))

@@ -22,6 +22,7 @@ from nlsdesign.components import (
     DrivenPoint,
     Encoder,
     ForceSensor,
+    GearedMotor,
     Inertia,
     Spring,
     assembly,
@@ -53,8 +54,9 @@ def test_load_cell_and_ammeter_are_lines_and_their_inverse_is_exact() -> None:
     cell = ForceSensor(of="spring.force", gain=1.02, bias=-3.0)
     model = flatten(pulled(cell=cell))
     assert model.evaluate([], [0.01, 0.0])["cell.reading"] == pytest.approx(1.02 * 10.0 - 3.0)
-    meter = CurrentSensor(of="wheel.torque", bias=0.1)
-    one = flatten(assembly("a", wheel=Inertia(inertia=1.0), meter=meter))
+    meter = CurrentSensor(of="motor.current", bias=0.1)
+    motor = GearedMotor(inertia=1.0, gear_ratio=1.0, torque_constant=0.1)
+    one = flatten(assembly("a", motor=motor, meter=meter))
     assert one.evaluate([0.0, 0.0], [2.0])["meter.reading"] == pytest.approx(2.1)
     for sensor, reading, value in ((cell, 7.2, 10.0), (meter, 2.1, 2.0)):
 

@@ -1,0 +1,33 @@
+"""One instance of each sensor, motor, gear, cam and cable."""
+
+from __future__ import annotations
+
+from nlsdesign.components import (
+    CurrentSensor,
+    DelayedForceSensor,
+    DriftingForceSensor,
+    Encoder,
+    ForceSensor,
+    Part,
+    SampleAndHold,
+    SampledEncoder,
+    Tachometer,
+    TorqueSensor,
+    TransportDelay,
+)
+
+EXAMPLES: dict[type[Part], Part] = {
+    type(part): part
+    for part in (
+        Encoder(of="motor.angle", quantum=0.767e-3),
+        SampledEncoder(of="motor.angle", quantum=0.767e-3, sample_rate=1000.0),
+        Tachometer(of="motor.angle", bandwidth=60.0, sample_rate=1000.0),
+        SampleAndHold(of="motor.speed", sample_rate=1000.0),
+        TransportDelay(of="motor.speed", delay=1e-3),
+        ForceSensor(of="spring.force", gain=1.02, bias=-0.4, noise=0.2),
+        DelayedForceSensor(of="spring.force", gain=1.02, bias=-0.4, noise=0.2, delay=2e-3),
+        DriftingForceSensor(of="spring.force", gain=1.02, bias=-0.4, noise=0.2, drift=0.01),
+        TorqueSensor(of="spring.torque", gain=0.98, bias=0.01, noise=0.005),
+        CurrentSensor(of="motor.current", bias=0.02, noise=0.04),
+    )
+}
