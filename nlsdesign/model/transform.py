@@ -85,8 +85,8 @@ def with_signal(
     >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring)
     >>> energy = Variable("spring.energy", "J", "energy stored in the spring")
     >>> half = lambda n: n["spring.torque"] * n["wheel.angle"] / 2
-    >>> with_signal(flatten(swing), energy, half).evaluate([0.1, 0.0])["spring.energy"]
-    0.01
+    >>> with_signal(flatten(swing), energy, half).evaluate([0.5, 0.0])["spring.energy"]
+    0.25
     """
     s = model.symbols()
     known = named(model, s)
