@@ -13,10 +13,9 @@ from .hysteresis import SlidingFillers
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
 from .play import Backlash, Slack, Turned
-from .sensors import CurrentSensor, DelayedForceSensor, Encoder, ForceSensor, Sensor
-from .slide import ConstantForce, LinearDrive, SlidingFriction
 from .sampling import SampleAndHold, SampledEncoder, Tachometer
 from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
+from .slide import ConstantForce, LinearDrive, SlidingFriction
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
 from .tie import Tie, tie
 

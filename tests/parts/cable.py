@@ -24,9 +24,9 @@ EXAMPLES: dict[type[Part], Part] = {
         Tachometer(of="motor.angle", bandwidth=60.0, sample_rate=1000.0),
         SampleAndHold(of="motor.speed", sample_rate=1000.0),
         TransportDelay(of="motor.speed", delay=1e-3),
-        ForceSensor(of="spring.force", gain=1.02, bias=-0.4, noise=0.2),
-        DelayedForceSensor(of="spring.force", gain=1.02, bias=-0.4, noise=0.2, delay=2e-3),
-        DriftingForceSensor(of="spring.force", gain=1.02, bias=-0.4, noise=0.2, drift=0.01),
+        ForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2),
+        DelayedForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, delay=2e-3),
+        DriftingForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, drift=0.01),
         TorqueSensor(of="spring.torque", gain=0.98, bias=0.01, noise=0.005),
         CurrentSensor(of="motor.current", bias=0.02, noise=0.04),
     )
