@@ -130,3 +130,17 @@ def test_another_rig_needs_only_what_its_makers_declare(
     assert status == 2
     assert "rubber.k_Pa" in err
     assert not (tmp_path / "third.toml").exists()
+
+
+def test_every_part_that_a_deck_can_name_is_listed_with_its_law(run: Run) -> None:
+    status, out, _ = run("parts", "--json")
+    listed = json.loads(out)
+    assert status == 0
+    assert listed["TwoSidedCam"]["kind"] == "cam"
+    assert all(entry["law"] for entry in listed.values())
+    _, out, _ = run("parts", "StribeckFriction")
+    assert "Source:" in out
+    assert "stribeck_speed" in out
+    status, _, err = run("parts", "StribekFriction")
+    assert status == 2
+    assert "did you mean 'StribeckFriction'?" in err

@@ -1,0 +1,67 @@
+"""``nlsdesign parts``: what a deck can be made of."""
+
+from __future__ import annotations
+
+import inspect
+import math
+
+import click
+
+from ..components import Body, Cam, Element, Part, Sensor
+from ..components.part import ParameterInfo
+from ..components.reading import component_classes
+from ..errors import unknown_name
+from .output import json_option, show_json, show_table
+
+_KINDS: dict[str, type[Part]] = {"element": Element, "body": Body, "cam": Cam, "sensor": Sensor}
+
+
+@click.command()
+@click.argument("name", metavar="[PART]", required=False)
+@json_option
+def parts(name: str | None, as_json: bool) -> None:
+    """List the parts that a deck can name, or show one: its law, source and numbers."""
+    known = component_classes()
+    if name is None:
+        rows = sorted((_kind(c), n, _law(c)) for n, c in known.items())
+        if as_json:
+            show_json({n: {"kind": kind, "law": law} for kind, n, law in rows})
+        else:
+            show_table("Parts", ("kind", "part", "law"), rows)
+        return
+    if name not in known:
+        raise unknown_name("part", name, known)
+    infos = known[name].parameter_infos()
+    if as_json:
+        show_json({"kind": _kind(known[name]), "law": inspect.getdoc(known[name]), "numbers": _plain(infos)})
+        return
+    click.echo(f"{name} ({_kind(known[name])})\n\n{inspect.getdoc(known[name])}\n")
+    columns = ("name", "unit", "from", "to", "meaning")
+    rows = [(n, i.unit, f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()]
+    show_table("Numbers", columns, rows)
+
+
+def _kind(part: type[Part]) -> str:
+    return next(word for word, base in _KINDS.items() if issubclass(part, base))
+
+
+def _law(part: type[Part]) -> str:
+    return (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
+
+
+def _meaning(info: ParameterInfo) -> str:
+    return info.description + (" (a row)" if info.row else "")
+
+
+def _plain(infos: dict[str, ParameterInfo]) -> dict[str, dict[str, object]]:
+    # JSON knows no infinity.
+    return {
+        n: {
+            "unit": i.unit,
+            "minimum": i.minimum if math.isfinite(i.minimum) else None,
+            "maximum": i.maximum if math.isfinite(i.maximum) else None,
+            "meaning": i.description,
+            "row": i.row,
+        }
+        for n, i in infos.items()
+    }
