@@ -9,6 +9,7 @@ from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
+from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
@@ -38,16 +39,20 @@ __all__ = [
     "DrivenPoint",
     "Element",
     "Encoder",
+    "ExtendedTube",
     "Fixed",
     "FixedPoint",
     "ForceSensor",
     "GearedMotor",
+    "Hyperelastic",
     "Inertia",
     "InextensibleCable",
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
     "Mass",
+    "NeoHooke",
+    "Ogden",
     "Parallel",
     "Part",
     "PullOnly",
@@ -77,6 +82,7 @@ __all__ = [
     "Turned",
     "TwoSidedCam",
     "ViscousMaterial",
+    "Yeoh",
     "assembly",
     "control_values",
     "parallel",

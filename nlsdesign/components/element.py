@@ -6,10 +6,11 @@ decides the causality: ``needs_rate`` says whether the effort depends directly o
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Protocol, Self, TypeAlias
 
 import casadi as ca
 
@@ -44,6 +45,9 @@ MATERIAL = Domain("strain", "1", "strain_rate", "1/s", "stress", "Pa")
 TRANSLATION = Domain("extension", "m", "rate", "m/s", "force", "N")
 ROTATION = Domain("angle", "rad", "speed", "rad/s", "torque", "N*m")
 
+Range: TypeAlias = tuple[float, float]
+UNBOUNDED: Range = (-math.inf, math.inf)
+
 
 class Scope(Protocol):
     """What an element sees of the model that is being written: its own names, nothing else."""
@@ -74,8 +78,10 @@ class Scope(Protocol):
         """Give the derivative of a state."""
         ...
 
-    def signal(self, name: str, value: Expression, unit: str, description: str) -> None:
-        """Give a name to an expression."""
+    def signal(
+        self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
+    ) -> None:
+        """Give a name to an expression, and the range in which the law behind it is stated to hold."""
         ...
 
     def define(self, unknown: Expression, solution: Expression) -> None:
@@ -109,6 +115,11 @@ class Element(Part):
     def needs_rate(self) -> bool:
         """Whether the effort depends directly on the rate of the motion."""
 
+    @property
+    def valid(self) -> Range:
+        """Least and greatest motion for which the law is stated to hold; results name it when it is left."""
+        return UNBOUNDED
+
     @abstractmethod
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the effort at a motion and its rate.
@@ -132,7 +143,8 @@ def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Ex
     """
     effort = element.effort(scope, motion, rate)
     domain = element.domain
-    scope.signal(domain.motion, motion, domain.motion_unit, f"{domain.motion} of {scope.path}")
+    meaning = f"{domain.motion} of {scope.path}"
+    scope.signal(domain.motion, motion, domain.motion_unit, meaning, valid=element.valid)
     scope.signal(domain.effort, effort, domain.effort_unit, f"{domain.effort} of {scope.path}")
     return effort
 

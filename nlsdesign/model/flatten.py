@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import casadi as ca
 
 from ..components.assembly import Assembly
 from ..components.bodies import Body, Motion
-from ..components.element import observed_effort
+from ..components.element import UNBOUNDED, Range, observed_effort
 from ..components.part import Part
 from ..components.sensors import Sensor
 from ..components.tie import Tie
@@ -123,11 +124,20 @@ class PartScope:
         """Give the derivative of a state."""
         self._ledger.derivatives[state.name()] = derivative
 
-    def signal(self, name: str, value: Expression, unit: str, description: str) -> None:
-        """Give a name to an expression, unless a state or input of that name says the same."""
+    def signal(
+        self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
+    ) -> None:
+        """Give a name to an expression; of a state or input of that name, only the range is noted."""
         full = f"{self.path}.{name}"
-        if full not in self._ledger.states and full not in self._ledger.inputs:
-            self._ledger.signals[full] = (Variable(full, unit, description), ca.SX(value))
+        low, high = valid
+        for group in (self._ledger.states, self._ledger.inputs):
+            if full in group:
+                variable, symbol = group[full]
+                if valid != UNBOUNDED:
+                    group[full] = (replace(variable, minimum=low, maximum=high), symbol)
+                return
+        variable = Variable(full, unit, description, minimum=low, maximum=high)
+        self._ledger.signals[full] = (variable, ca.SX(value))
 
     def define(self, unknown: Expression, solution: Expression) -> None:
         """Give the solution of an unknown."""

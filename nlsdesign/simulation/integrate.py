@@ -16,7 +16,7 @@ from ..model import FlatModel
 from .drives import Drive, Drives, drives_of
 from .runge_kutta import TooStiffError, integrate_explicitly
 from .stiff import integrate_implicitly
-from .trace import Trace
+from .trace import Trace, range_warnings
 
 Array = NDArray[np.float64]
 
@@ -132,7 +132,8 @@ def _evaluated(model: FlatModel, times: Array, x: Array, u: Array) -> Trace:
         values = np.array(rows)
         signals |= {v.name: values[i] for i, v in enumerate(group)}
     everything = model.signals + model.outputs + model.inputs + model.states
-    return Trace(times, signals, {v.name: v.unit for v in everything}, model.name)
+    warnings = range_warnings(model.signals + model.states, times, signals)
+    return Trace(times, signals, {v.name: v.unit for v in everything}, model.name, warnings)
 
 
 def _check_residuals(model: FlatModel, times: Array, residuals: Array) -> None:

@@ -3,18 +3,86 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeasurementError, unknown_name
+from ..model import Variable
 
 Array = NDArray[np.float64]
+_ROUNDING = 1e-9
+"""Relative to the nominal size."""
+
+
+class RangeWarning(NamedTuple):
+    """A signal that left the range in which the law behind it is stated to hold.
+
+    Parameters
+    ----------
+    name, unit
+        Of the signal.
+    time
+        Of the first sample outside, in s.
+    furthest
+        Value furthest outside.
+    minimum, maximum
+        The range.
+    """
+
+    name: str
+    unit: str
+    time: float
+    furthest: float
+    minimum: float
+    maximum: float
+
+    def __str__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return (
+            f"{self.name} leaves [{self.minimum:g}, {self.maximum:g}]{unit}, where its law is stated to "
+            f"hold, at t = {self.time:g} s and reaches {self.furthest:g}{unit}"
+        )
+
+
+def range_warnings(
+    variables: Iterable[Variable], time: Array, signals: Mapping[str, Array], prefix: str = ""
+) -> tuple[RangeWarning, ...]:
+    """Return a warning for each variable that leaves its stated range.
+
+    Parameters
+    ----------
+    variables
+        With ranges, for instance the signals and states of a flat model.
+    time
+        Shape (n,), in s.
+    signals
+        Arrays of shape (n,) by name; a variable that is not among them is passed over.
+    prefix
+        What stands before the names of the variables in ``signals``.
+    """
+    found = []
+    for v in variables:
+        values = signals.get(prefix + v.name)
+        if values is None or (math.isinf(v.minimum) and math.isinf(v.maximum)):
+            continue
+        over = np.maximum(v.minimum - values, values - v.maximum)
+        # A strain that should be zero is a rounding error beside it.
+        outside = np.flatnonzero(over > _ROUNDING * v.nominal)
+        if outside.size:
+            first, worst = int(outside[0]), int(np.argmax(over))
+            found.append(
+                RangeWarning(
+                    prefix + v.name, v.unit, float(time[first]), float(values[worst]), v.minimum, v.maximum
+                )
+            )
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +99,15 @@ class Trace:
         SI unit of each signal by name.
     name
         For messages and legends.
+    warnings
+        Signals that left the range in which their law is stated to hold.
     """
 
     time: Array
     signals: Mapping[str, Array]
     units: Mapping[str, str]
     name: str = ""
+    warnings: tuple[RangeWarning, ...] = ()
 
     def __post_init__(self) -> None:
         for signal, values in self.signals.items():
@@ -65,6 +136,13 @@ class Trace:
     def __len__(self) -> int:
         """Return the number of samples."""
         return len(self.time)
+
+    def __str__(self) -> str:
+        head = (
+            f"Trace {self.name}: {len(self.signals)} signals, {len(self)} samples "
+            f"from {self.time[0]:g} s to {self.time[-1]:g} s"
+        )
+        return "\n".join([head, *(f"  warning: {each}" for each in self.warnings)])
 
     def with_signals(self, signals: Mapping[str, Array], units: Mapping[str, str]) -> Trace:
         """Return a copy with more (or other) signals.

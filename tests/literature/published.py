@@ -81,3 +81,28 @@ TARGET_TORQUE, TARGET_ANGLE = 5.0, np.radians(53.0)
 
 SOFT_STIFFNESS, STIFF_STIFFNESS = 1.7, 3.4
 """IROS 2015: the two linear springs, N·m/rad."""
+
+TRELOAR_TENSION = np.array(
+    [
+        (1.02, 0.26), (1.125, 1.37), (1.24, 2.30), (1.39, 3.23), (1.585, 4.16), (1.90, 5.10),
+        (2.18, 6.00), (2.42, 6.90), (3.02, 8.80), (3.57, 10.7), (4.03, 12.5), (4.76, 16.2),
+        (5.36, 19.9), (5.75, 23.6), (6.15, 27.4), (6.40, 31.0), (6.60, 34.8), (6.85, 38.5),
+        (7.05, 42.1), (7.15, 45.8), (7.25, 49.6), (7.40, 53.3), (7.50, 57.0), (7.60, 64.4),
+    ]
+)  # fmt: skip
+"""Treloar, L. R. G.: Stress-strain data for vulcanised rubber under various types of deformation. Trans.
+Faraday Soc. 40, 1944: simple elongation of natural rubber with 8 % sulphur; stretch and nominal stress in
+kgf/cm². The points as they are tabulated in the documentation of FElupe (Dutzler 2022)."""
+
+KILOGRAM_FORCE_PER_SQUARE_CENTIMETRE = 98066.5
+"""In Pa."""
+
+TRELOAR_SHEAR_MODULUS = 4.0
+"""Treloar 1944: modulus of the Gaussian network that he draws through the points, in kgf/cm²."""
+
+OGDEN_1972 = ((6.3, 0.012, -0.1), (1.3, 5.0, -2.0))
+"""Ogden, R. W.: Large deformation isotropic elasticity. Proc. R. Soc. A 326, 1972: moduli in kgf/cm² and
+exponents for Treloar's rubber, from tension, pure shear and equibiaxial tension together."""
+
+EXTENDED_TUBE_FIT = (0.1867e6, 0.2169e6, 0.2, 0.09693)
+"""G_c and G_e in Pa, β and δ for Treloar's rubber; example of the documentation of FElupe (Dutzler 2022)."""

@@ -1,0 +1,13 @@
+"""Independent roads of rubber."""
+
+from __future__ import annotations
+
+from nlsdesign import components as c
+from tests.physics.table import Row
+
+_ENERGY = "test_hyperelastic.py::test_work_put_in_is_the_energy_of_the_paper"
+_ROADS = ("quadrature of the stress", "strain energy of the paper in the principal stretches")
+
+ROWS: tuple[Row, ...] = tuple(
+    Row(law, "work = stored energy", _ROADS, _ENERGY) for law in (c.NeoHooke, c.Yeoh, c.Ogden, c.ExtendedTube)
+)
