@@ -17,7 +17,9 @@ from .play import Backlash, Slack, Turned
 from .sampling import SampleAndHold, SampledEncoder, Tachometer
 from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .slide import ConstantForce, LinearDrive, SlidingFriction
+from .springpot import Springpot
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
+from .standard import burgers, generalised_maxwell, kelvin_voigt, maxwell, standard_linear_solid
 from .tie import Tie, tie
 
 __all__ = [
@@ -68,6 +70,7 @@ __all__ = [
     "SmoothStrainStiffening",
     "Specimen",
     "Spring",
+    "Springpot",
     "StrainStiffening",
     "StretchyCable",
     "StribeckFriction",
@@ -84,11 +87,16 @@ __all__ = [
     "ViscousMaterial",
     "Yeoh",
     "assembly",
+    "burgers",
     "control_values",
+    "generalised_maxwell",
+    "kelvin_voigt",
+    "maxwell",
     "parallel",
     "pull_only",
     "series",
     "specimen",
+    "standard_linear_solid",
     "through",
     "tie",
 ]

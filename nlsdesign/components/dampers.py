@@ -19,6 +19,11 @@ class Viscous(Element):
         """True: the effort depends directly on the rate."""
         return True
 
+    @property
+    def dissipates(self) -> bool:
+        """True: nothing is stored."""
+        return True
+
 
 @dataclass(frozen=True, kw_only=True)
 class Dashpot(Viscous):

@@ -84,6 +84,14 @@ class Scope(Protocol):
         """Give a name to an expression, and the range in which the law behind it is stated to hold."""
         ...
 
+    def loss(self, power: Expression) -> None:
+        """Note power that turns into heat inside the part, in effort times rate."""
+        ...
+
+    def losses(self) -> Expression:
+        """Return the sum of what the part and all parts inside it have noted as lost."""
+        ...
+
     def define(self, unknown: Expression, solution: Expression) -> None:
         """Give the solution of an unknown that stands in expressions given before."""
         ...
@@ -116,6 +124,11 @@ class Element(Part):
         """Whether the effort depends directly on the rate of the motion."""
 
     @property
+    def dissipates(self) -> bool:
+        """Whether all power that goes into the element is lost in it; other laws say :meth:`Scope.loss`."""
+        return False
+
+    @property
     def valid(self) -> Range:
         """Least and greatest motion for which the law is stated to hold; results name it when it is left."""
         return UNBOUNDED
@@ -143,6 +156,8 @@ def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Ex
     """
     effort = element.effort(scope, motion, rate)
     domain = element.domain
+    if element.dissipates:
+        scope.loss(effort * rate)
     meaning = f"{domain.motion} of {scope.path}"
     scope.signal(domain.motion, motion, domain.motion_unit, meaning, valid=element.valid)
     scope.signal(domain.effort, effort, domain.effort_unit, f"{domain.effort} of {scope.path}")

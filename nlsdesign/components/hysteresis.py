@@ -54,5 +54,6 @@ class SlidingFillers(Element):
             ratio = ca.fmin(ca.fabs(stress) / (share * limit), _MOST_OVERSHOOT)
             loading = ca.if_else(stress * rate > 0, ratio**4, 0)
             scope.derive(stress, modulus * rate * (1 - loading))
+            scope.loss(stress * rate * loading)
             total += stress
         return total

@@ -38,6 +38,7 @@ class Ledger:
         self.unknowns = ca.SX(0, 1)
         self.solutions = ca.SX(0, 1)
         self.checks: dict[str, Expression] = {}
+        self.losses: list[tuple[str, Expression]] = []
         self.order = {path: number for number, (path, _) in enumerate(assembly.walk())}
         for path, part in assembly.walk():
             self._declare(path, part)
@@ -139,6 +140,15 @@ class PartScope:
         variable = Variable(full, unit, description, minimum=low, maximum=high)
         self._ledger.signals[full] = (variable, ca.SX(value))
 
+    def loss(self, power: Expression) -> None:
+        """Note power that turns into heat inside the part."""
+        self._ledger.losses.append((f"{self.path}.", power))
+
+    def losses(self) -> Expression:
+        """Return the sum of what the part and all parts inside it have noted as lost."""
+        inside = [power for path, power in self._ledger.losses if path.startswith(f"{self.path}.")]
+        return sum(inside, start=ca.SX(0))
+
     def define(self, unknown: Expression, solution: Expression) -> None:
         """Give the solution of an unknown."""
         self._ledger.define(unknown, solution)
@@ -161,7 +171,7 @@ class PartScope:
     def rate_is_used(self, rate: Expression) -> bool:
         """Tell whether anything given so far contains this symbol."""
         given = [*self._ledger.derivatives.values(), *(e for _, e in self._ledger.signals.values())]
-        given.append(self._ledger.solutions)
+        given += [self._ledger.solutions, *(power for _, power in self._ledger.losses)]
         return any(depends(e, rate) for e in given)
 
 
