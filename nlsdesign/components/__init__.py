@@ -10,7 +10,9 @@ from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
+from .gear import Gear, LossyGear
 from .hysteresis import SlidingFillers
+from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
 from .play import Backlash, Slack, Turned
@@ -32,6 +34,7 @@ __all__ = [
     "Cam",
     "ConstantForce",
     "CoulombFriction",
+    "CurrentDrivenMotor",
     "CurrentSensor",
     "Dashpot",
     "DelayedForceSensor",
@@ -39,12 +42,14 @@ __all__ = [
     "DriftingForceSensor",
     "Driven",
     "DrivenPoint",
+    "ElectricMotor",
     "Element",
     "Encoder",
     "ExtendedTube",
     "Fixed",
     "FixedPoint",
     "ForceSensor",
+    "Gear",
     "GearedMotor",
     "Hyperelastic",
     "Inertia",
@@ -52,6 +57,7 @@ __all__ = [
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
+    "LossyGear",
     "Mass",
     "NeoHooke",
     "Ogden",
@@ -86,6 +92,7 @@ __all__ = [
     "TwoSidedCam",
     "ViscousMaterial",
     "Yeoh",
+    "VoltageDrivenMotor",
     "assembly",
     "burgers",
     "control_values",

@@ -1,4 +1,4 @@
-"""An assembly: bodies, elements tied between them, and sensors, all by name."""
+"""An assembly: bodies, elements tied and gears set between them, and sensors, all by name."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ..quantity import Quantity
 from .bodies import Body, Fixed
 from .drawing import draw
 from .element import Element
+from .gear import Gear, gear_problems
 from .part import Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from .sensors import Sensor
 from .tie import Tie
@@ -25,7 +26,7 @@ class Assembly:
     name
         Short name; also that of generated code.
     parts
-        Pairs of name and body, tie or sensor, in written order.
+        Pairs of name and body, gear, tie or sensor, in written order.
     description
         One sentence.
     """
@@ -171,15 +172,16 @@ def arrangement_problems(
         if isinstance(part, Tie):
             if not set(unsure) & set(part.between):
                 yield from ((name, error) for error in _tie_problems(name, part, bodies))
-        elif not isinstance(part, Body | Sensor):
+        elif not isinstance(part, Body | Sensor | Gear):
             yield (
                 name,
                 ArrangementError(
                     f"part '{name}'",
-                    f"is a {type(part).__name__}; an assembly holds bodies, ties and sensors",
+                    f"is a {type(part).__name__}; an assembly holds bodies, gears, ties and sensors",
                     next_step="tie an element to bodies with tie(element, 'motor', 'load')",
                 ),
             )
+    yield from gear_problems(parts, unsure)
 
 
 def _tie_problems(name: str, part: Tie, bodies: Mapping[str, Body]) -> Iterator[NlsError]:
@@ -214,6 +216,6 @@ def assembly(name: str, *, description: str = "", **parts: Any) -> Assembly:
     description
         One sentence.
     **parts
-        Bodies, ties and sensors by name.
+        Bodies, gears, ties and sensors by name.
     """
     return Assembly(name, tuple(parts.items()), description)

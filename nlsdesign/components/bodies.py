@@ -56,7 +56,7 @@ class Free(Body):
         )
 
     @abstractmethod
-    def drive(self, scope: Scope) -> Expression:
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the effort that acts on the body from outside, in the unit of the domain."""
 
     @abstractmethod
@@ -65,7 +65,7 @@ class Free(Body):
 
     def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
         """Newton: inertia × acceleration = sum of efforts."""
-        acceleration = (self.drive(scope) + effort) / self.inertia_of(scope)
+        acceleration = (self.drive(scope, motion) + effort) / self.inertia_of(scope)
         scope.derive(motion.motion, motion.rate)
         scope.derive(motion.rate, acceleration)
         scope.signal(
@@ -84,7 +84,7 @@ class Inertia(Free):
         """Rotation."""
         return ROTATION
 
-    def drive(self, scope: Scope) -> Expression:
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the torque from outside, an input."""
         return scope.input("torque", "N*m", f"torque on {scope.path} from outside")
 
@@ -104,7 +104,7 @@ class Mass(Free):
         """Translation."""
         return TRANSLATION
 
-    def drive(self, scope: Scope) -> Expression:
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the force from outside, an input."""
         return scope.input("force", "N", f"force on {scope.path} from outside")
 
@@ -133,7 +133,7 @@ class GearedMotor(Free):
         """Rotation."""
         return ROTATION
 
-    def drive(self, scope: Scope) -> Expression:
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return n·k_T·I with the current held within its limit."""
         limit = scope.parameter("current_limit")
         current = ca.fmin(ca.fmax(scope.input("current", "A", f"current of {scope.path}"), -limit), limit)

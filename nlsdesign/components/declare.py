@@ -14,6 +14,7 @@ from ..errors import DeckError, NlsError, nearest
 from ..quantity import Quantity, parse_unit
 from .assembly import Assembly, arrangement_problems
 from .element import Element
+from .gear import Gear
 from .part import Part
 from .reading import Builder
 from .sensors import Sensor
@@ -85,9 +86,10 @@ def deck_text(assembly: Assembly) -> str:
     """
     lines = ["[deck]", f"name = {_string(assembly.name)}", f"description = {_string(assembly.description)}"]
     for name, part in assembly.parts:
-        if isinstance(part, Tie):
+        if isinstance(part, Tie | Gear):
             ends = ", ".join(_string(end) for end in part.between)
-            lines += _table(name, part.element, [f"between = [{ends}]"])
+            inner = part.element if isinstance(part, Tie) else part
+            lines += _table(name, inner, [f"between = [{ends}]"])
         else:
             lines += _table(name, part, [f"of = {_string(part.of)}"] if isinstance(part, Sensor) else [])
     return "\n".join(lines) + "\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .gear import Gear
 from .part import Part
 from .sensors import Sensor
 from .tie import Tie
@@ -17,7 +18,7 @@ def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
     title
         First line.
     parts
-        Pairs of name and body, tie or sensor.
+        Pairs of name and body, gear, tie or sensor.
     """
     lines = [title]
     for name, part in parts:
@@ -25,6 +26,8 @@ def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
             ends = " ── ".join((part.between[0], f"[{name}]", *(part.between[1:] or ("frame",))))
             lines.append(f"  {ends}   {part.element.title()}")
             lines += _branches(part.element, "    ")
+        elif isinstance(part, Gear):
+            lines.append(f"  {part.between[0]} ══ [{name}] ══ {part.between[1]}   {part.title()}")
         elif isinstance(part, Sensor):
             lines.append(f"  {name} ◁ {part.of}   {part.title()}")
         else:

@@ -12,6 +12,7 @@ from ..errors import DeckError, NlsError, nearest, unknown_name
 from ..quantity import Quantity
 from .bodies import Body
 from .element import Combination, Element
+from .gear import Gear
 from .networks import Through
 from .part import Part
 from .sensors import Sensor
@@ -181,10 +182,12 @@ class Builder:
         kind = self.classes[name]
         if issubclass(kind, Sensor) and not isinstance(table.get("of"), str):
             self._problem(path, f"{name} needs 'of'", next_step='add of = "...", the signal that it reads')
+        if issubclass(kind, Gear) and not _is_pair(table.get("between")):
+            self._problem(path, f"{name} needs 'between'", next_step='add between = ["motor", "wheel"]')
         return kind
 
     def _keys(self, path: str, kind: type[Part]) -> list[str]:
-        tied = issubclass(kind, Element) and "." not in path
+        tied = (issubclass(kind, Element) and "." not in path) or issubclass(kind, Gear)
         return ["component"] + ["between"] * tied + ["of"] * issubclass(kind, Sensor)
 
     def _problem(
@@ -199,6 +202,10 @@ def _is_part(raw: object) -> bool:
     return isinstance(raw, dict) and ("component" in raw or not set(raw) & set(NUMBER_FIELDS))
 
 
+def _is_pair(raw: object) -> bool:
+    return isinstance(raw, list) and len(raw) == 2 and all(isinstance(end, str) for end in raw)
+
+
 def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str, Part]) -> dict[str, Any]:
     """Return the fields of a part that are not numbers."""
     if issubclass(kind, Combination):
@@ -208,4 +215,6 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
         if "cam" not in children or len(behind) != 1:
             raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
         return {"cam": children["cam"], "behind": behind[0]}
+    if issubclass(kind, Gear):
+        return {"between": tuple(table["between"])}
     return {"of": table["of"]} if issubclass(kind, Sensor) else {}

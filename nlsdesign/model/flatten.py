@@ -21,6 +21,7 @@ from ..components.tie import Tie
 from ..errors import ArrangementError, UnitError, nearest, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
+from .train import balance_train, train_motions, trains
 
 TYPICAL_SIZE = {"m": 1e-2, "m/s": 0.1, "N": 10.0, "Pa": 1e5}
 """Nominal size of a state by its unit, where one of the unit is far off; for tolerances and scaling."""
@@ -213,19 +214,26 @@ def flatten(
 
 def _write_mechanics(assembly: Assembly, ledger: Ledger) -> None:
     bodies = {name: part for name, part in assembly.parts if isinstance(part, Body)}
-    motions = {name: body.motion(PartScope(ledger, name)) for name, body in bodies.items()}
+    scopes = {name: PartScope(ledger, name) for name, _ in assembly.parts}
+    geared = trains(assembly)
+    followers = {w.name for lead, train in geared.items() for w in train.wheels() if w.name != lead}
+    motions = {name: b.motion(scopes[name]) for name, b in bodies.items() if name not in followers}
+    turning = {lead: train_motions(train, scopes, motions[lead]) for lead, train in geared.items()}
+    motions |= {name: motion for found in turning.values() for name, (motion, _) in found.items()}
     sums = {name: ca.SX(0) for name in bodies}
     rest = Motion(ca.SX(0), ca.SX(0))
     for name, part in assembly.parts:
         if not isinstance(part, Tie):
             continue
         one, other = motions[part.between[0]], (motions[part.between[1]] if len(part.between) > 1 else rest)
-        scope = PartScope(ledger, name)
-        effort = observed_effort(part.element, scope, one.motion - other.motion, one.rate - other.rate)
+        effort = observed_effort(part.element, scopes[name], one.motion - other.motion, one.rate - other.rate)
         for sign, body in zip((-1, 1), part.between, strict=False):
             sums[body] += sign * effort
-    for name, turning in bodies.items():
-        turning.balance(PartScope(ledger, name), motions[name], sums[name])
+    for name, turned in bodies.items():
+        if name in geared:
+            balance_train(geared[name], scopes, turning[name], sums)
+        elif name not in followers:
+            turned.balance(scopes[name], motions[name], sums[name])
 
 
 def _write_sensors(assembly: Assembly, ledger: Ledger) -> None:

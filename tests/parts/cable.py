@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
+    CurrentDrivenMotor,
     CurrentSensor,
     DelayedForceSensor,
     DriftingForceSensor,
     Encoder,
     ForceSensor,
+    Gear,
+    LossyGear,
     Part,
     SampleAndHold,
     SampledEncoder,
     Tachometer,
     TorqueSensor,
     TransportDelay,
+    VoltageDrivenMotor,
 )
+
+WINDING = {
+    "inertia": 1.4e-5,
+    "torque_constant": 0.0302,
+    "resistance": 0.3,
+    "current_limit": 20.0,
+    "voltage_limit": 24.0,
+}
 
 EXAMPLES: dict[type[Part], Part] = {
     type(part): part
@@ -29,5 +41,9 @@ EXAMPLES: dict[type[Part], Part] = {
         DriftingForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, drift=0.01),
         TorqueSensor(of="spring.torque", gain=0.98, bias=0.01, noise=0.005),
         CurrentSensor(of="motor.current", bias=0.02, noise=0.04),
+        CurrentDrivenMotor(**WINDING),
+        VoltageDrivenMotor(**WINDING, inductance=8.2e-5),
+        Gear(between=("motor", "wheel"), ratio=4.0),
+        LossyGear(between=("motor", "wheel"), ratio=4.0, efficiency=0.8, back_efficiency=0.7),
     )
 }

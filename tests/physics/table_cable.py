@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
+    CurrentDrivenMotor,
     CurrentSensor,
     DelayedForceSensor,
     DriftingForceSensor,
     Encoder,
     ForceSensor,
+    Gear,
+    LossyGear,
     SampleAndHold,
     SampledEncoder,
     Tachometer,
     TorqueSensor,
     TransportDelay,
+    VoltageDrivenMotor,
 )
 
 from .table import Row
@@ -58,5 +62,39 @@ ROWS: tuple[Row, ...] = (
     Row(
         CurrentSensor, "I + bias", ("record", "arithmetic"),
         "test_sensors.py::test_transducer_and_ammeter_are_lines_in_a_record",
+    ),
+    Row(
+        CurrentDrivenMotor, "torque over speed under current and voltage limit",
+        ("flat model", "line through stall and no-load"),
+        "test_motor_and_gear.py::"
+        "test_torque_over_speed_is_the_line_from_stall_to_no_load_under_the_current_limit",
+    ),
+    Row(
+        VoltageDrivenMotor, "power: electrical = mechanical + heat + ½L·I²",
+        ("simulated power at the terminals", "powers integrated by Simpson's rule"),
+        "test_motor_and_gear.py::test_electrical_power_is_mechanical_power_heat_and_field",
+    ),
+    Row(
+        VoltageDrivenMotor, "poles", ("linearised flat model", "J·L·s² + J·R·s + k² = 0"),
+        "test_motor_and_gear.py::test_the_poles_of_the_motor_are_the_roots_of_its_polynomial",
+    ),
+    Row(
+        Gear, "θ₁ = n·θ₂ and J = n²·J₁ + J₂", ("two bodies and a gear", "one reflected body"),
+        "test_motor_and_gear.py::test_rigidly_geared_inertias_are_one_state_pair_and_the_reflected_motor",
+    ),
+    Row(
+        Gear, "rigid limit", ("gear of n = 1", "very stiff shaft between two state pairs"),
+        "test_motor_and_gear.py::test_a_rigid_gear_is_the_limit_of_a_stiff_shaft",
+    ),
+    Row(
+        LossyGear, "T₂ = n·T₁·s",
+        ("piecewise linear root of the flat model", "trying both directions of power"),
+        "test_motor_and_gear.py::test_a_lossy_gear_between_two_inertias_against_trying_both_directions",
+    ),
+    Row(
+        LossyGear, "power: in = stored + lost, loss ≥ 0",
+        ("simulation", "another integrator, Simpson's rule"),
+        "test_motor_and_gear.py::"
+        "test_a_swing_through_a_lossy_gear_against_another_integrator_and_its_power_balance",
     ),
 )  # fmt: skip
