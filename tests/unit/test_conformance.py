@@ -23,6 +23,7 @@ from nlsdesign.components import (
     Body,
     Cam,
     Element,
+    Gear,
     GearedMotor,
     Inertia,
     Mass,
@@ -67,6 +68,9 @@ def around(part: Part) -> Assembly:
         spring = TorsionSpring(stiffness=3.4) if part.domain == ROTATION else Spring(stiffness=2500.0)
         other = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
         return assembly("bench", part=part, other=other, spring=tie(spring, "part", "other"))
+    if isinstance(part, Gear):
+        bodies = {name: Inertia(inertia=6e-4) for name in part.between}
+        return assembly("bench", **bodies, part=part)
     if isinstance(part, Tie):
         return assembly("bench", shaft=Inertia(inertia=6e-4), part=part)
     if isinstance(part, Cam):
