@@ -7,13 +7,19 @@ import math
 
 import click
 
-from ..components import Body, Cam, Element, Part, Sensor
+from ..components import Body, Cam, Element, Gear, Part, Sensor
 from ..components.part import ParameterInfo
 from ..components.reading import component_classes
 from ..errors import unknown_name
 from .output import json_option, show_json, show_table
 
-_KINDS: dict[str, type[Part]] = {"element": Element, "body": Body, "cam": Cam, "sensor": Sensor}
+_KINDS: dict[str, type[Part]] = {
+    "element": Element,
+    "body": Body,
+    "gear": Gear,
+    "cam": Cam,
+    "sensor": Sensor,
+}
 
 
 @click.command()
@@ -37,8 +43,8 @@ def parts(name: str | None, as_json: bool) -> None:
         return
     click.echo(f"{name} ({_kind(known[name])})\n\n{inspect.getdoc(known[name])}\n")
     columns = ("name", "unit", "from", "to", "meaning")
-    rows = [(n, i.unit, f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()]
-    show_table("Numbers", columns, rows)
+    numbers = [(n, i.unit, f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()]
+    show_table("Numbers", columns, numbers)
 
 
 def _kind(part: type[Part]) -> str:

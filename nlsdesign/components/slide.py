@@ -8,7 +8,7 @@ import casadi as ca
 
 from ..quantity import Quantity
 from ..symbolic import Expression, smooth_sign
-from .bodies import Free
+from .bodies import Free, Motion
 from .dampers import Viscous
 from .element import TRANSLATION, Domain, Scope
 from .part import parameter
@@ -40,7 +40,7 @@ class LinearDrive(Free):
         """Translation."""
         return TRANSLATION
 
-    def drive(self, scope: Scope) -> Expression:
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return g·V with the voltage held within its limit."""
         limit = scope.parameter("voltage_limit")
         voltage = ca.fmin(ca.fmax(scope.input("voltage", "V", f"voltage of {scope.path}"), -limit), limit)
