@@ -8,11 +8,14 @@ from .contact import InextensibleCable
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
+from .encoders import EccentricEncoder
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .gear import Gear, LossyGear
 from .hysteresis import SlidingFillers
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
+from .misshapen import MisshapenCam
+from .motors import DelayedMotor, SaturatingMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
 from .play import Backlash, Slack, Turned
@@ -38,11 +41,13 @@ __all__ = [
     "CurrentSensor",
     "Dashpot",
     "DelayedForceSensor",
+    "DelayedMotor",
     "Domain",
     "DriftingForceSensor",
     "Driven",
     "DrivenPoint",
     "ElectricMotor",
+    "EccentricEncoder",
     "Element",
     "Encoder",
     "ExtendedTube",
@@ -61,6 +66,7 @@ __all__ = [
     "Mass",
     "NeoHooke",
     "Ogden",
+    "MisshapenCam",
     "Parallel",
     "Part",
     "PullOnly",
@@ -68,6 +74,7 @@ __all__ = [
     "QuadraticDrag",
     "SampleAndHold",
     "SampledEncoder",
+    "SaturatingMotor",
     "Sensor",
     "Series",
     "Slack",

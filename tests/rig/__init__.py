@@ -10,13 +10,14 @@ the step is fixed at 20 kHz.  Only numpy and the standard library are used.
 
 from .actuators import ACTUATORS, Actuator
 from .declaration import write_collection, write_declaration, write_records, write_set
-from .effects import EFFECTS, OUTSIDE_ANY_CATALOGUE, Hidden
+from .effects import EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS, Hidden
 from .records import make_records, truth
 
 __all__ = [
     "ACTUATORS",
     "EFFECTS",
     "OUTSIDE_ANY_CATALOGUE",
+    "STRENGTHS",
     "Actuator",
     "Hidden",
     "make_records",

@@ -25,6 +25,7 @@ import numpy as np
 from .actuators import Actuator, Cam, Drivetrain
 from .commands import STEP, Command
 from .effects import Hidden
+from .faults import acting_current, capstan
 from .rubber import pull_of
 
 SERVO_BANDWIDTH = 75.0  # rad/s
@@ -33,6 +34,7 @@ CURRENT_LIMIT = 12.0  # A
 CAM_GRID = 5.0e-4  # rad
 CAM_END = 1.35  # rad; nothing turns as far as this
 SPOT_PLACE, SPOT_WIDTH = 0.25, 0.06  # rad, of the rubbing spot
+BUMP_PLACE, BUMP_WIDTH = 0.4, 0.15  # rad, of the error of the contour
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,12 @@ class History:
     extension: np.ndarray  # m, rubber
 
 
-def _cam_tables(cam: Cam) -> tuple[list[float], list[float]]:
-    """δ and h on the grid; δ is the exact integral of the linearly interpolated h."""
+def _cam_tables(cam: Cam, bump: float) -> tuple[list[float], list[float]]:
+    """δ and h on the grid; δ is the exact integral of the linearly interpolated h, with its bump."""
     angles = np.arange(round(CAM_END / CAM_GRID) + 2) * CAM_GRID
-    lever_arm = np.asarray(cam.lever_arm(angles))
+    lever_arm = np.asarray(cam.lever_arm(angles)) + bump * np.exp(
+        -(((angles - BUMP_PLACE) / BUMP_WIDTH) ** 2)
+    )
     steps = 0.5 * CAM_GRID * (lever_arm[1:] + lever_arm[:-1])
     return np.concatenate([[0.0], np.cumsum(steps)]).tolist(), lever_arm.tolist()
 
@@ -123,12 +127,13 @@ def _gear_play(drive: Drivetrain, gap: float) -> Callable[..., tuple[float, floa
     return advance
 
 
-def _feeds(servo: Servo, hidden: Hidden, command: Command) -> Iterator[tuple[float, float]]:
-    """Part of the current that the command fixes (A), and disturbing torque (N·m), step by step."""
+def _feeds(servo: Servo, hidden: Hidden, command: Command) -> Iterator[tuple[float, float, float]]:
+    """Step by step: current that the command fixes (A), disturbing torque (N·m), angle of the load (rad)."""
     feed = servo.stiffness * command.angle + servo.damping * command.speed
     turns = hidden.disturbance_frequency * command.time
     push = hidden.disturbance * np.sin(2.0 * np.pi * turns + hidden.disturbance_phase)
-    return zip(feed.tolist(), push.tolist(), strict=True)
+    load = hidden.shake * np.sin(2.0 * np.pi * hidden.shake_frequency * command.time)
+    return zip(feed.tolist(), push.tolist(), (load + hidden.cam_offset).tolist(), strict=True)
 
 
 def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) -> History:
@@ -136,30 +141,34 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
     drive = built.drivetrain
     per_ampere, viscosity, inertia = drive.torque_per_ampere, drive.viscosity, drive.inertia
     k_p, k_d, limit = servo.stiffness, servo.damping, servo.limit
-    delta, lever = _cam_tables(built.cam)
+    delta, lever = _cam_tables(built.cam, hidden.profile_error)
     pull = pull_of(built.rubber, hidden, STEP)
     level = _friction_level(hidden)
     play = _gear_play(drive, hidden.gap) if hidden.gap else None
     ripple, order, phase = hidden.ripple, hidden.ripple_order, hidden.ripple_phase
-    offset, per_grid = hidden.cam_offset, 1.0 / CAM_GRID
+    act, pass_on, drag, per_grid = acting_current(hidden), capstan(hidden), hidden.drag, 1.0 / CAM_GRID
     motor = cam = speed = cam_speed = friction = 0.0
     rows: list[tuple[float, ...]] = []
 
-    for wanted, push in _feeds(servo, hidden, command):
+    for wanted, push, offset in _feeds(servo, hidden, command):
         angle = cam - offset
         place = abs(angle) * per_grid
         j = int(place)
         part = place - j
         left = lever[j]
         arm = left + part * (lever[j + 1] - left)
-        force, extension = pull(delta[j] + 0.5 * part * CAM_GRID * (left + arm))
-        load = arm * force if angle >= 0.0 else -arm * force
+        asked = delta[j] + 0.5 * part * CAM_GRID * (left + arm)
+        force, extension = pull(asked)
+        at_cam = force if pass_on is None else pass_on(force, asked)
+        load = arm * at_cam if angle >= 0.0 else -arm * at_cam
         current = wanted - k_p * motor - k_d * speed
         if not -limit <= current <= limit:
             current = limit if current > 0.0 else -limit
         rows.append((motor, cam, speed, current, force, extension))
 
-        push += per_ampere * current - viscosity * speed
+        push += per_ampere * (current if act is None else act(current)) - viscosity * speed
+        if drag:
+            push -= drag * speed * abs(speed)
         if ripple:
             push -= ripple * sin(order * motor + phase)
         if level is not None:

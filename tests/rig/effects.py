@@ -20,6 +20,21 @@ current_sensor_bias               0.06 T / torque per ampere
 force_sensor_bias                 0.03 F
 force_sensor_gain                 factor 1.15
 force_sensor_delay                10 ms
+quadratic_drag                    0.006 T per (rad/s)²
+drive_delay                       8 ms from the measured current to the torque
+torque_constant_saturation        T ∝ I_s arctan(I/I_s), I_s = 1.5 times the current for T
+cable_friction                    a guide with the wrap µα = 0.12 between rubber and cam
+cam_profile_error                 lever arm larger by 0.12 h(45°) exp(−((θ − 0.4)/0.15)²)
+stress_softening                  F* less by 0.25 at zero extension, by 0 at the largest one so far
+self_heating                      0.30 per (F δ) of loss, cooling in about 8 s
+permanent_set                     0.06 of the largest extension so far
+strain_stiffening                 0.2 F at δ, growing with the cube of the extension
+force_sensor_drift                0.004 F/s from the start of each record
+angle_sensor_eccentricity         0.02 rad · (sin(θ + phase) − sin(phase))
+winding_heat (no catalogue)       torque per ampere falls by 0.08/s at the current for T, cooling in 6 s
+cable_resonance (no catalogue)    force read through a weakly damped mass at about 18 Hz
+load_disturbance (no catalogue)   load side turns by 0.03 rad, about 3.3 Hz
+amplifier_dead_zone (no cat.)     0.10 of the current for T makes no torque
 ================================  ============================================================================
 
 "About" means: times 1.3ᵘ with u uniform in (−1, 1), drawn from the seed.  Strength multiplies the size.
@@ -63,6 +78,27 @@ class Hidden:
     force_bias: float = 0.0  # N
     force_gain: float = 1.0
     force_delay: float = 0.0  # s
+    drag: float = 0.0  # N·m·s²/rad²
+    drive_delay: float = 0.0  # s
+    saturation: float = 0.0  # 1/A
+    wrap: float = 0.0  # µα, of a guide of the cable
+    guide_stiffness: float = 0.0  # N/m, while the cable sticks to the guide
+    profile_error: float = 0.0  # m, lever arm at the middle of the bump
+    softening: float = 0.0  # share of F* that is lost at small extension
+    heating: float = 0.0  # 1/J, softness per heat
+    cooling_time: float = 1.0  # s
+    permanent_set: float = 0.0  # share of the largest extension
+    cubic: float = 0.0  # N/m³
+    force_drift: float = 0.0  # N/s
+    eccentricity: float = 0.0  # rad
+    disc_phase: float = 0.0  # rad
+    winding_heat: float = 0.0  # 1/(A²·s)
+    winding_time: float = 6.0  # s
+    resonance: float = 0.0  # share of the force that goes through the mass
+    resonance_frequency: float = 18.0  # Hz
+    shake: float = 0.0  # rad, of the load side
+    shake_frequency: float = 1.0  # Hz
+    dead_zone: float = 0.0  # A
 
 
 @dataclass(frozen=True)
@@ -93,6 +129,9 @@ def _sizes(actuator: Actuator, draw: np.random.Generator) -> dict[str, dict[str,
     s = scale_of(actuator)
     about = 1.3 ** draw.uniform(-1.0, 1.0, size=3)
     phase = draw.uniform(0.0, 2.0 * np.pi, size=2)
+    later = 1.3 ** draw.uniform(-1.0, 1.0, size=3)
+    current = s.torque / actuator.drivetrain.torque_per_ampere
+    lever_arm = float(actuator.cam.lever_arm(np.radians(45.0)))
     return {
         "none": {},
         "coulomb_friction": {"friction": 0.12 * s.torque},
@@ -126,6 +165,21 @@ def _sizes(actuator: Actuator, draw: np.random.Generator) -> dict[str, dict[str,
         "force_sensor_bias": {"force_bias": 0.03 * s.force},
         "force_sensor_gain": {"force_gain": 1.15},
         "force_sensor_delay": {"force_delay": 0.010},
+        "quadratic_drag": {"drag": 0.006 * s.torque},
+        "drive_delay": {"drive_delay": 0.008},
+        "torque_constant_saturation": {"saturation": 1.0 / (1.5 * current)},
+        "cable_friction": {"wrap": 0.12, "guide_stiffness": 10.0 * s.stiffness},
+        "cam_profile_error": {"profile_error": 0.12 * lever_arm},
+        "stress_softening": {"softening": 0.25},
+        "self_heating": {"heating": 0.30 / (s.force * s.extension), "cooling_time": 8.0 * later[0]},
+        "permanent_set": {"permanent_set": 0.06},
+        "strain_stiffening": {"cubic": 0.2 * s.force / s.extension**3},
+        "force_sensor_drift": {"force_drift": 0.004 * s.force},
+        "angle_sensor_eccentricity": {"eccentricity": 0.02, "disc_phase": phase[0]},
+        "winding_heat": {"winding_heat": 0.08 / current**2},
+        "cable_resonance": {"resonance": 1.0, "resonance_frequency": 18.0 * later[1]},
+        "load_disturbance": {"shake": 0.03, "shake_frequency": 3.3 * later[2]},
+        "amplifier_dead_zone": {"dead_zone": 0.10 * current},
     }
 
 
@@ -145,8 +199,28 @@ EFFECTS = (
     "force_sensor_bias",
     "force_sensor_gain",
     "force_sensor_delay",
+    "quadratic_drag",
+    "drive_delay",
+    "torque_constant_saturation",
+    "cable_friction",
+    "cam_profile_error",
+    "stress_softening",
+    "self_heating",
+    "permanent_set",
+    "strain_stiffening",
+    "force_sensor_drift",
+    "angle_sensor_eccentricity",
 )
-OUTSIDE_ANY_CATALOGUE = ("periodic_disturbance", "rubbing_spot")
+OUTSIDE_ANY_CATALOGUE = (
+    "periodic_disturbance",
+    "rubbing_spot",
+    "winding_heat",
+    "cable_resonance",
+    "load_disturbance",
+    "amplifier_dead_zone",
+)
+STRENGTHS = {"weak": 0.5, "strong": 1.0}
+"""The two strengths at which every effect is tried."""
 
 # What an effect changes in shape rather than in size: the strength leaves these alone.
 _SHAPES = (
@@ -157,6 +231,11 @@ _SHAPES = (
     "disturbance_phase",
     "branch_time",
     "slider_stiffness",
+    "guide_stiffness",
+    "cooling_time",
+    "disc_phase",
+    "resonance_frequency",
+    "shake_frequency",
 )
 
 

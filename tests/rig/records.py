@@ -33,21 +33,22 @@ def measure(
 ) -> np.ndarray:
     """Sample the true signals: time (s), angle (rad), current (A), force (N), shape (n, 4).
 
-        angle = quantum · round(θₘ / quantum)
+        angle = quantum · round((θₘ + A sin(θₘ + φ) − A sin φ) / quantum)
         current = I + bias + noise
-        force(t) = gain · F(t − delay) + bias + noise, F = 0 before the record
+        force(t) = gain · F(t − delay) + bias + drift · t + noise, F = 0 before the record
 
     Without a noise generator the angle is not rounded either.
     """
     every = round(1.0 / (sensors.sample_rate * STEP))
     late = round(hidden.force_delay / STEP)
-    force = np.concatenate([np.zeros(late), history.force])[: history.force.size]
+    force = np.concatenate([np.zeros(late), _rung(history.force, hidden)])[: history.force.size]
+    angle, phase = history.motor_angle, hidden.disc_phase
     table = np.column_stack(
         [
             history.time,
-            history.motor_angle,
+            angle + hidden.eccentricity * (np.sin(angle + phase) - np.sin(phase)),
             history.current + hidden.current_bias,
-            hidden.force_gain * force + hidden.force_bias,
+            hidden.force_gain * force + hidden.force_bias + hidden.force_drift * history.time,
         ]
     )[::every]
     if noise is not None:
@@ -55,6 +56,20 @@ def measure(
         table[:, 2] += sensors.current_noise * noise.standard_normal(len(table))
         table[:, 3] += sensors.force_noise * noise.standard_normal(len(table))
     return table
+
+
+def _rung(force: np.ndarray, hidden: Hidden) -> np.ndarray:
+    """Force behind a mass on the cable, x'' + 2 ζ ω x' + ω² x = ω² F with ζ = 0.06; half-implicit steps."""
+    if not hidden.resonance:
+        return force
+    turn, damping = 2.0 * np.pi * hidden.resonance_frequency, 0.06
+    place = speed = 0.0
+    read = np.empty_like(force)
+    for i, value in enumerate(force.tolist()):
+        speed += STEP * (turn * turn * (value - place) - 2.0 * damping * turn * speed)
+        place += STEP * speed
+        read[i] = place
+    return (1.0 - hidden.resonance) * force + hidden.resonance * read
 
 
 def make_records(

@@ -22,6 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .actuators import Rubber
+from .aging import Aging
 from .effects import Hidden
 
 GRID = 1.0e-5  # m, spacing of the table of F*; the knots of the rubber lie on it
@@ -42,11 +43,11 @@ def slider_set(force: float, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
     return shares, force * SLIDERS / SLIDERS.sum()
 
 
-def _equilibrium_table(rubber: Rubber) -> tuple[list[float], list[float], float]:
+def _equilibrium_table(rubber: Rubber, cubic: float) -> tuple[list[float], list[float], float]:
     """F* on the grid, its slope per grid cell, and the place of δ = 0 in the table."""
     origin = round(-LOWEST / GRID)
     places = (np.arange(round((HIGHEST - LOWEST) / GRID) + 1) - origin) * GRID
-    force = rubber.equilibrium(places)
+    force = rubber.equilibrium(places) + cubic * places**3
     return force.tolist(), np.append(np.diff(force), 0.0).tolist(), float(origin)
 
 
@@ -55,35 +56,37 @@ def pull_of(rubber: Rubber, hidden: Hidden, step: float) -> Pull:
 
     The rubber starts relaxed, at its natural length.  Calling the stepper advances it by `step` seconds.
     """
-    value, rise, origin = _equilibrium_table(rubber)
+    value, rise, origin = _equilibrium_table(rubber, hidden.cubic)
     per_grid = 1.0 / GRID
     q1, g1 = _maxwell(rubber.shape * rubber.k, rubber.relaxation_time, step)
     q2, g2 = _maxwell(rubber.shape * hidden.branch_modulus, hidden.branch_time, step)
-    sliders = _Sliders(hidden)
+    sliders, aging = _Sliders(hidden), Aging(rubber, hidden, step)
+    ageing = aging.present
     hysteretic = hidden.slider_force > 0.0
     rigid = bool(np.isinf(hidden.cable_stiffness))
     cable, slack = 0.0 if rigid else hidden.cable_stiffness, hidden.slack
-    x = m1 = m2 = 0.0
+    x = m1 = m2 = shift = 0.0
+    soft = 1.0
 
     def resistance(y: float) -> tuple[float, float]:
         """R and dR/dy, with the history frozen at the start of the step."""
-        place = y * per_grid + origin
+        place = (y - shift) * per_grid + origin
         j = int(place)
-        force = value[j] + (place - j) * rise[j] + q1 * m1 + q2 * m2 + (g1 + g2) * (y - x)
-        slope = rise[j] * per_grid + g1 + g2
+        force = soft * (value[j] + (place - j) * rise[j]) + q1 * m1 + q2 * m2 + (g1 + g2) * (y - x)
+        slope = soft * rise[j] * per_grid + g1 + g2
         if hysteretic:
             z, stiffness = sliders.trial(y - x)
             return force + z, slope + stiffness
         return force, slope
 
     def pull(asked: float) -> tuple[float, float]:
-        nonlocal x, m1, m2
+        nonlocal x, m1, m2, shift, soft
         y = asked - slack
         force = -1.0
         if rigid:  # the usual case: the rubber follows the cam, in line because function calls cost time
-            place = y * per_grid + origin
+            place = (y - shift) * per_grid + origin
             j = int(place)
-            force = value[j] + (place - j) * rise[j] + q1 * m1 + q2 * m2 + (g1 + g2) * (y - x)
+            force = soft * (value[j] + (place - j) * rise[j]) + q1 * m1 + q2 * m2 + (g1 + g2) * (y - x)
             if hysteretic:
                 force += sliders.trial(y - x)[0]
         if force < 0.0:
@@ -95,6 +98,9 @@ def pull_of(rubber: Rubber, hidden: Hidden, step: float) -> Pull:
         m1 = q1 * m1 + g1 * (y - x)
         m2 = q2 * m2 + g2 * (y - x)
         x = y
+        if ageing:
+            aging.advance(y, m1, m2)
+            soft, shift = aging.softness, aging.set
         return force, y
 
     return pull

@@ -1,7 +1,8 @@
 """The catalogue of missing effects: functions that return an assembly with the effect in it."""
 
-from .cable import cable_compliance, cable_slack, cam_angle_offset
+from .cable import cable_compliance, cable_slack, cam_angle_offset, cam_profile_error
 from .candidate import Candidate, Effect, Unknown, wrapped
+from .drive import drive_delay, torque_constant_saturation
 from .friction import (
     backlash,
     coulomb_friction,
@@ -10,8 +11,14 @@ from .friction import (
     stribeck_friction,
     torque_ripple,
 )
-from .rubber import rate_independent_hysteresis, second_relaxation
-from .sensing import current_sensor_bias, force_sensor_bias, force_sensor_delay, force_sensor_gain
+from .rubber import rate_independent_hysteresis, second_relaxation, strain_stiffening
+from .sensing import (
+    angle_sensor_eccentricity,
+    current_sensor_bias,
+    force_sensor_bias,
+    force_sensor_delay,
+    force_sensor_gain,
+)
 
 ALL: tuple[Effect, ...] = (
     coulomb_friction,
@@ -29,6 +36,11 @@ ALL: tuple[Effect, ...] = (
     force_sensor_delay,
     force_sensor_bias,
     force_sensor_gain,
+    drive_delay,
+    torque_constant_saturation,
+    strain_stiffening,
+    cam_profile_error,
+    angle_sensor_eccentricity,
 )
 
 __all__ = [
@@ -36,12 +48,15 @@ __all__ = [
     "Candidate",
     "Effect",
     "Unknown",
+    "angle_sensor_eccentricity",
     "backlash",
     "cable_compliance",
     "cable_slack",
     "cam_angle_offset",
+    "cam_profile_error",
     "coulomb_friction",
     "current_sensor_bias",
+    "drive_delay",
     "force_sensor_bias",
     "force_sensor_delay",
     "force_sensor_gain",
@@ -49,7 +64,9 @@ __all__ = [
     "quadratic_drag",
     "rate_independent_hysteresis",
     "second_relaxation",
+    "strain_stiffening",
     "stribeck_friction",
+    "torque_constant_saturation",
     "torque_ripple",
     "wrapped",
 ]

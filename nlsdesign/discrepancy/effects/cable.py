@@ -4,11 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ...components import Assembly, InextensibleCable, PullOnly, Slack, StretchyCable, Tie, Turned
+from ...components import (
+    Assembly,
+    InextensibleCable,
+    MisshapenCam,
+    PullOnly,
+    Slack,
+    StretchyCable,
+    Tie,
+    Turned,
+    TwoSidedCam,
+)
 from ...components.element import ROTATION, TRANSLATION, Element
 from ...components.networks import Through
 from ...quantity import Quantity
-from .candidate import SOURCE, Candidate, Unknown, wrapped
+from .candidate import SOURCE, Candidate, Unknown, numbers_of, wrapped
+
+_CONTROL_VALUES = 7
+"""Of the error of a contour: four spans, a quarter of the contour each."""
 
 
 def stretched(assembly: Assembly) -> list[str]:
@@ -123,6 +136,36 @@ def cam_angle_offset(assembly: Assembly) -> Sequence[Candidate]:
                 (Unknown(f"{name}.offset", (-0.02, 0.02), -0.5, 0.5),),
                 "more force on one side than at the same angle on the other",
                 "geometry",
+            )
+        )
+    return found
+
+
+def cam_profile_error(assembly: Assembly) -> Sequence[Candidate]:
+    """A cam that was not cut as it was drawn.
+
+    Parameters
+    ----------
+    assembly
+        As declared; pulleys have no profile.
+    """
+    found = []
+    for path, part in assembly.walk():
+        if not isinstance(part, TwoSidedCam) or isinstance(part, MisshapenCam):
+            continue
+        error = Quantity((0.0,) * _CONTROL_VALUES, "m", SOURCE)
+        of = f"{path}.lever_arm_now"
+        found.append(
+            Candidate(
+                "cam_profile_error",
+                path,
+                assembly.with_part(path, MisshapenCam(**numbers_of(part), error=error)),
+                tuple(
+                    Unknown(f"{path}.error[{i}]", (0.0,), -0.5, 0.5, of)
+                    for i in range(1, _CONTROL_VALUES + 1)
+                ),
+                "force and torque over the angle that are off together, at any speed and on both sides alike",
+                "virtual work",
             )
         )
     return found

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeAlias
 
-from ...components import Assembly, Element
+from ...components import Assembly, Element, Part
 from ...components.sensors import Sensor
 
 SOURCE = "fitted to bench records"
@@ -126,3 +126,14 @@ def free_name(assembly: Assembly, name: str) -> str:
     while found in taken:
         found, number = f"{name}_{number}", number + 1
     return found
+
+
+def numbers_of(part: Part) -> dict[str, Any]:
+    """Return the fields of a part, to make a part of a more special kind from it.
+
+    Parameters
+    ----------
+    part
+        Of the declared model.
+    """
+    return {field.name: getattr(part, field.name) for field in fields(part)}

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...components import Assembly, LinearElastic, SlidingFillers, Specimen, ViscousMaterial, series
+from ...components import (
+    Assembly,
+    LinearElastic,
+    SlidingFillers,
+    SmoothStrainStiffening,
+    Specimen,
+    ViscousMaterial,
+    series,
+)
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown
 
@@ -69,6 +77,38 @@ def rate_independent_hysteresis(assembly: Assembly) -> Sequence[Candidate]:
                 ),
                 "loops of force over extension as wide when slow as when fast, and no creep at rest",
                 "Iwan 1967; Bouc 1967, Wen 1976",
+            )
+        )
+    return found
+
+
+def strain_stiffening(assembly: Assembly) -> Sequence[Candidate]:
+    """One more elastic law in a piece of material, that engages at a strain.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for path in _specimens(assembly, "stiffening"):
+        law = SmoothStrainStiffening(
+            modulus=Quantity((1e5,), "Pa", SOURCE),
+            knots=Quantity((0.1,), "1", SOURCE),
+            width=Quantity(0.02, "1", SOURCE),
+        )
+        inner = f"{path}.stiffening"
+        found.append(
+            Candidate(
+                "strain_stiffening",
+                path,
+                assembly.with_part(inner, law),
+                (
+                    Unknown(f"{inner}.modulus[1]", (3e5,), 1e2, 1e9),
+                    Unknown(f"{inner}.knots[1]", (0.4, 0.75), 0.01, 0.98, f"{path}.strain"),
+                ),
+                "force that grows more than declared where the strain is large, the same at any speed",
+                "Treloar 1975; Austin et al. 2015, eq. (1)",
             )
         )
     return found

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...components import Assembly, CurrentSensor, DelayedForceSensor, ForceSensor
+from ...components import (
+    Assembly,
+    CurrentSensor,
+    DelayedForceSensor,
+    EccentricEncoder,
+    Encoder,
+    ForceSensor,
+    GearedMotor,
+)
 from ...quantity import Quantity
-from .candidate import SOURCE, Candidate, Unknown
+from .candidate import SOURCE, Candidate, Unknown, numbers_of
 
 
 def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
@@ -105,3 +113,46 @@ def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
         for name, sensor in assembly.sensors().items()
         if isinstance(sensor, CurrentSensor) and sensor.bias.number == 0.0
     ]
+
+
+def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
+    """An encoder whose disc sits off its shaft, on the shaft that is read or on the motor in front of a gear.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for name, sensor in assembly.sensors().items():
+        if not isinstance(sensor, Encoder) or isinstance(sensor, EccentricEncoder):
+            continue
+        for order in _disc_orders(assembly, sensor.of):
+            faulty = EccentricEncoder(
+                **numbers_of(sensor),
+                sine=Quantity(0.0, "rad", SOURCE),
+                cosine=Quantity(0.0, "rad", SOURCE),
+                order=order,
+            )
+            largest = 0.2 / max(order.number, 1.0)
+            unknowns = (Unknown(f"{name}.{part}", (0.0,), -largest, largest) for part in ("sine", "cosine"))
+            found.append(
+                Candidate(
+                    "angle_sensor_eccentricity",
+                    name,
+                    assembly.with_part(name, faulty),
+                    tuple(unknowns),
+                    "force, torque and inertia that are off together, as a sine of the angle",
+                    "geometry; data sheets of encoders",
+                )
+            )
+    return found
+
+
+def _disc_orders(assembly: Assembly, read: str) -> list[Quantity]:
+    """Return how often the disc may turn per turn of what is read."""
+    once = Quantity(1.0, "1", "once per turn of what is read")
+    body = dict(assembly.parts).get(read.partition(".")[0])
+    if isinstance(body, GearedMotor) and body.gear_ratio.number != 1.0:
+        return [once, Quantity(body.gear_ratio.number, "1", "disc on the shaft of the motor")]
+    return [once]

@@ -1,0 +1,49 @@
+"""Encoders with a fault of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..quantity import Quantity
+from ..symbolic import Expression
+from .element import Scope
+from .part import parameter
+from .sensors import Encoder, Numbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class EccentricEncoder(Encoder):
+    """Encoder whose disc sits off its shaft: it counts θ + a·sin(nθ) + b·(cos(nθ) − 1).
+
+    n is the number of turns of the disc per turn of what is read: 1, or the gear ratio for a disc on the
+    motor's shaft. The error vanishes at zero, where encoders are set to zero. An eccentricity e under a read
+    head at radius R gives a² + b² = (e/R)². Valid while n·√(a² + b²) < 1, so that counts grow with the angle.
+    Source: geometry; data sheets of optical encoders ("eccentricity error").
+    """
+
+    sine: Quantity = parameter("rad", "amplitude of the error in sin(nθ)", minimum=-0.5, maximum=0.5)
+    cosine: Quantity = parameter("rad", "amplitude of the error in cos(nθ)", minimum=-0.5, maximum=0.5)
+    order: Quantity = parameter(
+        "1", "turns of the disc per turn of what is read", minimum=1e-3, maximum=1e5, default=1.0
+    )
+
+    def read(self, scope: Scope, value: Expression) -> Expression:
+        """Return the faulty angle rounded to whole counts."""
+        return super().read(scope, value + _error(scope, value))
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return the angle behind a reading: three rounds of θ ← reading − error(θ).
+
+        Each round takes the remainder down by the factor n·√(a² + b²).
+        """
+        angle = reading
+        for _ in range(3):
+            angle = reading - _error(numbers, angle)
+        return angle
+
+
+def _error(numbers: Numbers, angle: Expression) -> Expression:
+    phase = numbers.parameter("order") * angle
+    return numbers.parameter("sine") * ca.sin(phase) + numbers.parameter("cosine") * (ca.cos(phase) - 1)
