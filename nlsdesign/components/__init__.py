@@ -7,6 +7,7 @@ from .cam import Cam, Pulley, TwoSidedCam, control_values
 from .contact import InextensibleCable
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
+from .drives import DelayedMotor, SaturatingMotor
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .encoders import EccentricEncoder
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
@@ -15,7 +16,6 @@ from .gear import Gear, LossyGear
 from .hysteresis import SlidingFillers
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .misshapen import MisshapenCam
-from .motors import DelayedMotor, SaturatingMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
 from .play import Backlash, Slack, Turned
