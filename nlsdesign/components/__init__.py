@@ -11,11 +11,11 @@ from .drives import DelayedMotor, SaturatingMotor
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .encoders import EccentricEncoder
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
-from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .gear import Gear, LossyGear
+from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
-from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .misshapen import MisshapenCam
+from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
 from .play import Backlash, Slack, Turned
@@ -46,8 +46,8 @@ __all__ = [
     "DriftingForceSensor",
     "Driven",
     "DrivenPoint",
-    "ElectricMotor",
     "EccentricEncoder",
+    "ElectricMotor",
     "Element",
     "Encoder",
     "ExtendedTube",
@@ -64,9 +64,9 @@ __all__ = [
     "LoadFriction",
     "LossyGear",
     "Mass",
+    "MisshapenCam",
     "NeoHooke",
     "Ogden",
-    "MisshapenCam",
     "Parallel",
     "Part",
     "PullOnly",
@@ -98,8 +98,8 @@ __all__ = [
     "Turned",
     "TwoSidedCam",
     "ViscousMaterial",
-    "Yeoh",
     "VoltageDrivenMotor",
+    "Yeoh",
     "assembly",
     "burgers",
     "control_values",
