@@ -9,7 +9,7 @@ import casadi as ca
 
 from ..quantity import Quantity
 from ..symbolic import Expression
-from .bodies import GearedMotor
+from .bodies import GearedMotor, Motion
 from .element import Scope
 from .part import parameter
 
@@ -30,7 +30,7 @@ class ImperfectMotor(GearedMotor):
             Held within its limit.
         """
 
-    def drive(self, scope: Scope) -> Expression:
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return n·k_T times the acting current."""
         limit = scope.parameter("current_limit")
         current = ca.fmin(ca.fmax(scope.input("current", "A", f"current of {scope.path}"), -limit), limit)
