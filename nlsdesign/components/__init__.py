@@ -25,6 +25,7 @@ from .slide import ConstantForce, LinearDrive, SlidingFriction
 from .springpot import Springpot
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
 from .standard import burgers, generalised_maxwell, kelvin_voigt, maxwell, standard_linear_solid
+from .sticking import DryFriction, DryLoadFriction, DryStribeckFriction
 from .tie import Tie, tie
 
 __all__ = [
@@ -46,6 +47,9 @@ __all__ = [
     "DriftingForceSensor",
     "Driven",
     "DrivenPoint",
+    "DryFriction",
+    "DryLoadFriction",
+    "DryStribeckFriction",
     "EccentricEncoder",
     "ElectricMotor",
     "Element",

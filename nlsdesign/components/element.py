@@ -17,6 +17,7 @@ import casadi as ca
 from ..errors import ArrangementError
 from ..symbolic import Expression, depends, solve_monotone, symbol
 from .part import RESERVED, Part, check_names
+from .switches import Switches
 
 
 @dataclass(frozen=True)
@@ -49,14 +50,10 @@ Range: TypeAlias = tuple[float, float]
 UNBOUNDED: Range = (-math.inf, math.inf)
 
 
-class Scope(Protocol):
-    """What an element sees of the model that is being written: its own names, nothing else."""
+class OwnNames(Protocol):
+    """What an element may name in the model that is being written: its numbers, inputs, states, signals."""
 
     path: str
-
-    def child(self, name: str) -> Scope:
-        """Return the scope of a part inside."""
-        ...
 
     def parameter(self, name: str) -> Expression:
         """Return the symbol of one of the part's own numbers."""
@@ -74,14 +71,22 @@ class Scope(Protocol):
         """Declare a state; its derivative is given by :meth:`derive`."""
         ...
 
-    def derive(self, state: Expression, derivative: Expression) -> None:
-        """Give the derivative of a state."""
-        ...
-
     def signal(
         self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
     ) -> None:
         """Give a name to an expression, and the range in which the law behind it is stated to hold."""
+        ...
+
+
+class Scope(OwnNames, Switches, Protocol):
+    """What an element sees of the model that is being written: its own names, nothing else."""
+
+    def child(self, name: str) -> Scope:
+        """Return the scope of a part inside."""
+        ...
+
+    def derive(self, state: Expression, derivative: Expression) -> None:
+        """Give the derivative of a state."""
         ...
 
     def loss(self, power: Expression) -> None:

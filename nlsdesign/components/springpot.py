@@ -29,7 +29,7 @@ class Springpot(Element):
 
     In time σ = c·d^α ε/dt^α with c = E₁/ω₁^α in Pa·s^α. Within the band the law is a Prony series of twelve
     Maxwell branches: the spectrum s^α = sin(απ)/π·∫ x^(α−1)·s/(s + x) dx by the midpoint rule in ln x, and
-    one branch for each tail that has its first two moments. ``largest_error`` is what that costs inside the band;
+    one branch for each tail that has its first two moments. ``largest_error`` is its cost inside the band;
     below it the stress relaxes to nothing, above it the modulus is constant. Sources: Scott Blair 1947;
     Koeller 1984.
 

@@ -3,5 +3,6 @@
 from ..components.assembly import Assembly
 from .flat import FlatModel, Symbols, Table, Variable
 from .flatten import flatten
+from .switching import Switch, Switching
 
-__all__ = ["Assembly", "FlatModel", "Symbols", "Table", "Variable", "flatten"]
+__all__ = ["Assembly", "FlatModel", "Switch", "Switching", "Symbols", "Table", "Variable", "flatten"]

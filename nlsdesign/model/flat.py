@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, same_dimension
 from ..symbolic import Expression
+from .switching import Switching
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,8 @@ class FlatModel:
         ``None`` for continuous time; otherwise f is the state one sample later.
     tables
         Looked-up numbers w; empty for a continuous model.
+    switching
+        Where the equations are not smooth; ``None`` if they are everywhere, or if nobody said.
     """
 
     name: str
@@ -142,6 +145,7 @@ class FlatModel:
     equations: ca.Function
     sample_time: float | None = None
     tables: tuple[Table, ...] = ()
+    switching: Switching | None = None
 
     def symbols(self) -> Symbols:
         """Return fresh symbols and the expressions in them."""

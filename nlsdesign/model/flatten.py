@@ -8,172 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import casadi as ca
 
 from ..components.assembly import Assembly
 from ..components.bodies import Body, Motion
-from ..components.element import UNBOUNDED, Range, observed_effort
-from ..components.part import Part
+from ..components.element import observed_effort
 from ..components.sensors import Sensor
 from ..components.tie import Tie
 from ..errors import ArrangementError, UnitError, nearest, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
+from .holding import Laws, natural_modes, switch_laws, switching
+from .ledger import Ledger, PartScope
 from .train import balance_train, train_motions, trains
-
-TYPICAL_SIZE = {"m": 1e-2, "m/s": 0.1, "N": 10.0, "Pa": 1e5}
-"""Nominal size of a state by its unit, where one of the unit is far off; for tolerances and scaling."""
-
-
-class Ledger:
-    """What the parts have said so far: symbols, equations, names."""
-
-    def __init__(self, assembly: Assembly) -> None:
-        self.parameters: dict[str, tuple[Variable, Expression]] = {}
-        self.inputs: dict[str, tuple[Variable, Expression]] = {}
-        self.states: dict[str, tuple[Variable, Expression]] = {}
-        self.signals: dict[str, tuple[Variable, Expression]] = {}
-        self.derivatives: dict[str, Expression] = {}
-        self.unknowns = ca.SX(0, 1)
-        self.solutions = ca.SX(0, 1)
-        self.checks: dict[str, Expression] = {}
-        self.losses: list[tuple[str, Expression]] = []
-        self.order = {path: number for number, (path, _) in enumerate(assembly.walk())}
-        for path, part in assembly.walk():
-            self._declare(path, part)
-
-    def _declare(self, path: str, part: Part) -> None:
-        inner = part.element if isinstance(part, Tie) else part
-        for field_name, info in inner.parameter_infos().items():
-            given = part.parameters()[field_name]
-            row = isinstance(given.value, tuple)
-            for number, value in enumerate(given.values, start=1):
-                name = f"{path}.{field_name}" + (f"[{number}]" if row else "")
-                variable = Variable(
-                    name, info.unit, info.description, value, abs(value) or 1.0, info.minimum, info.maximum,
-                    given.source, given.spread,
-                )  # fmt: skip
-                self.parameters[name] = (variable, ca.SX.sym(name))
-
-    def cleaned(self, expression: Expression) -> Expression:
-        """Return an expression with all defined unknowns replaced by their solutions."""
-        return ca.SX(ca.substitute(expression, self.unknowns, self.solutions))
-
-    def define(self, unknown: Expression, solution: Expression) -> None:
-        """Note the solution of an unknown; no solution ever contains a defined unknown.
-
-        All are replaced in one call each time, so that the solutions go on sharing their common parts;
-        one by one, they would grow with every step.
-        """
-        solution = self.cleaned(solution)
-        if depends(self.solutions, unknown):
-            self.solutions = ca.SX(ca.substitute(self.solutions, unknown, solution))
-        self.unknowns = ca.vertcat(self.unknowns, unknown)
-        self.solutions = ca.vertcat(self.solutions, solution)
-
-    def named(self) -> dict[str, Expression]:
-        """Return states, inputs and signals by name."""
-        found = {name: e for group in (self.states, self.inputs) for name, (_, e) in group.items()}
-        return found | {name: e for name, (_, e) in self.signals.items()}
-
-    def in_order(self, names: Iterable[str]) -> list[str]:
-        """Return names in the written order of the parts that own them."""
-        return sorted(names, key=lambda name: self.order.get(name.rpartition(".")[0], len(self.order)))
-
-
-class PartScope:
-    """The view of one part on the ledger: its own names only."""
-
-    def __init__(self, ledger: Ledger, path: str) -> None:
-        self._ledger = ledger
-        self.path = path
-
-    def child(self, name: str) -> PartScope:
-        """Return the scope of a part inside."""
-        return PartScope(self._ledger, f"{self.path}.{name}")
-
-    def parameter(self, name: str) -> Expression:
-        """Return the symbol of one of the part's own numbers."""
-        return self._ledger.parameters[f"{self.path}.{name}"][1]
-
-    def row(self, name: str) -> list[Expression]:
-        """Return the symbols of one of the part's own rows of numbers."""
-        prefix = f"{self.path}.{name}"
-        if prefix in self._ledger.parameters:
-            return [self._ledger.parameters[prefix][1]]
-        return [e for n, (_, e) in self._ledger.parameters.items() if n.startswith(prefix + "[")]
-
-    def input(self, name: str, unit: str, description: str) -> Expression:
-        """Declare an input."""
-        full = f"{self.path}.{name}"
-        symbol = ca.SX.sym(full)
-        self._ledger.inputs[full] = (Variable(full, unit, description), symbol)
-        return symbol
-
-    def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state."""
-        full = f"{self.path}.{name}"
-        if full in self._ledger.states:
-            raise ArrangementError(full, "two equations claim this state")
-        symbol = ca.SX.sym(full)
-        variable = Variable(full, unit, description, nominal=TYPICAL_SIZE.get(unit, 1.0))
-        self._ledger.states[full] = (variable, symbol)
-        return symbol
-
-    def derive(self, state: Expression, derivative: Expression) -> None:
-        """Give the derivative of a state."""
-        self._ledger.derivatives[state.name()] = derivative
-
-    def signal(
-        self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
-    ) -> None:
-        """Give a name to an expression; of a state or input of that name, only the range is noted."""
-        full = f"{self.path}.{name}"
-        low, high = valid
-        for group in (self._ledger.states, self._ledger.inputs):
-            if full in group:
-                variable, symbol = group[full]
-                if valid != UNBOUNDED:
-                    group[full] = (replace(variable, minimum=low, maximum=high), symbol)
-                return
-        variable = Variable(full, unit, description, minimum=low, maximum=high)
-        self._ledger.signals[full] = (variable, ca.SX(value))
-
-    def loss(self, power: Expression) -> None:
-        """Note power that turns into heat inside the part."""
-        self._ledger.losses.append((f"{self.path}.", power))
-
-    def losses(self) -> Expression:
-        """Return the sum of what the part and all parts inside it have noted as lost."""
-        inside = [power for path, power in self._ledger.losses if path.startswith(f"{self.path}.")]
-        return sum(inside, start=ca.SX(0))
-
-    def define(self, unknown: Expression, solution: Expression) -> None:
-        """Give the solution of an unknown."""
-        self._ledger.define(unknown, solution)
-
-    def check(self, name: str, residual: Expression) -> None:
-        """Record a residual that must vanish."""
-        self._ledger.checks[name] = residual
-
-    def total_rate(self, value: Expression, moving: Mapping[Expression, Expression]) -> Expression:
-        """Return the time derivative of an expression of states and moving symbols."""
-        value = self._ledger.cleaned(value)
-        rate = ca.SX(0)
-        for symbol, own_rate in moving.items():
-            rate += ca.jacobian(value, symbol) * own_rate
-        for name, (_, symbol) in self._ledger.states.items():
-            if depends(value, symbol):
-                rate += ca.jacobian(value, symbol) * self._ledger.cleaned(self._ledger.derivatives[name])
-        return rate
-
-    def rate_is_used(self, rate: Expression) -> bool:
-        """Tell whether anything given so far contains this symbol."""
-        given = [*self._ledger.derivatives.values(), *(e for _, e in self._ledger.signals.values())]
-        given += [self._ledger.solutions, *(power for _, power in self._ledger.losses)]
-        return any(depends(e, rate) for e in given)
 
 
 def flatten(
@@ -297,17 +145,17 @@ def _needed_states(
 def _model(
     assembly: Assembly, ledger: Ledger, inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> FlatModel:
-    kept = _chosen("input", inputs, ledger.inputs, ledger.in_order(ledger.inputs))
-    known = ledger.named()
-    given = _chosen("output", outputs, known, _default_outputs(assembly))
     open_states = [name for name in ledger.states if name not in ledger.derivatives]
     if open_states:
         raise ArrangementError(open_states[0], "no equation gives its derivative")
-
+    laws = switch_laws(ledger)
+    kept = _chosen("input", inputs, ledger.inputs, ledger.in_order(ledger.inputs))
+    known = ledger.named()
+    given = _chosen("output", outputs, known, _default_outputs(assembly))
     ledger.signals = {name: ledger.signals[name] for name in ledger.in_order(ledger.signals)}
-    derivatives, signals, results, checks = _finished(ledger, kept, given)
+    derivatives, signals, results, checks, laws = _finished(ledger, laws, kept, given)
     moving = [ledger.states[n][1] for n in ledger.states if isinstance(assembly[n.rpartition(".")[0]], Body)]
-    states = _needed_states(ledger, derivatives, [*signals, *results, *moving])
+    states = _needed_states(ledger, derivatives, [*signals, *results, *moving, *laws.lasts])
     columns = [
         ca.SX.sym("time"),
         ca.vertcat(*[ledger.states[n][1] for n in states]),
@@ -316,6 +164,8 @@ def _model(
         ca.SX.sym("w", 0),
     ]
     rows = [[derivatives[n] for n in states], results, signals, checks]
+    switches = switching(laws, columns, rows[0], states) if laws.switches else None
+    rows = _natural(laws, rows)
     equations = ca.Function(
         "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
@@ -332,14 +182,14 @@ def _model(
         assembly.name, assembly.description,
         tuple(ledger.states[n][0] for n in states), tuple(ledger.inputs[n][0] for n in kept),
         tuple(v for v, _ in ledger.parameters.values()), tuple(_variable_of(ledger, n) for n in given),
-        tuple(v for v, _ in ledger.signals.values()), equations,
+        tuple(v for v, _ in ledger.signals.values()), equations, switching=switches,
     )  # fmt: skip
 
 
 def _finished(
-    ledger: Ledger, inputs: Sequence[str], outputs: Sequence[str]
-) -> tuple[dict[str, Expression], list[Expression], list[Expression], list[Expression]]:
-    """Return derivatives, signals, outputs and checks with all unknowns solved and unused inputs at zero.
+    ledger: Ledger, laws: Laws, inputs: Sequence[str], outputs: Sequence[str]
+) -> tuple[dict[str, Expression], list[Expression], list[Expression], list[Expression], Laws]:
+    """Return derivatives, signals, outputs, checks, switches: unknowns solved, unused inputs at zero.
 
     All are substituted together, so that they go on sharing their common parts.
     """
@@ -349,13 +199,30 @@ def _finished(
         [e for _, e in ledger.signals.values()],
         [known[name] for name in outputs],
         list(ledger.checks.values()),
+        *laws.columns(),
     ]
     everything = ledger.cleaned(ca.vertcat(*[e for group in groups for e in group]))
     rest = ca.vertcat(*[e for n, (_, e) in ledger.inputs.items() if n not in inputs])
     everything = ca.cse(ca.SX(ca.substitute(everything, rest, ca.SX.zeros(rest.shape))))
     done = iter(ca.vertsplit(everything))
     split = [[next(done) for _ in group] for group in groups]
-    return dict(zip(ledger.derivatives, split[0], strict=True)), split[1], split[2], split[3]
+    return (
+        dict(zip(ledger.derivatives, split[0], strict=True)),
+        split[1],
+        split[2],
+        split[3],
+        laws.with_columns(split[4:]),
+    )
+
+
+def _natural(laws: Laws, rows: list[list[Expression]]) -> list[list[Expression]]:
+    """Return the rows with the modes that belong to the state."""
+    if not laws.modes or not depends(ca.vertcat(*[e for row in rows for e in row]), ca.vertcat(*laws.modes)):
+        return rows
+    everything = ca.vertcat(*[e for row in rows for e in row])
+    everything = ca.cse(ca.SX(ca.substitute(everything, ca.vertcat(*laws.modes), natural_modes(laws))))
+    done = iter(ca.vertsplit(everything))
+    return [[next(done) for _ in row] for row in rows]
 
 
 def _check_unique(ledger: Ledger) -> None:

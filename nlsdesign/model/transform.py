@@ -235,6 +235,12 @@ def _rebuilt(
     signals: tuple[Variable, ...] | None = None,
 ) -> FlatModel:
     """Return the model with these expressions and names; groups that are not given stay."""
+    moved = states is not None or inputs is not None
+    if moved and model.switching is not None and model.switching.jumps:
+        raise ArrangementError(
+            model.name, f"'{model.switching.jumps[0]}' is not smooth, so its coordinates stay",
+            next_step="take the smooth form of its law: smoothed(assembly)",
+        )  # fmt: skip
     rows = [s.derivative, s.output, s.signal, s.residual]
     shared = ca.cse(ca.vertcat(*rows)) if any(r.numel() for r in rows) else ca.SX(0, 1)
     ends = [0]
@@ -248,6 +254,8 @@ def _rebuilt(
     return replace(
         model,
         equations=equations,
+        # Corners may be forgotten: the equations say them too.
+        switching=None if moved else model.switching,
         states=model.states if states is None else states,
         inputs=model.inputs if inputs is None else inputs,
         outputs=model.outputs if outputs is None else outputs,

@@ -7,6 +7,7 @@ are stepped. Inputs are samples (lines between them) or functions of time.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from .drives import Drive, Drives, drives_of
+from .events import Event
 from .runge_kutta import TooStiffError, integrate_explicitly
 from .stiff import integrate_implicitly
 from .trace import Trace, range_warnings
@@ -54,7 +56,8 @@ def simulate(
     Returns
     -------
     Trace
-        All states, inputs, outputs and signals at ``times``.
+        All states, inputs, outputs and signals at ``times``; ``events`` tells when something stuck, slipped,
+        struck or went slack. A stiff model without jumps is told only until the implicit method takes over.
 
     Raises
     ------
@@ -68,11 +71,12 @@ def simulate(
     times = _checked_times(times)
     drives = drives_of(model, times, inputs or {}, hold=hold)
     x0 = _start(model, start or {})
+    events: list[Event] = []
     if model.sample_time is not None:
         x = _stepped(model, times, drives.samples, x0)
     else:
-        x = _integrated(model, drives, x0, tolerance)
-    return _evaluated(model, times, x, drives.samples)
+        x, events = _integrated(model, drives, x0, tolerance)
+    return replace(_evaluated(model, times, x, drives.samples), events=tuple(events))
 
 
 def _checked_times(times: Array) -> Array:
@@ -92,18 +96,18 @@ def _start(model: FlatModel, start: Mapping[str, float]) -> Array:
     return x
 
 
-def _integrated(model: FlatModel, drives: Drives, x0: Array, tolerance: float) -> Array:
+def _integrated(model: FlatModel, drives: Drives, x0: Array, tolerance: float) -> tuple[Array, list[Event]]:
     if not model.states:
-        return np.zeros((0, len(drives.times)))
+        return np.zeros((0, len(drives.times))), []
     try:
-        x = integrate_explicitly(model, drives, x0, tolerance)
+        x, events = integrate_explicitly(model, drives, x0, tolerance)
     except TooStiffError as found:
-        first = found.interval
+        first, events = found.interval, found.events
         rest = integrate_implicitly(model, drives, first, found.states[:, -1], tolerance)
         x = np.hstack([found.states[:, :-1], rest])
     if not np.all(np.isfinite(x)):
         raise ConvergenceError(f"simulation of {model.name}", "a state is not finite")
-    return x
+    return x, events
 
 
 def _stepped(model: FlatModel, times: Array, u: Array, x0: Array) -> Array:

@@ -7,6 +7,7 @@ Solving Ordinary Differential Equations I, section II.5; coefficients from ``sci
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import casadi as ca
@@ -17,6 +18,7 @@ from scipy.integrate import DOP853
 from ..errors import ConvergenceError
 from ..model import FlatModel
 from .drives import Drives
+from .events import LOCATED, Event, Modes, branch_of, located
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,9 @@ NODES: Array = np.asarray(DOP853.C[:STAGES], dtype=float)
 SMALLEST_STEP = 1e-13
 """Shortest step relative to the distance of two samples or to the time itself."""
 
+HOPELESS = 1e6
+"""With an error beyond this a step is shortened before anything is looked for in it."""
+
 WRITTEN_OUT = 2000
 """Right-hand sides with more operations than this are called, not written out twelve times."""
 
@@ -32,41 +37,50 @@ WRITTEN_OUT = 2000
 class TooStiffError(Exception):
     """The steps are held short by stability and not by accuracy; an implicit method is due."""
 
-    def __init__(self, interval: int, states: Array) -> None:
+    def __init__(self, interval: int, states: Array, events: list[Event]) -> None:
         super().__init__(interval)
         self.interval = interval
         self.states = states
+        self.events = events
 
 
 @lru_cache(maxsize=16)
-def step_function(equations: ca.Function) -> ca.Function:
-    """Return (t, h, x, U, p, tolerance, nominal) -> (x after the step, error relative to the tolerance).
+def step_function(branch: ca.Function) -> ca.Function:
+    """Return (t, h, x, U, p, tolerance, nominal, m) -> (x after the step, error, c, d, v).
+
+    The error is relative to the tolerance. c and d say for each switch whether its mode lasts at the end
+    and in the middle of the step, v is the rate at the end.
 
     Parameters
     ----------
-    equations
-        Of a continuous flat model. U holds the inputs at the twelve stages, one column each.
+    branch
+        (t, x, u, p, m) -> (f, c, v). U holds the inputs at the twelve stages and in the middle, one column
+        each.
     """
-    n, m, parameters = (equations.size1_in(i) for i in (1, 2, 3))
-    arguments = [ca.SX.sym(name, equations.size1_in(i)) for i, name in enumerate("txupw")]
-    rate = ca.Function("rate", arguments[:4], [equations.call([*arguments[:4], ca.SX(0, 1)])[0]])
+    n, m, parameters, switches = (branch.size1_in(i) for i in (1, 2, 3, 4))
     t, h, tolerance = ca.MX.sym("t"), ca.MX.sym("h"), ca.MX.sym("tolerance")
-    x, u, p = ca.MX.sym("x", n), ca.MX.sym("u", m, STAGES), ca.MX.sym("p", parameters)
-    nominal = ca.MX.sym("nominal", n)
+    x, u, p = ca.MX.sym("x", n), ca.MX.sym("u", m, STAGES + 1), ca.MX.sym("p", parameters)
+    nominal, modes = ca.MX.sym("nominal", n), ca.MX.sym("m", switches)
     rates: list[ca.MX] = []
 
     def weighted(weights: Array) -> ca.MX:
         return sum((float(w) * k for w, k in zip(weights, rates, strict=False) if w), start=ca.MX.zeros(n))
 
     for i in range(STAGES):
-        rates.append(rate(t + float(NODES[i]) * h, x + h * weighted(DOP853.A[i, :i]), u[:, i], p))
+        place = x + h * weighted(DOP853.A[i, :i])
+        rates.append(branch(t + float(NODES[i]) * h, place, u[:, i], p, modes)[0])
     after = x + h * weighted(DOP853.B)
     scale = tolerance * (nominal + ca.fmax(ca.fabs(x), ca.fabs(after)))
     fifth, third = ca.sumsqr(weighted(DOP853.E5) / scale), ca.sumsqr(weighted(DOP853.E3) / scale)
     # The smallest normal number only keeps 0/0 away.
     error = h * fifth / ca.sqrt(n * (fifth + 0.01 * third) + 2.3e-308)
-    step = ca.Function("step", [t, h, x, u, p, tolerance, nominal], [after, error])
-    if rate.n_instructions() >= WRITTEN_OUT:
+    watched: list[ca.MX] = [ca.MX(0, 1)] * 3
+    if switches:
+        last, at_end, rate = branch(t + h, after, u[:, STAGES - 1], p, modes)
+        middle = (x + after) / 2 + h / 8 * (rates[0] - last)
+        watched = [at_end, branch(t + h / 2, middle, u[:, STAGES], p, modes)[1], rate]
+    step = ca.Function("step", [t, h, x, u, p, tolerance, nominal, modes], [after, error, *watched])
+    if branch.n_instructions() >= WRITTEN_OUT:
         return step
     symbols = [step.sx_in(i) for i in range(step.n_in())]
     # What depends on parameters alone is then computed once and not at every stage.
@@ -76,30 +90,65 @@ def step_function(equations: ca.Function) -> ca.Function:
 class _Stepper:
     """One step at a time through buffers, so that a step costs little more than its arithmetic."""
 
-    def __init__(self, model: FlatModel, tolerance: float) -> None:
-        n, m = len(model.states), len(model.inputs)
+    def __init__(self, model: FlatModel, drives: Drives, tolerance: float, modes: Array) -> None:
+        n, m, k = len(model.states), len(model.inputs), len(modes)
+        self.drives, self._moments = drives, np.append(NODES, 0.5)[: STAGES + (k > 0)]
         self.time, self.length = np.zeros(1), np.zeros(1)
-        self.state, self.inputs = np.zeros(n), np.zeros((STAGES, m))
+        self.state, self._inputs = np.zeros(n), np.zeros((STAGES + 1, m))
         self.after, self.error = np.zeros(n), np.zeros(1)
+        self.end, self.middle, self.rate = np.ones(k), np.ones(k), np.zeros(k)
         nominal = np.array([v.nominal for v in model.states])
         fixed = (model.start(model.parameters), np.array([tolerance]), nominal)
-        self._kept = (self.time, self.length, self.state, self.inputs, *fixed)
-        self._buffer, self._evaluate = step_function(model.equations).buffer()
+        self._kept = (self.time, self.length, self.state, self._inputs, *fixed, modes)
+        branch = branch_of(model.switching, model.equations)
+        self._buffer, self._evaluate = step_function(branch).buffer()
         for i, values in enumerate(self._kept):
             self._buffer.set_arg(i, memoryview(values))  # type: ignore[call-arg, arg-type]
-        for i, values in enumerate((self.after, self.error)):
+        for i, values in enumerate((self.after, self.error, self.end, self.middle, self.rate)):
             self._buffer.set_res(i, memoryview(values))  # type: ignore[call-arg, arg-type]
 
-    def step(self, drives: Drives, interval: int, time: float, length: float) -> float:
+    def step(self, interval: int, time: float, length: float) -> float:
         """Try a step from ``state`` to ``after`` and return its error; 1 is as large as it may be."""
         self.time[0], self.length[0] = time, length
-        drives.at(interval, time + length * NODES, self.inputs)
+        self.drives.at(interval, time + length * self._moments, self._inputs[: len(self._moments)])
         self._evaluate()
         return float(self.error[0])
 
+    def ends(self) -> bool:
+        """Tell whether a mode has ended in the last step."""
+        return bool(self.end.min() < 0.0 or self.middle.min() < 0.0)
 
-def integrate_explicitly(model: FlatModel, drives: Drives, x0: Array, tolerance: float) -> Array:
-    """Return the states at the sample times, shape (states, n); no step reaches across a sample.
+    def settle(self, modes: Modes, time: float) -> None:
+        """After a step that was taken, change the modes that have ended and keep what is held."""
+        inputs = self._inputs[STAGES - 1]
+        if self.end.min() < 0.0:
+            modes.settle(time, self.state, inputs)
+        elif len(modes.held) and self.rate[modes.held].any():
+            modes.keep(time, self.state, inputs)
+
+    def shortened(self, interval: int, length: float, distance: float) -> float:
+        """Take the step anew so that it ends where the first mode ends; return its length."""
+        time = float(self.time[0])
+
+        def lasts(length: float) -> float:
+            self.step(interval, time, length)
+            return float(self.end.min())
+
+        if self.end.min() >= 0.0:
+            # Something has ended in the middle of the step, and begun again.
+            if lasts(length / 2) >= 0.0:
+                self.step(interval, time, length)
+                return length
+            length /= 2
+        return located(lasts, length, max(LOCATED * distance, 4 * math.ulp(time)))
+
+
+def integrate_explicitly(
+    model: FlatModel, drives: Drives, x0: Array, tolerance: float
+) -> tuple[Array, list[Event]]:
+    """Return the states at the sample times, shape (states, n), and the events.
+
+    No step reaches across a sample or an event.
 
     Parameters
     ----------
@@ -117,11 +166,17 @@ def integrate_explicitly(model: FlatModel, drives: Drives, x0: Array, tolerance:
     TooStiffError
         If stability holds the steps short, with what was found so far.
     ConvergenceError
-        If no step is short enough.
+        If no step is short enough, or events accumulate.
     """
-    times, stepper = drives.times.tolist(), _Stepper(model, tolerance)
+    times = drives.times.tolist()
+    modes = Modes(model, times[-1] - times[0]) if model.switching else None
+    stepper = _Stepper(model, drives, tolerance, modes.now if modes else np.zeros(0))
     states = np.zeros((len(x0), len(times)))
-    states[:, 0] = stepper.state[:] = x0
+    stepper.state[:] = x0
+    if modes:
+        modes.begin(times[0], stepper.state, drives.at(0, drives.times[:1])[0])
+    states[:, 0] = stepper.state
+    can_be_handed_over = modes is None or not modes.jump
     wanted, budget, done = times[1] - times[0], 40 * 20.0, 0
     for k, end in enumerate(times[1:]):
         now = times[k]
@@ -129,24 +184,29 @@ def integrate_explicitly(model: FlatModel, drives: Drives, x0: Array, tolerance:
             left = end - now
             # A sliver of a step at the end would cost as much as a whole one.
             length = left if left <= 1.001 * wanted else wanted
-            error = stepper.step(drives, k, now, length)
+            error = stepper.step(k, now, length)
+            ended = modes is not None and error < HOPELESS and stepper.ends()
+            taken = stepper.shortened(k, length, end - times[k]) if ended else length
+            error = float(stepper.error[0])
             if error <= 1.0:
-                now = end if length == left else now + length
+                now = end if taken == left else now + taken
                 stepper.state[:] = stepper.after
-                longer = length * min(10.0, 0.9 * max(error, 1e-30) ** -0.125)
-                wanted = max(wanted, longer) if length == left else longer
+                longer = taken * min(10.0, 0.9 * max(error, 1e-30) ** -0.125)
+                wanted = max(wanted, longer) if taken == left or ended else longer
+                if modes:
+                    stepper.settle(modes, now)
             else:
-                wanted = length * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.2)
+                wanted = taken * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.2)
                 if wanted < SMALLEST_STEP * max(abs(now), end - times[k]):
                     raise _no_step(model, now)
             done += 1
             if done > budget:
-                if _held_by_stability(model, drives, k, stepper.state, wanted):
-                    raise TooStiffError(k, states[:, : k + 1])
+                if can_be_handed_over and _held_by_stability(model, drives, k, stepper.state, wanted):
+                    raise TooStiffError(k, states[:, : k + 1], modes.events if modes else [])
                 budget *= 2.0
         states[:, k + 1] = stepper.state
         budget += 40.0
-    return states
+    return states, modes.events if modes else []
 
 
 def _held_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, wanted: float) -> bool:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import MeasurementError, unknown_name
 from ..model import Variable
+from .events import Event
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-9
@@ -101,6 +102,8 @@ class Trace:
         For messages and legends.
     warnings
         Signals that left the range in which their law is stated to hold.
+    events
+        What happened, in order of time.
     """
 
     time: Array
@@ -108,6 +111,7 @@ class Trace:
     units: Mapping[str, str]
     name: str = ""
     warnings: tuple[RangeWarning, ...] = ()
+    events: tuple[Event, ...] = ()
 
     def __post_init__(self) -> None:
         for signal, values in self.signals.items():

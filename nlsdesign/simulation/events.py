@@ -1,0 +1,238 @@
+"""Events: where a model is not smooth, the step ends there, and goes on with the equations of the other side.
+
+Between events the modes of all switches are held, so each step sees smooth equations only. For each switch
+the model gives a number that is not negative while its mode lasts; it is looked at in the middle and at the
+end of each step. Where one has become negative, the step is taken anew with shorter and shorter lengths until
+the moment is known. Source: Shampine and Thompson 2000, Event location for ordinary differential equations;
+for the laws that hold a rate, Pfeiffer and Glocker 1996, Multibody Dynamics with Unilateral Contacts.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError
+from ..model import FlatModel
+from ..model.switching import Switching
+
+Array = NDArray[np.float64]
+
+LOCATED = 1e-12
+"""An event is known to this share of the distance of two samples, or to four units in the last place."""
+
+REBOUND = 2
+MOST_AT_ONCE = 40
+CROWD, CROWDED = 200, 1e-7
+"""So many events within this share of the whole time are taken for infinitely many."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at a moment.
+
+    Parameters
+    ----------
+    time
+        In s.
+    name
+        Full name of the element.
+    what
+        For instance "sticks".
+    """
+
+    time: float
+    name: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.time:.9g} s: {self.name} {self.what}"
+
+
+def located(lasts: Callable[[float], float], length: float, finest: float) -> float:
+    """Return the shortest length known at which something has ended.
+
+    Parameters
+    ----------
+    lasts
+        Takes a length of step; not negative while everything lasts. It is called last with the result.
+    length
+        Where something has ended.
+    finest
+        Uncertainty that is allowed.
+    """
+    low, high = 0.0, length
+    at_low, at_high = np.inf, lasts(length)
+    halve = True
+    while high - low > finest:
+        # A false position that does not shrink the bracket by half is followed by a halving.
+        middle = (low + high) / 2
+        if not halve and np.isfinite(at_low) and at_low > 0.0:
+            share = at_low / (at_low - at_high)
+            middle = min(max(low + share * (high - low), low + finest / 2), high - finest / 2)
+        before, value = high - low, lasts(middle)
+        if value < 0.0:
+            high, at_high = middle, value
+        else:
+            low, at_low = middle, value
+        halve = high - low > before / 2
+    lasts(high)
+    return high
+
+
+class Modes:
+    """The modes of all switches, what changes them, and what has happened.
+
+    Parameters
+    ----------
+    model
+        With switches.
+    span
+        Whole time that is simulated, in s.
+    """
+
+    def __init__(self, model: FlatModel, span: float) -> None:
+        if model.switching is None:
+            raise ValueError("the model has no switches")
+        self._model, self._laws = model, model.switching
+        self._parameters = model.start(model.parameters)
+        self._nominal = np.array([v.nominal for v in model.states])
+        self._recent: deque[float] = deque(maxlen=CROWD)
+        self._crowded = CROWDED * span
+        self.events: list[Event] = []
+        self.now = np.zeros(len(self._laws.switches))
+        self.held = np.zeros(0, dtype=int)
+
+    @property
+    def jump(self) -> bool:
+        """Whether the equations themselves jump at one of them."""
+        return bool(self._laws.jumps)
+
+    def begin(self, time: float, state: Array, inputs: Array) -> None:
+        """Take the modes that belong to a state, which must lie within all stops."""
+        self.now[:] = np.array(self._laws.natural(time, state, inputs, self._parameters)).ravel()
+        self.settle(time, state, inputs, told=False)
+
+    def settle(self, time: float, state: Array, inputs: Array, *, told: bool = True) -> None:
+        """Change the modes that have ended, and the state where it jumps, until all last.
+
+        Parameters
+        ----------
+        time, state, inputs
+            Now; the state is changed in place.
+        told
+            Whether to record events.
+        """
+        before = self.now.copy()
+        rebounds: list[int] = []
+        for _ in range(MOST_AT_ONCE):
+            ended = np.flatnonzero(self._lasts(time, state, inputs) < 0.0)
+            if not len(ended):
+                break
+            for i in ended.tolist():
+                rebounds += self._changed(i, time, state, inputs)
+        else:
+            raise self._too_many(int(ended[0]), time)
+        self.held = np.flatnonzero((self.now == 0.0) & np.array(self._laws.holds))
+        self.keep(time, state, inputs)
+        if told:
+            for i in rebounds:
+                self._tell(time, i, REBOUND)
+            for i, (old, new) in enumerate(zip(before.tolist(), self.now.tolist(), strict=True)):
+                if old != new:
+                    self._tell(time, i, int(new))
+
+    def keep(self, time: float, state: Array, inputs: Array) -> None:
+        """Bring the rates that are held back to exactly zero, without changing any momentum."""
+        if not len(self.held):
+            return
+        rate, _, _, reach, slope = self._landing(time, state, inputs)
+        held = self.held
+        if np.any(rate[held]):
+            change = np.linalg.solve(slope[held] @ reach[:, held], -rate[held])
+            state += reach[:, held] @ change
+            self._check_small(time, np.max(np.abs(reach[:, held] @ change) / self._nominal), int(held[0]))
+            for i in held.tolist():
+                # What rounding has left.
+                left = self._landing(time, state, inputs)[0][i]
+                first = int(np.argmax(np.abs(slope[i])))
+                state[first] -= left / slope[i, first]
+
+    def _changed(self, i: int, time: float, state: Array, inputs: Array) -> list[int]:
+        """Change one mode that has ended; return its number if it has rebounded."""
+        if not self._laws.holds[i]:
+            self.now[i] = -self.now[i]
+            return []
+        rate, target, leads, reach, slope = self._landing(time, state, inputs)
+        if self.now[i] == 0.0:
+            self.now[i] = leads[i]
+            return []
+        impulse = (target[i] - rate[i]) / (slope[i] @ reach[:, i])
+        state += reach[:, i] * impulse
+        if target[i] != 0.0:
+            self._others_after_impact(i, time, state, inputs)
+            return [i]
+        if abs(rate[i]) > 1e-9:
+            self._others_after_impact(i, time, state, inputs)
+        first = int(np.argmax(np.abs(slope[i])))
+        state[first] -= self._landing(time, state, inputs)[0][i] / slope[i, first]
+        self.now[i] = 0.0
+        if self._lasts(time, state, inputs)[i] < 0.0:
+            self.now[i] = self._landing(time, state, inputs)[2][i]
+        return []
+
+    def _others_after_impact(self, i: int, time: float, state: Array, inputs: Array) -> None:
+        natural = np.array(self._laws.natural(time, state, inputs, self._parameters)).ravel()
+        others = np.array(self._laws.holds) & (np.arange(len(self.now)) != i)
+        self.now[others] = natural[others]
+
+    def _lasts(self, time: float, state: Array, inputs: Array) -> Array:
+        found = self._laws.branch(time, state, inputs, self._parameters, self.now)[1]
+        return np.array(found, dtype=float).ravel()
+
+    def _landing(self, time: float, state: Array, inputs: Array) -> tuple[Array, ...]:
+        found = self._laws.landing(time, state, inputs, self._parameters, self.now)
+        rate, target, leads, reach, slope = (np.array(each, dtype=float) for each in found)
+        return rate.ravel(), target.ravel(), leads.ravel(), reach, slope
+
+    def _tell(self, time: float, i: int, mode: int) -> None:
+        switch = self._laws.switches[i]
+        self.events.append(Event(time, switch.name, switch.told(mode)))
+        self._recent.append(time)
+        if len(self._recent) == CROWD and time - self._recent[0] < self._crowded:
+            raise self._too_many(i, time)
+
+    def _check_small(self, time: float, change: float, i: int) -> None:
+        if change > 1e-6:
+            raise ConvergenceError(
+                f"simulation of {self._model.name}",
+                f"'{self._laws.switches[i].name}' sticks, but its rate has changed by t = {time:g} s",
+                next_step="give the acceleration of the driven body as an input too",
+            )
+
+    def _too_many(self, i: int, time: float) -> ConvergenceError:
+        return ConvergenceError(
+            f"simulation of {self._model.name}",
+            f"events of '{self._laws.switches[i].name}' accumulate at t = {time:g} s",
+            next_step="give a stop a speed below which it rests, or take the smooth form of the law",
+        )
+
+
+def branch_of(switching: Switching | None, equations: ca.Function) -> ca.Function:
+    """Return (t, x, u, p, m) -> (f, c, v) of a model; m, c and v are empty where it has no switches.
+
+    Parameters
+    ----------
+    switching, equations
+        Of a continuous flat model.
+    """
+    if switching is not None:
+        return switching.branch
+    given = [ca.SX.sym(name, equations.size1_in(i)) for i, name in enumerate("txup")]
+    rate = equations.call([*given, ca.SX(0, 1)])[0]
+    return ca.Function("branch", [*given, ca.SX.sym("m", 0)], [rate, ca.SX(0, 1), ca.SX(0, 1)])
