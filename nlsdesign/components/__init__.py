@@ -2,6 +2,7 @@
 
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
+from .bristles import LuGreFriction
 from .cable import StretchyCable
 from .cam import Cam, Pulley, TwoSidedCam, control_values
 from .contact import InextensibleCable
@@ -18,14 +19,16 @@ from .misshapen import MisshapenCam
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
-from .play import Backlash, Slack, Turned
+from .play import Backlash, LooseCable, Play, Slack, Turned
 from .sampling import SampleAndHold, SampledEncoder, Tachometer
 from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .slide import ConstantForce, LinearDrive, SlidingFriction
+from .smooth import Sharp, smoothed
 from .springpot import Springpot
 from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
 from .standard import burgers, generalised_maxwell, kelvin_voigt, maxwell, standard_linear_solid
 from .sticking import DryFriction, DryLoadFriction, DryStribeckFriction
+from .stops import EndStop, RigidStop, RoundedEndStop
 from .tie import Tie, tie
 
 __all__ = [
@@ -54,6 +57,7 @@ __all__ = [
     "ElectricMotor",
     "Element",
     "Encoder",
+    "EndStop",
     "ExtendedTube",
     "Fixed",
     "FixedPoint",
@@ -66,21 +70,27 @@ __all__ = [
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
+    "LooseCable",
     "LossyGear",
+    "LuGreFriction",
     "Mass",
     "MisshapenCam",
     "NeoHooke",
     "Ogden",
     "Parallel",
     "Part",
+    "Play",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "RigidStop",
+    "RoundedEndStop",
     "SampleAndHold",
     "SampledEncoder",
     "SaturatingMotor",
     "Sensor",
     "Series",
+    "Sharp",
     "Slack",
     "SlidingFillers",
     "SlidingFriction",
@@ -113,6 +123,7 @@ __all__ = [
     "parallel",
     "pull_only",
     "series",
+    "smoothed",
     "specimen",
     "standard_linear_solid",
     "through",

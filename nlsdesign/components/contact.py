@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..errors import ArrangementError
+from ..quantity import Quantity
 from ..symbolic import Expression, symbol
 from .cable import newton_root
-from .element import TRANSLATION, Combination, Scope, observed_effort
+from .element import TRANSLATION, Combination, Element, Scope, observed_effort
+from .networks import PullOnly
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +51,18 @@ class InextensibleCable(Combination):
         # While taut this is the positive force itself; while slack it must vanish.
         remainder = ca.fmin(ca.substitute(force, left, place), 0)
         scope.check(f"{scope.path}.left", remainder / (1 + ca.fabs(ca.substitute(force, left, motion))))
+        scope.corner(motion - resting, above="becomes taut", below="goes slack")
         scope.define(left, place)
         scope.define(left_rate, ca.if_else(motion >= resting, rate, 0))
         return ca.fmax(ca.substitute(force, left, place), 0)
+
+    def smooth(self, width: float = 0.1) -> Element:
+        """Return :class:`PullOnly`, C∞; the force differs by at most width·ln 2 while nothing relaxes inside.
+
+        Parameters
+        ----------
+        width
+            Force over which the corner is rounded, in N.
+        """
+        rounded = Quantity(width, "N", "assumed: width of the smooth form")
+        return PullOnly(width=rounded, members=self.members)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from ..quantity import Quantity
 from ..symbolic import Expression
 from .element import Scope
 from .part import parameter
-from .sensors import Encoder, Numbers
+from .sensors import Array, Encoder, Numbers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +30,15 @@ class EccentricEncoder(Encoder):
         "1", "turns of the disc per turn of what is read", minimum=1e-3, maximum=1e5, default=1.0
     )
 
-    def read(self, scope: Scope, value: Expression) -> Expression:
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
         """Return the faulty angle rounded to whole counts."""
-        return super().read(scope, value + _error(scope, value))
+        return super().read(scope, value + _error(scope, value), unit)
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return the faulty angles rounded to whole counts."""
+        phase = self.order.number * values
+        error: Array = self.sine.number * np.sin(phase) + self.cosine.number * (np.cos(phase) - 1)
+        return super().recorded(times, values + error, noise)
 
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return the angle behind a reading: three rounds of θ ← reading − error(θ).

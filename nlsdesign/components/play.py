@@ -9,7 +9,7 @@ import casadi as ca
 from ..errors import ArrangementError
 from ..quantity import Quantity
 from ..symbolic import Expression, positive_part
-from .element import ROTATION, TRANSLATION, Combination, Domain, Scope, observed_effort
+from .element import ROTATION, TRANSLATION, Combination, Domain, Element, Scope, observed_effort
 from .part import parameter
 
 
@@ -90,6 +90,70 @@ class Slack(Shifting):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Play(Shifting):
+    """Play with sharp contact: φ = max(θ − g/2, 0) − max(−θ − g/2, 0), for what acts between two inertias.
+
+    Inside the gap the two sides are free; contact is located in simulation. With a damper inside, the torque
+    jumps on contact, and pulls for a moment before contact ends. Source: e.g. Nordin and Gutman 2002.
+    """
+
+    gap: Quantity = parameter("rad", "angle from stop to stop", minimum=0.0, maximum=1.0)
+
+    def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
+        """Return the angle beyond the gap and its derivative."""
+        half = scope.parameter("gap") / 2
+        ahead, behind = (
+            _beyond(scope, self, value, name, words)
+            for value, name, words in (
+                (motion - half, "ahead", ("meets ahead", "parts ahead")),
+                (-motion - half, "behind", ("meets behind", "parts behind")),
+            )
+        )
+        return ahead[0] - behind[0], ahead[1] + behind[1]
+
+    def smooth(self, width: float = 5e-4) -> Element:
+        """Return :class:`Backlash`, C∞; φ differs by at most width·ln 2.
+
+        Parameters
+        ----------
+        width
+            Angle over which a corner is rounded, in rad.
+        """
+        rounded = Quantity(width, "rad", "assumed: width of the smooth form")
+        return Backlash(gap=self.gap, width=rounded, members=self.members)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LooseCable(Shifting):
+    """A cable too long by s, sharp: the element inside is stretched by max(e − s, 0).
+
+    Where it becomes taut or slack is located in simulation. Source: geometry.
+    """
+
+    length: Quantity = parameter("m", "extension that stretches nothing", minimum=0.0, maximum=1.0)
+
+    @property
+    def _wanted(self) -> Domain:
+        return TRANSLATION
+
+    def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
+        """Return the extension left and its derivative."""
+        left = motion - scope.parameter("length")
+        return _beyond(scope, self, left, "", ("becomes taut", "goes slack"))
+
+    def smooth(self, width: float = 1e-5) -> Element:
+        """Return :class:`Slack`, C∞; the extension inside differs by at most width·ln 2.
+
+        Parameters
+        ----------
+        width
+            Extension over which the corner is rounded, in m.
+        """
+        rounded = Quantity(width, "m", "assumed: width of the smooth form")
+        return Slack(length=self.length, width=rounded, members=self.members)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Turned(Shifting):
     """A cam that sits on its shaft turned by θ₀, or an encoder whose zero is off: φ = θ − θ₀.
 
@@ -108,3 +172,15 @@ class Turned(Shifting):
 def _step(value: Expression, width: Expression) -> Expression:
     """Return the derivative of the smooth positive part."""
     return (1 + ca.tanh(value / (2 * width))) / 2
+
+
+def _beyond(
+    scope: Scope, owner: Shifting, value: Expression, name: str, words: tuple[str, str]
+) -> tuple[Expression, Expression]:
+    """Return the positive part of a value and its derivative, and say where its corner is."""
+    if owner.needs_rate:
+        # The rate inside jumps, and with it the effort.
+        share = (1 + scope.side(value, above=words[0], below=words[1], name=name)) / 2
+        return share * value, share
+    scope.corner(value, above=words[0], below=words[1], name=name)
+    return ca.fmax(value, 0), ca.if_else(value > 0, 1, 0)

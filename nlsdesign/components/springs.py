@@ -111,8 +111,27 @@ class StrainStiffening(Elastic):
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the sum over the engaged moduli."""
+        knots = zip(scope.row("knots"), self.knots.values, strict=True)
+        for number, (at, value) in enumerate(knots, start=1):
+            # Rubber in tension has no corner at zero.
+            if value > 0.0:
+                words = f"engages modulus {number}", f"leaves modulus {number}"
+                scope.corner(motion - at, above=words[0], below=words[1], name=f"knot_{number}")
         pairs = zip(scope.row("modulus"), scope.row("knots"), strict=True)
         return sum((k * ca.fmax(motion - at, 0) for k, at in pairs), start=ca.SX(0))
+
+    def smooth(self, width: float = 0.01) -> Element:
+        """Return the law with rounded knots, C∞; the stress differs by at most width·ln 2·Σkᵢ.
+
+        Parameters
+        ----------
+        width
+            Strain over which a knot is rounded.
+        """
+        return SmoothStrainStiffening(
+            modulus=self.modulus, knots=self.knots,
+            width=Quantity(width, "1", "assumed: width of the smooth form"),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

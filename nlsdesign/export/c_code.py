@@ -20,6 +20,7 @@ from .c_text import Real, comment, identifier, real_type, signature
 from .files import filled, write_all
 from .guarded import STATUS_BITS, first_outputs, index_bit
 from .selftest import selftest_source
+from .sharp import refuse_jumps
 from .structures import initialiser, member_paths, structure
 from .tables import placed, table_data
 
@@ -102,6 +103,7 @@ def check_discrete(model: FlatModel) -> None:
     ExportError
         If it is continuous or depends on time.
     """
+    refuse_jumps(model)
     if model.sample_time is None:
         raise ExportError(
             f"model '{model.name}'",

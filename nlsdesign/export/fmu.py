@@ -24,6 +24,7 @@ from .files import draft, shell
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
+from .sharp import refuse_jumps
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _TOKEN = "{token-of-this-content}"
@@ -109,6 +110,7 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
     dict
         Content by path within the FMU.
     """
+    refuse_jumps(model)
     variables = layout(model)
     texts = {"modelDescription.xml": model_description(variables, version=version, token=_TOKEN, step=step)}
     for name, text in fmu_sources(variables, version, _TOKEN).items():

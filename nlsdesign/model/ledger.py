@@ -88,12 +88,33 @@ class Ledger:
         return sorted(names, key=lambda name: self.order.get(name.rpartition(".")[0], len(self.order)))
 
 
-class OwnNames:
-    """What one part has named on the ledger: numbers, inputs, states, signals."""
+class SwitchScope:
+    """What one part says of the places where it is not smooth."""
 
     def __init__(self, ledger: Ledger, path: str) -> None:
         self._ledger = ledger
         self.path = path
+
+    def corner(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
+        """Say that the effort has a corner where a value vanishes."""
+        full = f"{self.path}.{name}" if name else self.path
+        self._ledger.corners.append(Corner(full, value, above, below))
+
+    def side(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
+        """Return a symbol that is 1 where a value is positive and −1 where it is negative."""
+        full = f"{self.path}.{name}" if name else self.path
+        mode = symbol(f"{full}.mode")
+        self._ledger.sides.append(Side(full, value, above, below, mode))
+        return mode
+
+    def hold(self, hold: Hold) -> Expression:
+        """Take an effort that holds a rate at zero, and return it."""
+        self._ledger.holds.append(hold)
+        return hold.effort
+
+
+class OwnNames(SwitchScope):
+    """What one part has named on the ledger: numbers, inputs, states, signals."""
 
     def parameter(self, name: str) -> Expression:
         """Return the symbol of one of the part's own numbers."""
@@ -183,20 +204,3 @@ class PartScope(OwnNames):
         given = [*self._ledger.derivatives.values(), *(e for _, e in self._ledger.signals.values())]
         given += [self._ledger.solutions, *(power for _, power in self._ledger.losses)]
         return any(depends(e, rate) for e in given)
-
-    def corner(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
-        """Say that the effort has a corner where a value vanishes."""
-        full = f"{self.path}.{name}" if name else self.path
-        self._ledger.corners.append(Corner(full, value, above, below))
-
-    def side(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
-        """Return a symbol that is 1 where a value is positive and −1 where it is negative."""
-        full = f"{self.path}.{name}" if name else self.path
-        mode = symbol(f"{full}.mode")
-        self._ledger.sides.append(Side(full, value, above, below, mode))
-        return mode
-
-    def hold(self, hold: Hold) -> Expression:
-        """Take an effort that holds a rate at zero, and return it."""
-        self._ledger.holds.append(hold)
-        return hold.effort
