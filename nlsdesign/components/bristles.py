@@ -46,6 +46,11 @@ class LuGreFriction(Viscous):
         """Angle and torque."""
         return ROTATION
 
+    @property
+    def dissipates(self) -> bool:
+        """False: the bristles store."""
+        return False
+
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T."""
         stiffness, share = scope.parameter("stiffness"), scope.parameter("elastic_share")
@@ -58,4 +63,5 @@ class LuGreFriction(Viscous):
         bending = rate * (1 - plastic * ca.fabs(bent) / most)
         scope.derive(bent, bending)
         damping = scope.parameter("bristle_damping") * bending + scope.parameter("damping") * rate
+        scope.loss(stiffness * bent * (rate - bending) + damping * rate)
         return stiffness * bent + damping

@@ -120,7 +120,9 @@ class DryLoadFriction(Combination):
         inside = sum(torques[1:], start=torques[0])
         scope.corner(inside, above="is loaded forward", below="is loaded backward", name="load")
         level = scope.parameter("ratio") * ca.fabs(inside)
-        return inside + dry(scope, rate, lambda speed: level, level)
+        friction = dry(scope, rate, lambda speed: level, level)
+        scope.loss(friction * rate)
+        return inside + friction
 
     def smooth(self, width: float = CREEP) -> Element:
         """Return the same with tanh(ω/width) for the sign, C∞ but for the corner of |T_in|.

@@ -47,6 +47,11 @@ class ElasticStops(Viscous):
         """Angle and torque."""
         return ROTATION
 
+    @property
+    def dissipates(self) -> bool:
+        """False: a stop stores, and loses what its torque is beyond k·p."""
+        return False
+
     @abstractmethod
     def depths(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
         """Return the penetration of the upper and of the lower stop."""
@@ -105,7 +110,10 @@ class RoundedEndStop(ElasticStops):
 
 
 def _hunt_crossley(scope: Scope, depth: Expression, rate: Expression) -> Expression:
-    return scope.parameter("stiffness") * depth * ca.fmax(1 + scope.parameter("damping") * rate, 0)
+    elastic = scope.parameter("stiffness") * depth
+    torque = elastic * ca.fmax(1 + scope.parameter("damping") * rate, 0)
+    scope.loss((torque - elastic) * rate)
+    return torque
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -179,7 +179,9 @@ def _check_linear(holds: Sequence[Hold], matrix: Expression, moving: Expression,
     names = " and ".join(f"'{h.name}'" for h in holds)
     if depends(matrix, efforts) or depends(moving, efforts):
         raise ArrangementError(
-            names, "the load of one dry friction contains the torque of another", next_step=_SMOOTH
+            names,
+            "what it takes to hold is not linear: a load contains another dry friction, or a gear loses",
+            next_step=_SMOOTH,
         )
     draw = np.random.default_rng(1)
     modes = ca.vertcat(*[h.mode for h in holds])

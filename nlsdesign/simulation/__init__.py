@@ -6,6 +6,4 @@ from .measure import measure
 from .signals import Sine, sine
 from .trace import RangeWarning, Trace, range_warnings
 
-__all__ = ["Sine", "Trace", "measure", "simulate", "sine"]
-__all__ = ["RangeWarning", "Sine", "Trace", "range_warnings", "simulate", "sine"]
-__all__ = ["Event", "Sine", "Trace", "simulate", "sine"]
+__all__ = ["Event", "RangeWarning", "Sine", "Trace", "measure", "range_warnings", "simulate", "sine"]

@@ -293,7 +293,7 @@ def test_the_same_motion_held_twice_is_refused_by_name() -> None:
 def test_load_that_contains_friction_is_refused_by_name() -> None:
     inside = parallel(k=TorsionSpring(stiffness=K), rub=DryFriction(sliding_torque=T))
     made = wheel(DryLoadFriction(ratio=0.1, members=(("in", inside),)), damper=TorsionDashpot(damping=1e-3))
-    with pytest.raises(ArrangementError, match="contains the torque of another"):
+    with pytest.raises(ArrangementError, match="a load contains another dry friction"):
         flatten(made)
 
 
