@@ -13,6 +13,7 @@ from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel,
 from .encoders import EccentricEncoder
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .gear import Gear, LossyGear
+from .history import PermanentSet, Softening
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
 from .misshapen import MisshapenCam
@@ -29,12 +30,14 @@ from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffe
 from .standard import burgers, generalised_maxwell, kelvin_voigt, maxwell, standard_linear_solid
 from .sticking import DryFriction, DryLoadFriction, DryStribeckFriction
 from .stops import EndStop, RigidStop, RoundedEndStop
+from .thermal import ArrheniusShift, SelfHeating, WlfShift
 from .tie import Tie, tie
 
 __all__ = [
     "MATERIAL",
     "ROTATION",
     "TRANSLATION",
+    "ArrheniusShift",
     "Assembly",
     "Backlash",
     "Body",
@@ -80,6 +83,7 @@ __all__ = [
     "Parallel",
     "Part",
     "Play",
+    "PermanentSet",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
@@ -88,6 +92,7 @@ __all__ = [
     "SampleAndHold",
     "SampledEncoder",
     "SaturatingMotor",
+    "SelfHeating",
     "Sensor",
     "Series",
     "Sharp",
@@ -95,6 +100,7 @@ __all__ = [
     "SlidingFillers",
     "SlidingFriction",
     "SmoothStrainStiffening",
+    "Softening",
     "Specimen",
     "Spring",
     "Springpot",
@@ -113,6 +119,7 @@ __all__ = [
     "TwoSidedCam",
     "ViscousMaterial",
     "VoltageDrivenMotor",
+    "WlfShift",
     "Yeoh",
     "assembly",
     "burgers",

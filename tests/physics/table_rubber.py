@@ -19,4 +19,34 @@ ROWS: tuple[Row, ...] = (
         ("simulated Prony series", "power law with the gamma function"),
         "test_networks.py::test_a_step_relaxes_by_a_power_law",
     ),
+    Row(
+        c.Softening,
+        "work lost in a cycle",
+        ("simulated power", "closed form of Ogden and Roxburgh"),
+        "test_history.py::test_what_is_lost_in_softening_is_work_minus_what_comes_back",
+    ),
+    Row(
+        c.PermanentSet,
+        "work = stored + lost",
+        ("simulated power", "½E·ε² and the loss by hand"),
+        "test_history.py::test_work_on_a_set_is_stored_or_lost_while_it_grows",
+    ),
+    Row(
+        c.SelfHeating,
+        "first law",
+        ("simulated power", "heat, elastic energy and heat given off by hand"),
+        "test_history.py::test_the_first_law_holds_at_every_moment",
+    ),
+    Row(
+        c.WlfShift,
+        "time-temperature superposition",
+        ("law at its temperature", "law inside at the shifted frequency"),
+        "test_temperature_shift.py::test_a_shifted_law_is_the_law_at_another_frequency",
+    ),
+    Row(
+        c.ArrheniusShift,
+        "activation energy",
+        ("simulated relaxation at three temperatures", "slope of ln τ over 1/T"),
+        "test_temperature_shift.py::test_arrhenius_by_its_slope",
+    ),
 )

@@ -1,0 +1,193 @@
+"""Laws that know temperature: self-heating, and relaxation times that a temperature shifts."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..errors import ValueRangeError
+from ..quantity import Quantity
+from ..symbolic import Expression
+from .element import UNBOUNDED, Range, Scope
+from .history import MaterialCombination
+from .part import parameter
+
+_ROOM = 293.15
+
+
+@dataclass(frozen=True, kw_only=True)
+class SelfHeating(MaterialCombination):
+    """Rubber that softens by its own heat: σ = g·Σσ with g = 1 − b·T', T' the rise over the ambient T₀.
+
+    C·dT'/dt = g·D − b·T·(P − D) − h·T' with the power P put into the laws inside, what they lose D, and
+    T = T₀ + T'. The middle term is the heat that a spring takes up whose modulus depends on temperature; with
+    it energy is conserved exactly. b = −1/T₀ is the entropy spring of unfilled rubber, b > 0 filled. One
+    temperature for the whole piece: thinner than about a centimetre. Valid while T' < 1/(2·b).
+    Sources: Schapery 1964; Holzapfel 2000, ch. 7.
+    """
+
+    heat_capacity: Quantity = parameter("J/m^3/K", "heat capacity C per volume", minimum=1e3, maximum=1e8)
+    cooling: Quantity = parameter(
+        "W/m^3/K", "heat h given off per volume and kelvin", minimum=0.0, maximum=1e9
+    )
+    softening: Quantity = parameter("1/K", "fall b of the modulus per kelvin", minimum=-0.02, maximum=0.1)
+    ambient: Quantity = parameter(
+        "K", "temperature T₀ around it", minimum=150.0, maximum=600.0, default=_ROOM
+    )
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the stress at the present temperature."""
+        names = ("heat_capacity", "cooling", "softening", "ambient")
+        capacity, cooling, softening, ambient = (scope.parameter(name) for name in names)
+        warming = scope.state("warming", "K", f"temperature of {scope.path} above the ambient")
+        b = self.softening.number
+        scope.signal("warming", warming, "K", "", valid=(-math.inf, 0.5 / b) if b > 0.0 else UNBOUNDED)
+        scope.signal("temperature", ambient + warming, "K", f"temperature of {scope.path}")
+        stress = self.stress_inside(scope, motion, rate)
+        factor, lost = 1 - softening * warming, scope.losses.total()
+        heat = factor * lost - softening * (ambient + warming) * (stress * rate - lost)
+        scope.derive(warming, (heat - cooling * warming) / capacity)
+        scope.losses.note((factor - 1) * lost)
+        scope.signal("lost_power", factor * lost, "W/m^3", f"power that {scope.path} loses per volume")
+        return factor * stress
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeShift(MaterialCombination):
+    """Base of laws by which a temperature multiplies every relaxation time inside with one factor a_T."""
+
+    temperature: Quantity = parameter("K", "temperature T", minimum=100.0, maximum=700.0)
+    reference: Quantity = parameter(
+        "K", "temperature T_r at which the laws inside were measured", minimum=100.0, maximum=700.0
+    )
+
+    @abstractmethod
+    def shift(self, scope: Scope) -> Expression:
+        """Return a_T, one at the reference temperature.
+
+        Parameters
+        ----------
+        scope
+            Gives the parameters.
+        """
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the stress of the laws inside, whose clock runs slower by a_T."""
+        factor = self.shift(scope)
+        scope.signal("time_shift", factor, "1", f"factor on the relaxation times of {scope.path}")
+        stress = self.stress_inside(ReducedTime(scope, factor), motion, factor * rate)
+        # The laws inside have noted their losses per reduced time.
+        scope.losses.note((1 / factor - 1) * scope.losses.total())
+        return stress
+
+
+@dataclass(frozen=True, kw_only=True)
+class WlfShift(TimeShift):
+    """log₁₀ a_T = −c₁·(T − T_r)/(c₂ + T − T_r): how time scales of rubber move above its glass transition.
+
+    With T_r about 50 K above the glass transition, c₁ and c₂ are nearly the same for all amorphous polymers.
+    Valid from the glass transition to 100 K above it; moduli are taken as they are. Source: Williams,
+    Landel and Ferry 1955.
+    """
+
+    c1: Quantity = parameter("1", "constant c₁", minimum=0.1, maximum=100.0, default=8.86)
+    c2: Quantity = parameter("K", "constant c₂", minimum=1.0, maximum=1000.0, default=101.6)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        lowest = self.reference.number - self.c2.number
+        if self.temperature.number <= lowest:
+            raise ValueRangeError(
+                f"temperature = {self.temperature}",
+                f"must lie above reference − c2 = {lowest:g} K, where the law has its pole",
+            )
+
+    def shift(self, scope: Scope) -> Expression:
+        """Return a_T."""
+        over = scope.parameter("temperature") - scope.parameter("reference")
+        return ca.exp(-math.log(10.0) * scope.parameter("c1") * over / (scope.parameter("c2") + over))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArrheniusShift(TimeShift):
+    """ln a_T = B·(1/T − 1/T_r) with B = E_a/R: time scales far above the glass transition, or below it.
+
+    Valid where one activation energy E_a rules; for rubber more than 100 K above its glass transition.
+    Sources: Arrhenius 1889; Ferry 1980, ch. 11.
+    """
+
+    activation: Quantity = parameter(
+        "K", "activation energy over the gas constant, B = E_a/R", minimum=0.0, maximum=1e5
+    )
+
+    def shift(self, scope: Scope) -> Expression:
+        """Return a_T."""
+        inverse = 1 / scope.parameter("temperature") - 1 / scope.parameter("reference")
+        return ca.exp(scope.parameter("activation") * inverse)
+
+
+class ReducedTime:
+    """The scope of laws whose clock runs slower: rates inside are per reduced time ξ, with dξ = dt/a_T.
+
+    Parameters
+    ----------
+    scope
+        In real time.
+    factor
+        a_T.
+    """
+
+    def __init__(self, scope: Scope, factor: Expression) -> None:
+        self._scope, self._factor = scope, factor
+        self.path, self.losses = scope.path, scope.losses
+
+    def child(self, name: str) -> Scope:
+        """Return the scope of a part inside."""
+        return ReducedTime(self._scope.child(name), self._factor)
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of one of the part's own numbers."""
+        return self._scope.parameter(name)
+
+    def row(self, name: str) -> list[Expression]:
+        """Return the symbols of one of the part's own rows of numbers."""
+        return self._scope.row(name)
+
+    def input(self, name: str, unit: str, description: str) -> Expression:
+        """Declare an input."""
+        return self._scope.input(name, unit, description)
+
+    def state(self, name: str, unit: str, description: str) -> Expression:
+        """Declare a state."""
+        return self._scope.state(name, unit, description)
+
+    def derive(self, state: Expression, derivative: Expression) -> None:
+        """Give the derivative of a state in reduced time."""
+        self._scope.derive(state, derivative / self._factor)
+
+    def signal(
+        self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
+    ) -> None:
+        """Give a name to an expression."""
+        self._scope.signal(name, value, unit, description, valid=valid)
+
+    def define(self, unknown: Expression, solution: Expression) -> None:
+        """Give the solution of an unknown."""
+        self._scope.define(unknown, solution)
+
+    def check(self, name: str, residual: Expression) -> None:
+        """Record a residual that must vanish."""
+        self._scope.check(name, residual)
+
+    def total_rate(self, value: Expression, moving: Mapping[Expression, Expression]) -> Expression:
+        """Return the derivative in reduced time; ``moving`` holds rates in reduced time."""
+        real = {symbol: rate / self._factor for symbol, rate in moving.items()}
+        return self._factor * self._scope.total_rate(value, real)
+
+    def rate_is_used(self, rate: Expression) -> bool:
+        """Tell whether anything given so far contains this symbol."""
+        return self._scope.rate_is_used(rate)
