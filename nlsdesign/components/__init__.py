@@ -5,6 +5,8 @@ from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, I
 from .bristles import LuGreFriction
 from .cable import StretchyCable
 from .cam import Cam, Pulley, TwoSidedCam, control_values
+from .cam_shapes import AnchoredCam, OneSidedCam
+from .capstan import CapstanFriction
 from .contact import InextensibleCable
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
@@ -39,10 +41,12 @@ __all__ = [
     "ROTATION",
     "TRANSLATION",
     "ArrheniusShift",
+    "AnchoredCam",
     "Assembly",
     "Backlash",
     "Body",
     "Cam",
+    "CapstanFriction",
     "ConstantForce",
     "CoulombFriction",
     "CurrentDrivenMotor",
@@ -81,6 +85,7 @@ __all__ = [
     "MisshapenCam",
     "NeoHooke",
     "Ogden",
+    "OneSidedCam",
     "Parallel",
     "Part",
     "Play",

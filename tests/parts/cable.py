@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
+    AnchoredCam,
+    CapstanFriction,
     CurrentDrivenMotor,
     CurrentSensor,
     DelayedForceSensor,
@@ -11,15 +13,18 @@ from nlsdesign.components import (
     ForceSensor,
     Gear,
     LossyGear,
+    OneSidedCam,
     Part,
     SampleAndHold,
     SampledEncoder,
+    Spring,
     Tachometer,
     TorqueSensor,
     TransportDelay,
     VoltageDrivenMotor,
 )
 
+ROW = (0.009, 0.0105, 0.0128, 0.0147, 0.0158, 0.0161, 0.0155, 0.0142)
 WINDING = {
     "inertia": 1.4e-5,
     "torque_constant": 0.0302,
@@ -43,6 +48,9 @@ EXAMPLES: dict[type[Part], Part] = {
         CurrentSensor(of="motor.current", bias=0.02, noise=0.04),
         CurrentDrivenMotor(**WINDING),
         VoltageDrivenMotor(**WINDING, inductance=8.2e-5),
+        OneSidedCam(lever_arm=ROW, last_angle=1.2, onset=0.02),
+        AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035),
+        CapstanFriction(members=(("rubber", Spring(stiffness=2500.0)),), friction=0.15, wrap_angle=1.57),
         Gear(between=("motor", "wheel"), ratio=4.0),
         LossyGear(between=("motor", "wheel"), ratio=4.0, efficiency=0.8, back_efficiency=0.7),
     )

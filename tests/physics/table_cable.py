@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
+    AnchoredCam,
+    CapstanFriction,
     CurrentDrivenMotor,
     CurrentSensor,
     DelayedForceSensor,
@@ -11,6 +13,7 @@ from nlsdesign.components import (
     ForceSensor,
     Gear,
     LossyGear,
+    OneSidedCam,
     SampleAndHold,
     SampledEncoder,
     Tachometer,
@@ -96,5 +99,34 @@ ROWS: tuple[Row, ...] = (
         ("simulation", "another integrator, Simpson's rule"),
         "test_motor_and_gear.py::"
         "test_a_swing_through_a_lossy_gear_against_another_integrator_and_its_power_balance",
+    ),
+    Row(
+        OneSidedCam, "δ = ∫H, h = dδ/dθ", ("flat model", "scipy spline, numerical integration"),
+        "test_cam_shapes.py::test_a_one_sided_cam_against_a_spline_integrated_numerically",
+    ),
+    Row(
+        OneSidedCam, "work = energy of spring and cable", ("simulated torque", "energies by hand"),
+        "test_cam_shapes.py::test_work_at_a_cam_is_the_energy_of_the_spring_and_of_the_cable",
+    ),
+    Row(
+        AnchoredCam, "δ = P + √(D² − p²)", ("flat model", "taut string around a polygon"),
+        "test_cam_shapes.py::test_an_anchored_cam_takes_up_a_string_laid_around_it",
+    ),
+    Row(
+        AnchoredCam, "parallel cable as D → ∞", ("anchored cam", "two-sided cam, error like 1/D"),
+        "test_cam_shapes.py::test_a_far_anchor_is_the_parallel_cable",
+    ),
+    Row(
+        AnchoredCam, "ψ = −(θ + asin(h/D))", ("flat model", "contour drawn by the design room"),
+        "test_cam_shapes.py::"
+        "test_the_contour_that_the_design_draws_for_an_anchor_gives_back_its_lever_arm",
+    ),
+    Row(
+        CapstanFriction, "loop area k·E²·sinh(µφ)", ("simulation", "closed form"),
+        "test_cam_shapes.py::test_the_loop_of_a_capstan_has_the_area_of_eytelwein",
+    ),
+    Row(
+        CapstanFriction, "power lost ≥ 0", ("random path, cable that goes slack", "zero"),
+        "test_cam_shapes.py::test_a_capstan_only_takes_power",
     ),
 )  # fmt: skip
