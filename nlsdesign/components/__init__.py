@@ -19,7 +19,6 @@ from .history import PermanentSet, Softening
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
 from .misshapen import MisshapenCam
-from .hysteresis import SlidingFillers
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part

@@ -1,0 +1,91 @@
+"""A drive that pulls rubber to one side: motor, lossy gear, drum, cable around a guide, load side held."""
+
+from __future__ import annotations
+
+from nlsdesign.components import (
+    Assembly,
+    CapstanFriction,
+    CurrentDrivenMotor,
+    CurrentSensor,
+    Fixed,
+    ForceSensor,
+    Inertia,
+    InextensibleCable,
+    LinearElastic,
+    LossyGear,
+    OneSidedCam,
+    SampledEncoder,
+    SmoothStrainStiffening,
+    Specimen,
+    Through,
+    TorsionDashpot,
+    ViscousMaterial,
+    assembly,
+    series,
+    specimen,
+    through,
+    tie,
+)
+from nlsdesign.components.declare import numbers_of, require_same_numbers
+from nlsdesign.deck import Deck
+
+RUBBER = "spring.cable.rope.rubber"
+
+
+def one_sided_cable_drive(deck: Deck) -> Assembly:
+    """Return a drive whose cable pulls for positive angles of the drum only.
+
+    Motor and drum are one state pair, joined by the gear; the cable goes slack when the drum turns back
+    faster than the rubber recovers.
+
+    Parameters
+    ----------
+    deck
+        Numbers of all parts, for instance ``load_deck("one_sided_cable_drive")``.
+
+    Raises
+    ------
+    NlsError
+        If a number is missing, or the deck declares something that this model does not have.
+
+    Examples
+    --------
+    >>> from nlsdesign.deck import load_deck
+    >>> [name for name, _ in one_sided_cable_drive(load_deck("one_sided_cable_drive")).parts][:5]
+    ['motor', 'drum', 'gear', 'load', 'spring']
+    """
+    cable = CapstanFriction(
+        members=(("rope", InextensibleCable(members=(("rubber", _rubber(deck)),))),),
+        **numbers_of(deck, "spring.cable", CapstanFriction),
+    )
+    cam = OneSidedCam(**numbers_of(deck, "spring.cam", OneSidedCam))
+    gear = LossyGear(between=("motor", "drum"), **numbers_of(deck, "gear", LossyGear))
+    encoder = SampledEncoder(of="motor.angle", **numbers_of(deck, "motor_encoder", SampledEncoder))
+    ammeter = CurrentSensor(of="motor.winding_current", **numbers_of(deck, "current_sensor", CurrentSensor))
+    cell = numbers_of(deck, "load_cell", ForceSensor)
+    found = assembly(
+        deck.name,
+        description=deck.description,
+        motor=CurrentDrivenMotor(**numbers_of(deck, "motor", CurrentDrivenMotor)),
+        drum=Inertia(**numbers_of(deck, "drum", Inertia)),
+        gear=gear,
+        load=Fixed(),
+        spring=tie(through(cam, cable=cable, **numbers_of(deck, "spring", Through)), "drum", "load"),
+        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing", TorsionDashpot)), "drum"),
+        motor_encoder=encoder,
+        current_sensor=ammeter,
+        load_cell=ForceSensor(of="spring.cable.rope.force", **cell),
+    )
+    return require_same_numbers(found, deck)
+
+
+def _rubber(deck: Deck) -> Specimen:
+    inside = f"{RUBBER}.relaxing"
+    return specimen(
+        stiff=SmoothStrainStiffening(**numbers_of(deck, f"{RUBBER}.stiff", SmoothStrainStiffening)),
+        relaxing=series(
+            spring=LinearElastic(**numbers_of(deck, f"{inside}.spring", LinearElastic)),
+            dashpot=ViscousMaterial(**numbers_of(deck, f"{inside}.dashpot", ViscousMaterial)),
+        ),
+        **numbers_of(deck, RUBBER, Specimen),
+    )
