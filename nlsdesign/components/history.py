@@ -51,8 +51,8 @@ class Softening(MaterialCombination):
 
     W is the energy of the laws inside and W_m the greatest so far, a state that rises with W and never falls.
     η is 1 on first loading and again where W reaches W_m. The sharp law has a corner there; here W_m − W and
-    the switch of the state are rounded over ``width``·m: σ is C∞ in strain and state, the rate of W_m is C⁰ at
-    a reversal, and W_m lags by about seven widths, so η is off by about ten times ``width``/r. What softens is
+    the switch of the state are rounded over ``width``·m: σ is C∞ in strain and state, the rate of W_m C⁰ at a
+    reversal, and W_m lags by about seven widths, so η is off by about ten times ``width``/r. What softens is
     lost: (erf(W_m/m) − erf((W_m − W)/m))/r per rise of W_m. Valid for what the first pull to a strain does;
     there is no recovery, no set and no loss on reloading. Source: Ogden and Roxburgh 1999.
     """
@@ -89,7 +89,7 @@ class Softening(MaterialCombination):
             return ca.erf(positive_part(below, width) / scale) / strength
 
         softness = softened(greatest - energy)
-        scope.losses.note((softened(greatest) - softness) * growth)
+        scope.loss((softened(greatest) - softness) * growth)
         scope.signal("softening", 1 - softness, "1", f"stress of {scope.path} over that of first loading")
         return (1 - softness) * stress
 
@@ -98,9 +98,9 @@ class Softening(MaterialCombination):
 class PermanentSet(MaterialCombination):
     """A rest length that grows: the laws inside see ε − s with s = c·ε_m, ε_m the greatest strain so far.
 
-    ε_m is a state that rises with ε and never falls; its switch is rounded over ``width``, so σ is C∞ in strain
-    and state and the rate of ε_m is C⁰ at a reversal. What is lost is σ·ds/dt, never negative for laws whose
-    memory fades. A set that is known and no longer grows is :class:`Slack`. Valid for c up to a few
+    ε_m is a state that rises with ε and never falls; its switch is rounded over ``width``, so σ is C∞ in
+    strain and state and the rate of ε_m is C⁰ at a reversal. What is lost is σ·ds/dt, never negative for laws
+    whose memory fades. A set that is known and no longer grows is :class:`Slack`. Valid for c up to a few
     tenths, as tension sets are measured. Source: ISO 2285 (tension set as a part of the strain).
     """
 
@@ -116,7 +116,7 @@ class PermanentSet(MaterialCombination):
         greatest, growth = _greatest(scope, state, motion, rate, scope.parameter("width"))
         share = scope.parameter("share")
         stress = self.stress_inside(scope, motion - share * greatest, rate - share * growth)
-        scope.losses.note(stress * share * growth)
+        scope.loss(stress * share * growth)
         return stress
 
 

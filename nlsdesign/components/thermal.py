@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
 
-from ..errors import ValueRangeError
+from ..errors import ArrangementError, ValueRangeError
 from ..quantity import Quantity
 from ..symbolic import Expression
-from .element import UNBOUNDED, Range, Scope
+from .element import UNBOUNDED, Scope
 from .history import MaterialCombination
-from .part import parameter
+from .part import parameter, walk
+from .reduced import ReducedTime
 
 _ROOM = 293.15
 
@@ -48,10 +48,10 @@ class SelfHeating(MaterialCombination):
         scope.signal("warming", warming, "K", "", valid=(-math.inf, 0.5 / b) if b > 0.0 else UNBOUNDED)
         scope.signal("temperature", ambient + warming, "K", f"temperature of {scope.path}")
         stress = self.stress_inside(scope, motion, rate)
-        factor, lost = 1 - softening * warming, scope.losses.total()
+        factor, lost = 1 - softening * warming, scope.losses()
         heat = factor * lost - softening * (ambient + warming) * (stress * rate - lost)
         scope.derive(warming, (heat - cooling * warming) / capacity)
-        scope.losses.note((factor - 1) * lost)
+        scope.loss((factor - 1) * lost)
         scope.signal("lost_power", factor * lost, "W/m^3", f"power that {scope.path} loses per volume")
         return factor * stress
 
@@ -64,6 +64,16 @@ class TimeShift(MaterialCombination):
     reference: Quantity = parameter(
         "K", "temperature T_r at which the laws inside were measured", minimum=100.0, maximum=700.0
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for path, part in walk(self):
+            if isinstance(part, SelfHeating):
+                raise ArrangementError(
+                    f"{type(self).__name__} member '{path}'",
+                    "heats up and cools in real time, which this law would shift",
+                    next_step="put the shift inside the self-heating",
+                )
 
     @abstractmethod
     def shift(self, scope: Scope) -> Expression:
@@ -79,10 +89,7 @@ class TimeShift(MaterialCombination):
         """Return the stress of the laws inside, whose clock runs slower by a_T."""
         factor = self.shift(scope)
         scope.signal("time_shift", factor, "1", f"factor on the relaxation times of {scope.path}")
-        stress = self.stress_inside(ReducedTime(scope, factor), motion, factor * rate)
-        # The laws inside have noted their losses per reduced time.
-        scope.losses.note((1 / factor - 1) * scope.losses.total())
-        return stress
+        return self.stress_inside(ReducedTime(scope, factor), motion, factor * rate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,66 +135,3 @@ class ArrheniusShift(TimeShift):
         """Return a_T."""
         inverse = 1 / scope.parameter("temperature") - 1 / scope.parameter("reference")
         return ca.exp(scope.parameter("activation") * inverse)
-
-
-class ReducedTime:
-    """The scope of laws whose clock runs slower: rates inside are per reduced time ξ, with dξ = dt/a_T.
-
-    Parameters
-    ----------
-    scope
-        In real time.
-    factor
-        a_T.
-    """
-
-    def __init__(self, scope: Scope, factor: Expression) -> None:
-        self._scope, self._factor = scope, factor
-        self.path, self.losses = scope.path, scope.losses
-
-    def child(self, name: str) -> Scope:
-        """Return the scope of a part inside."""
-        return ReducedTime(self._scope.child(name), self._factor)
-
-    def parameter(self, name: str) -> Expression:
-        """Return the symbol of one of the part's own numbers."""
-        return self._scope.parameter(name)
-
-    def row(self, name: str) -> list[Expression]:
-        """Return the symbols of one of the part's own rows of numbers."""
-        return self._scope.row(name)
-
-    def input(self, name: str, unit: str, description: str) -> Expression:
-        """Declare an input."""
-        return self._scope.input(name, unit, description)
-
-    def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state."""
-        return self._scope.state(name, unit, description)
-
-    def derive(self, state: Expression, derivative: Expression) -> None:
-        """Give the derivative of a state in reduced time."""
-        self._scope.derive(state, derivative / self._factor)
-
-    def signal(
-        self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
-    ) -> None:
-        """Give a name to an expression."""
-        self._scope.signal(name, value, unit, description, valid=valid)
-
-    def define(self, unknown: Expression, solution: Expression) -> None:
-        """Give the solution of an unknown."""
-        self._scope.define(unknown, solution)
-
-    def check(self, name: str, residual: Expression) -> None:
-        """Record a residual that must vanish."""
-        self._scope.check(name, residual)
-
-    def total_rate(self, value: Expression, moving: Mapping[Expression, Expression]) -> Expression:
-        """Return the derivative in reduced time; ``moving`` holds rates in reduced time."""
-        real = {symbol: rate / self._factor for symbol, rate in moving.items()}
-        return self._factor * self._scope.total_rate(value, real)
-
-    def rate_is_used(self, rate: Expression) -> bool:
-        """Tell whether anything given so far contains this symbol."""
-        return self._scope.rate_is_used(rate)

@@ -25,7 +25,7 @@ from nlsdesign.components import (
     maxwell,
     series,
 )
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.errors import ArrangementError, ValueRangeError
 from tests.stretched import VOLUME, pulled, run
 
 from .test_networks import complex_modulus
@@ -117,3 +117,11 @@ def test_what_has_no_clock_is_not_shifted() -> None:
 def test_the_pole_is_named() -> None:
     with pytest.raises(ValueRangeError, match=r"temperature = 150 K: must lie above .* 151\.55 K"):
         wlf(LinearElastic(modulus=1e6), 150.0)
+
+
+def test_a_law_that_cools_in_real_time_is_not_shifted() -> None:
+    inside = SelfHeating(
+        members=(("law", LinearElastic(modulus=1e6)),), heat_capacity=1e6, cooling=1e4, softening=0.0
+    )
+    with pytest.raises(ArrangementError, match=r"WlfShift member 'law'.*real time.*inside the self-heating"):
+        wlf(inside, 273.15)
