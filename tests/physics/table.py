@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from nlsdesign.components import Part
 
+HERE = Path(__file__).parent
+
 
 class Row(NamedTuple):
     """What proves the physics of one component.
@@ -22,7 +24,7 @@ class Row(NamedTuple):
 
 
 def rows() -> list[Row]:
-    """All rows, over all groups."""
-    here = Path(__file__).parent
-    names = sorted(path.stem for path in here.glob("table_*.py"))
+    """All rows: of the groups, and of tests that bring a row of their own."""
+    names = sorted(p.stem for p in HERE.glob("table_*.py"))
+    names += sorted(p.stem for p in HERE.glob("test_*.py") if "\nROWS" in p.read_text(encoding="utf-8"))
     return [row for name in names for row in importlib.import_module(f"tests.physics.{name}").ROWS]
