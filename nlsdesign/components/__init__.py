@@ -1,5 +1,6 @@
 """Parts that can be declared; they never learn what they are used for."""
 
+from .arruda_boyce import ArrudaBoyce
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .bristles import LuGreFriction
@@ -41,6 +42,7 @@ __all__ = [
     "TRANSLATION",
     "AnchoredCam",
     "ArrheniusShift",
+    "ArrudaBoyce",
     "Assembly",
     "Backlash",
     "Body",
