@@ -4,6 +4,7 @@ from matplotlib.figure import Figure
 
 from .cam import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .cam_frames import CamPicture, cam_picture, torque_curve
+from .curves import curves
 from .gap import CandidateShare, HeldOut, RecordError, candidate_shares, gap_bars, held_out_series
 from .numbers import compact, shown_unit, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
@@ -29,6 +30,7 @@ __all__ = [
     "closed_loop",
     "closed_loop_of",
     "compact",
+    "curves",
     "described",
     "gap_bars",
     "held_out_series",

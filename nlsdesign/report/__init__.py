@@ -1,5 +1,6 @@
 """Reports: sections composed into one self-contained file of HTML."""
 
+from .calculation import OUTCOMES, CalculationSection, CalculationStep
 from .cam import CamSection
 from .diagnosis import verdict_sections
 from .mathml import EquationsSection
@@ -18,6 +19,9 @@ from .tables import PublishedNumber, comparison_table, numbers_table
 from .verdict import VerdictSection
 
 __all__ = [
+    "OUTCOMES",
+    "CalculationSection",
+    "CalculationStep",
     "CamSection",
     "Chapter",
     "EquationsSection",
