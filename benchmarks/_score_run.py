@@ -12,7 +12,7 @@ from types import FrameType
 from typing import Any
 
 from benchmarks._score_cases import Case
-from benchmarks._score_yardsticks import YARDSTICKS, Missing, table_of
+from benchmarks._score_yardsticks import YARDSTICKS, MissingError, table_of
 from models.test_rig import test_rig_deck
 from nlsdesign.components import Assembly, InextensibleCable
 from nlsdesign.discrepancy import Verdict, diagnose
@@ -40,7 +40,7 @@ TRUE_SIZES: dict[str, tuple[str, Callable[[Hidden], float]]] = {
 _INTERVAL = 1.96
 
 
-class TooLong(Exception):
+class TooLongError(Exception):
     """A case took longer than it may."""
 
 
@@ -85,7 +85,7 @@ def run(case: Case, limit: int, yardsticks: bool) -> dict[str, Any]:
 
 
 def _give_up(number: int, frame: FrameType | None) -> None:
-    raise TooLong("longer than the limit")
+    raise TooLongError("longer than the limit")
 
 
 def opened(folder: Path) -> tuple[Assembly, RecordSet]:
@@ -134,6 +134,6 @@ def _yardsticks(declared: Assembly, records: RecordSet) -> dict[str, list[str] |
     for name, decide in YARDSTICKS.items():
         try:
             found[name] = decide(table)
-        except Missing as error:
+        except MissingError as error:
             found[name] = f"skipped: {error}"
     return found

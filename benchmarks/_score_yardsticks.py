@@ -37,7 +37,7 @@ THRESHOLD = 0.25
 _ORDERS = tuple(range(4, 61))
 
 
-class Missing(Exception):
+class MissingError(Exception):
     """A yardstick whose library is not installed."""
 
 
@@ -66,7 +66,10 @@ def table_of(declared: Assembly, records: RecordSet) -> Table:
         given = [_regressors(e.record, torque=block.target is None) for e in pieces]
         columns[block.name] = {
             effect: np.concatenate(
-                [(e.floor.filter @ g[effect]) / e.floor.sigma[:, None] for e, g in zip(pieces, given, strict=True)]
+                [
+                    (e.floor.filter @ g[effect]) / e.floor.sigma[:, None]
+                    for e, g in zip(pieces, given, strict=True)
+                ]
             )
             for effect in given[0]
         }  # fmt: skip
@@ -208,7 +211,7 @@ def _sparse(table: Table, block: str, residual: Array, make: Callable[[Any], Any
     try:
         from pysindy import optimizers
     except ImportError:
-        raise Missing("pysindy is not installed") from None
+        raise MissingError("pysindy is not installed") from None
     owners = [e for e, c in table.columns[block].items() for _ in range(c.shape[1])]
     together = np.column_stack(list(table.columns[block].values()))
     size = np.maximum(np.sqrt(np.mean(together**2, axis=0)), 1e-300)
@@ -223,7 +226,7 @@ def _sparse(table: Table, block: str, residual: Array, make: Callable[[Any], Any
 
 
 def _open_blocks(table: Table, choose: Callable[[str, Array], Sequence[str]]) -> list[str]:
-    """Return what is chosen in the open blocks, worst block first; ``unknown`` where it explains too little."""
+    """Return what is chosen in the open blocks, worst first; ``unknown`` where it explains little."""
     ratio = {b: float(np.mean(r**2)) for b, r in table.residuals.items()}
     found: list[str] = []
     for block in sorted((b for b in ratio if ratio[b] > OPEN), key=lambda b: -ratio[b]):

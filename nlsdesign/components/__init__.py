@@ -1,6 +1,7 @@
 """Parts that can be declared; they never learn what they are used for."""
 
 from .arruda_boyce import ArrudaBoyce
+from .ageing import PermanentSet, SelfHeating, StressSoftening
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .bristles import LuGreFriction
@@ -18,6 +19,7 @@ from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRippl
 from .gear import Gear, LossyGear
 from .history import PermanentSet, Softening
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
+from .guide import CableGuide
 from .hysteresis import SlidingFillers
 from .misshapen import MisshapenCam
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
@@ -46,6 +48,7 @@ __all__ = [
     "Assembly",
     "Backlash",
     "Body",
+    "CableGuide",
     "Cam",
     "CapstanFriction",
     "ConstantForce",
@@ -91,6 +94,7 @@ __all__ = [
     "Part",
     "PermanentSet",
     "Play",
+    "PermanentSet",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
@@ -112,6 +116,7 @@ __all__ = [
     "Spring",
     "Springpot",
     "StrainStiffening",
+    "StressSoftening",
     "StretchyCable",
     "StribeckFriction",
     "Tachometer",

@@ -10,7 +10,7 @@ from ..quantity import Quantity
 from ..symbolic import Expression
 from .element import Scope
 from .part import parameter
-from .sensors import Array, ForceSensor, Sensor
+from .sensors import Array, ForceSensor, Numbers, Sensor
 
 
 def _delayed(scope: Scope, value: Expression, unit: str) -> Expression:
@@ -94,6 +94,10 @@ class DriftingForceSensor(ForceSensor):
         drifted = scope.state("drifted", "N", f"drift of {scope.path} so far")
         scope.derive(drifted, scope.parameter("drift"))
         return super().read(scope, value, unit) + drifted
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return (reading − bias − drift so far)/gain."""
+        return super().infer(numbers, reading - numbers.state("drifted"))
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return gain·F + bias + drift so far + noise."""

@@ -34,6 +34,10 @@ class Numbers(Protocol):
         """Return the symbol of one number."""
         ...
 
+    def state(self, name: str) -> Expression:
+        """Return the symbol of one of the part's own states."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor(Part):

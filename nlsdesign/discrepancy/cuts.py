@@ -27,14 +27,20 @@ class _Known:
 
 
 class _SensorNumbers:
-    """The parameters of one sensor as symbols of a flat model."""
+    """The parameters and states of one sensor as symbols of a flat model."""
 
-    def __init__(self, model: FlatModel, parameter: Expression, owner: str) -> None:
+    def __init__(self, model: FlatModel, symbols: tuple[Expression, Expression], owner: str) -> None:
+        parameter, state = symbols
         self._symbols = {v.name: parameter[i] for i, v in enumerate(model.parameters)}
+        self._symbols |= {v.name: state[i] for i, v in enumerate(model.states)}
         self._owner = owner
 
     def parameter(self, name: str) -> Expression:
         """Return the symbol of one number."""
+        return self._symbols[f"{self._owner}.{name}"]
+
+    def state(self, name: str) -> Expression:
+        """Return the symbol of one state."""
         return self._symbols[f"{self._owner}.{name}"]
 
 
@@ -104,8 +110,8 @@ def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Se
 class _Readings:
     """What readings of sensors say of the variables of a model, as symbols that they drive."""
 
-    def __init__(self, assembly: Assembly, model: FlatModel, parameter: Expression) -> None:
-        self._sensors, self._model, self._parameter = assembly.sensors(), model, parameter
+    def __init__(self, assembly: Assembly, model: FlatModel, symbols: tuple[Expression, Expression]) -> None:
+        self._sensors, self._model, self._symbols = assembly.sensors(), model, symbols
         self.drives: dict[str, Drive] = {}
         self.new: dict[str, tuple[Variable, Expression]] = {}
 
@@ -122,7 +128,7 @@ class _Readings:
         """Return what the sensor must have seen, or its derivative."""
         value = self.reading(known, 0)
         if known.sensor is not None:
-            numbers = _SensorNumbers(self._model, self._parameter, known.sensor)
+            numbers = _SensorNumbers(self._model, self._symbols, known.sensor)
             value = self._sensors[known.sensor].infer(numbers, value)
         if order == 0:
             return value
@@ -137,7 +143,7 @@ def _driven(
     name, output, target = what
     s = model.symbols()
     states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
-    readings = _Readings(assembly, model, s.parameter)
+    readings = _Readings(assembly, model, (s.parameter, s.state))
     inferred = readings.inferred
     old, instead = [], []
     prescribed: list[str] = []

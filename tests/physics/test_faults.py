@@ -62,6 +62,9 @@ class _Plain:
     def parameter(self, name: str) -> ca.SX:
         return ca.SX(getattr(self._sensor, name).number)
 
+    def state(self, name: str) -> ca.SX:
+        raise AssertionError(f"an encoder has no state {name}")
+
 
 def test_an_eccentric_disc_reads_what_geometry_says() -> None:
     """A disc whose centre is off by e turns; the head at radius R sees the mark in its line of sight."""

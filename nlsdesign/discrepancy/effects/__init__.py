@@ -1,6 +1,7 @@
 """The catalogue of missing effects: functions that return an assembly with the effect in it."""
 
-from .cable import cable_compliance, cable_slack, cam_angle_offset, cam_profile_error
+from .ageing import permanent_set, self_heating, stress_softening
+from .cable import cable_compliance, cable_friction, cable_slack, cam_angle_offset, cam_profile_error
 from .candidate import Candidate, Effect, Unknown, wrapped
 from .drive import drive_delay, torque_constant_saturation
 from .friction import (
@@ -17,6 +18,7 @@ from .sensing import (
     current_sensor_bias,
     force_sensor_bias,
     force_sensor_delay,
+    force_sensor_drift,
     force_sensor_gain,
 )
 
@@ -41,6 +43,11 @@ ALL: tuple[Effect, ...] = (
     strain_stiffening,
     cam_profile_error,
     angle_sensor_eccentricity,
+    stress_softening,
+    permanent_set,
+    self_heating,
+    cable_friction,
+    force_sensor_drift,
 )
 
 __all__ = [
@@ -51,6 +58,7 @@ __all__ = [
     "angle_sensor_eccentricity",
     "backlash",
     "cable_compliance",
+    "cable_friction",
     "cable_slack",
     "cam_angle_offset",
     "cam_profile_error",
@@ -59,12 +67,16 @@ __all__ = [
     "drive_delay",
     "force_sensor_bias",
     "force_sensor_delay",
+    "force_sensor_drift",
     "force_sensor_gain",
     "load_dependent_friction",
+    "permanent_set",
     "quadratic_drag",
     "rate_independent_hysteresis",
     "second_relaxation",
+    "self_heating",
     "strain_stiffening",
+    "stress_softening",
     "stribeck_friction",
     "torque_constant_saturation",
     "torque_ripple",

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from ...components import (
     Assembly,
+    CableGuide,
     InextensibleCable,
     MisshapenCam,
     PullOnly,
@@ -46,7 +47,18 @@ def stretched(assembly: Assembly) -> list[str]:
     return found
 
 
-def _inside(assembly: Assembly, path: str, kind: type[Element]) -> bool:
+def is_inside(assembly: Assembly, path: str, kind: type[Element]) -> bool:
+    """Tell whether a part, or any part around it, is of a kind.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    path
+        Of the part.
+    kind
+        Of element.
+    """
     owners = path.split(".")
     parts = [assembly[".".join(owners[: i + 1])] for i in range(len(owners))]
     return any(isinstance(p.element if isinstance(p, Tie) else p, kind) for p in parts)
@@ -62,7 +74,7 @@ def cable_compliance(assembly: Assembly) -> Sequence[Candidate]:
     """
     found = []
     for path in stretched(assembly):
-        if _inside(assembly, path, StretchyCable) or assembly.element(path).needs_rate:
+        if is_inside(assembly, path, StretchyCable) or assembly.element(path).needs_rate:
             continue
         stiffness = Quantity(1e5, "N/m", SOURCE)
         edited = wrapped(assembly, path, "elastic", _stretchy(stiffness))
@@ -90,7 +102,7 @@ def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
     """
     found = []
     for path in stretched(assembly):
-        if _inside(assembly, path, Slack) or assembly[path].domain != TRANSLATION:  # type: ignore[attr-defined]
+        if is_inside(assembly, path, Slack) or assembly[path].domain != TRANSLATION:  # type: ignore[attr-defined]
             continue
         length = Quantity(1e-4, "m", SOURCE)
         edited = wrapped(assembly, path, "slack", _slack(length))
@@ -106,6 +118,44 @@ def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
             )
         )
     return found
+
+
+def cable_friction(assembly: Assembly) -> Sequence[Candidate]:
+    """A cable that rubs on a guide: between load cell and cam, or where nothing reads its force, anywhere.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    found = []
+    for path, part in assembly.walk():
+        element = part.element if isinstance(part, Tie) else part
+        if not isinstance(element, Through) or isinstance(element.behind[1], CableGuide):
+            continue
+        for outside in (False, True) if _is_read(assembly, f"{path}.{element.behind[0]}") else (False,):
+            edited = wrapped(assembly, f"{path}.{element.behind[0]}", "guide", _guide, read_outside=outside)
+            found.append(
+                Candidate(
+                    "cable_friction",
+                    f"{path}.{element.behind[0]}",
+                    edited,
+                    (Unknown(f"{path}.guide.wrap", (0.05,), 1e-3, 2.0),),
+                    "force in proportion to the load, against the motion, between motor and load cell"
+                    if not outside
+                    else "a loop of force over extension in proportion to the force, at any speed",
+                    "Euler 1769, Eytelwein 1808",
+                )
+            )
+    return found
+
+
+def _guide(name: str, element: Element) -> Element:
+    return CableGuide(members=((name, element),), wrap=Quantity(0.01, "1", SOURCE))
+
+
+def _is_read(assembly: Assembly, path: str) -> bool:
+    return any(sensor.of.startswith(f"{path}.") for sensor in assembly.sensors().values())
 
 
 def cam_angle_offset(assembly: Assembly) -> Sequence[Candidate]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
@@ -68,7 +68,14 @@ Effect: TypeAlias = Callable[[Assembly], Sequence[Candidate]]
 """A function from an assembly to the ways in which it can have the effect; none where it cannot."""
 
 
-def wrapped(assembly: Assembly, path: str, name: str, wrapper: Callable[[str, Element], Element]) -> Assembly:
+def wrapped(
+    assembly: Assembly,
+    path: str,
+    name: str,
+    wrapper: Callable[[str, Element], Element],
+    *,
+    read_outside: bool = False,
+) -> Assembly:
     """Return the assembly with an element inside a wrapper; sensors go on reading what they read.
 
     Parameters
@@ -82,28 +89,32 @@ def wrapped(assembly: Assembly, path: str, name: str, wrapper: Callable[[str, El
         Name of the wrapper; for a tie, of the element inside.
     wrapper
         Makes the wrapper from the name and the element.
+    read_outside
+        Whether sensors of the element's own motion and effort read those of the wrapper from now on.
     """
     owner, _, last = path.rpartition(".")
     old = assembly.element(path)
     if not owner:
-        inner = f"{path}.{name}"
+        outer, inner = path, f"{path}.{name}"
         edited = assembly.with_part(path, wrapper(name, old))
     else:
-        inner = f"{owner}.{name}.{last}"
+        outer, inner = f"{owner}.{name}", f"{owner}.{name}.{last}"
         holder = assembly[owner]
         children = {
             (name if key == last else key): (wrapper(last, old) if key == last else part)
             for key, part in holder.children().items()
         }
         edited = assembly.with_part(owner, holder.with_children(children))
-    return _reading_on(edited, path, inner)
+    own = (old.domain.motion, old.domain.rate, old.domain.effort) if read_outside else ()
+    renamed = {f"{path}.{signal}": f"{outer}.{signal}" for signal in own}
+    return _reading_on(edited, path, inner, renamed)
 
 
-def _reading_on(assembly: Assembly, old: str, new: str) -> Assembly:
+def _reading_on(assembly: Assembly, old: str, new: str, renamed: Mapping[str, str]) -> Assembly:
     parts = [
         (
             n,
-            replace(p, of=new + p.of[len(old) :])
+            replace(p, of=renamed.get(p.of, new + p.of[len(old) :]))
             if isinstance(p, Sensor) and p.of.startswith(old + ".")
             else p,
         )

@@ -8,6 +8,7 @@ from ...components import (
     Assembly,
     CurrentSensor,
     DelayedForceSensor,
+    DriftingForceSensor,
     EccentricEncoder,
     Encoder,
     ForceSensor,
@@ -156,3 +157,27 @@ def _disc_orders(assembly: Assembly, read: str) -> list[Quantity]:
     if isinstance(body, GearedMotor) and body.gear_ratio.number != 1.0:
         return [once, Quantity(body.gear_ratio.number, "1", "disc on the shaft of the motor")]
     return [once]
+
+
+def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
+    """A load cell whose zero wanders from the start of each record.
+
+    Parameters
+    ----------
+    assembly
+        As declared; load cells with a fault of their own are left out.
+    """
+    return [
+        Candidate(
+            "force_sensor_drift",
+            name,
+            assembly.with_part(
+                name, DriftingForceSensor(**numbers_of(sensor), drift=Quantity(0.0, "N/s", SOURCE))
+            ),
+            (Unknown(f"{name}.drift", (0.0,), -0.05, 0.05, f"{name}.reading"),),
+            "force that is off by more and more over time, also at rest",
+            "data sheets of load cells",
+        )
+        for name, sensor in assembly.sensors().items()
+        if type(sensor) is ForceSensor
+    ]
