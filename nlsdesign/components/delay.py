@@ -97,7 +97,7 @@ class DriftingForceSensor(ForceSensor):
 
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return (reading − bias − drift so far)/gain."""
-        return super().infer(numbers, reading - numbers.state("drifted"))
+        return super().infer(numbers, reading - numbers.memory("drifted"))
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return gain·F + bias + drift so far + noise."""

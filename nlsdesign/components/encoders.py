@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -32,7 +33,7 @@ class EccentricEncoder(Encoder):
 
     def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
         """Return the faulty angle rounded to whole counts."""
-        return super().read(scope, value + _error(scope, value), unit)
+        return super().read(scope, value + _error(scope.parameter, value), unit)
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return the faulty angles rounded to whole counts."""
@@ -47,10 +48,10 @@ class EccentricEncoder(Encoder):
         """
         angle = reading
         for _ in range(3):
-            angle = reading - _error(numbers, angle)
+            angle = reading - _error(numbers.parameter, angle)
         return angle
 
 
-def _error(numbers: Numbers, angle: Expression) -> Expression:
-    phase = numbers.parameter("order") * angle
-    return numbers.parameter("sine") * ca.sin(phase) + numbers.parameter("cosine") * (ca.cos(phase) - 1)
+def _error(number: Callable[[str], Expression], angle: Expression) -> Expression:
+    phase = number("order") * angle
+    return number("sine") * ca.sin(phase) + number("cosine") * (ca.cos(phase) - 1)

@@ -34,7 +34,7 @@ class Numbers(Protocol):
         """Return the symbol of one number."""
         ...
 
-    def state(self, name: str) -> Expression:
+    def memory(self, name: str) -> Expression:
         """Return the symbol of one of the part's own states."""
         ...
 

@@ -39,7 +39,7 @@ class _SensorNumbers:
         """Return the symbol of one number."""
         return self._symbols[f"{self._owner}.{name}"]
 
-    def state(self, name: str) -> Expression:
+    def memory(self, name: str) -> Expression:
         """Return the symbol of one state."""
         return self._symbols[f"{self._owner}.{name}"]
 

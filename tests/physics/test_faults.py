@@ -62,7 +62,7 @@ class _Plain:
     def parameter(self, name: str) -> ca.SX:
         return ca.SX(getattr(self._sensor, name).number)
 
-    def state(self, name: str) -> ca.SX:
+    def memory(self, name: str) -> ca.SX:
         raise AssertionError(f"an encoder has no state {name}")
 
 

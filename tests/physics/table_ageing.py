@@ -1,0 +1,35 @@
+"""Independent roads of rubber that remembers and of a cable that rubs."""
+
+from __future__ import annotations
+
+from nlsdesign import components as c
+from tests.physics.table import Row
+
+_HERE = "test_ageing.py::test_"
+
+ROWS: tuple[Row, ...] = (
+    Row(
+        c.StressSoftening,
+        "work lost in a loop",
+        ("simulated loop", "s·k·X²/6 in closed form"),
+        _HERE + "a_softened_spring_loses_the_work_of_its_first_loop_only",
+    ),
+    Row(
+        c.PermanentSet,
+        "geometry",
+        ("simulated force", "spring of a longer rest length"),
+        _HERE + "a_spring_that_has_set_is_a_longer_spring",
+    ),
+    Row(
+        c.SelfHeating,
+        "first law",
+        ("simulated heat", "quadrature of the work over an exponential"),
+        _HERE + "heat_is_the_work_done_less_what_cooled_off",
+    ),
+    Row(
+        c.CableGuide,
+        "capstan",
+        ("force", "Euler's differential equation along the wrap, integrated"),
+        _HERE + "a_guide_is_eulers_equation",
+    ),
+)
