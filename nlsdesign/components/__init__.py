@@ -20,6 +20,7 @@ from .gear import Gear, LossyGear
 from .history import PermanentSet, Softening
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .guide import CableGuide
+from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
 from .misshapen import MisshapenCam
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
@@ -95,6 +96,7 @@ __all__ = [
     "PermanentSet",
     "Play",
     "PermanentSet",
+    "Play",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
