@@ -212,8 +212,15 @@ def _sparse(table: Table, block: str, residual: Array, make: Callable[[Any], Any
         from pysindy import optimizers
     except ImportError:
         raise MissingError("pysindy is not installed") from None
-    owners = [e for e, c in table.columns[block].items() for _ in range(c.shape[1])]
-    together = np.column_stack(list(table.columns[block].values()))
+    owners: list[str] = []
+    kept: list[Array] = []
+    for effect, columns in table.columns[block].items():
+        for column in columns.T:
+            # A column that an earlier effect brought is not offered twice: Stribeck adds to Coulomb.
+            if not any(np.array_equal(column, other) for other in kept):
+                owners.append(effect)
+                kept.append(column)
+    together = np.column_stack(kept)
     size = np.maximum(np.sqrt(np.mean(together**2, axis=0)), 1e-300)
     scale = np.sqrt(np.mean(residual**2))
     np.random.seed(0)
@@ -222,6 +229,8 @@ def _sparse(table: Table, block: str, residual: Array, make: Callable[[Any], Any
     for effect, coefficient in zip(owners, np.ravel(found.coef_), strict=True):
         if coefficient != 0.0:
             weight[effect] = weight.get(effect, 0.0) + float(coefficient) ** 2
+    if "stribeck_friction" in weight:
+        weight.pop("coulomb_friction", None)
     return sorted(weight, key=lambda e: -weight[e])
 
 

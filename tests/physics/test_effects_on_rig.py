@@ -1,0 +1,53 @@
+"""Each effect of the catalogue leaves its signature on a record of the rig, and explains most of it there.
+
+The rig's formulation of an effect is never the package's. Two records are enough to see it; what to name in
+full sets is the matter of ``test_diagnosis_rig.py`` and of ``benchmarks/discrepancy_score.py``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.discrepancy.compare import Comparison
+from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.discrepancy.effects import ALL
+from nlsdesign.discrepancy.locate import excesses, total_excess
+from nlsdesign.discrepancy.suspicion import typical_sizes
+from nlsdesign.identification import load_records
+from nlsdesign.identification.evidence import Bench
+from nlsdesign.model import flatten
+from tests.diagnosed import declared_rig, with_true_contact
+from tests.rig import ACTUATORS, make_records, write_set
+
+CASES = {
+    "drive_delay": "arm",
+    "torque_constant_saturation": "wrist",
+    "cable_friction": "arm",
+    "cam_profile_error": "wrist",
+    "stress_softening": "arm",
+    "self_heating": "arm",
+    "permanent_set": "wrist",
+    "strain_stiffening": "arm",
+    "force_sensor_drift": "wrist",
+    "angle_sensor_eccentricity": "arm",
+}
+RECORDS = ("sine_45deg_0.5Hz", "sine_25deg_2.0Hz", "sine_15deg_5.0Hz")
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> None:
+    actuator = ACTUATORS[CASES[effect]]
+    write_set(tmp_path, actuator, make_records(actuator, {effect: 1.0}, 21, only=RECORDS))
+    declared = with_true_contact(declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv"))
+    records = load_records(tmp_path, flatten(declared))
+    bench = Bench(records, blocks_of(declared, records.signals))
+    comparison = Comparison(bench, typical_sizes(declared, records))
+    base = comparison.coarsely(comparison.base(declared))
+    before = excesses(base, bench)
+    assert any(each.open for each in before.values()), "the refitted declared model lacks nothing"
+    (tried,) = [e for e in ALL if e.__name__ == effect]
+    with_it = [comparison.with_effect(base, candidate) for candidate in tried(declared)]
+    left = min(total_excess(excesses(h, bench)) for h in with_it)
+    assert left < 0.5 * total_excess(before)
