@@ -10,6 +10,9 @@ from functools import lru_cache
 
 from .errors import UnitError, ValueRangeError, nearest
 
+NOT_STATED = "not stated"
+_CHANGED = f"{NOT_STATED}; changed from"
+
 BASE = ("kg", "m", "s", "A", "K", "rad")
 
 _DEGREE = math.pi / 180.0
@@ -202,9 +205,20 @@ class Quantity:
         value
             New value(s) in SI.
         source
-            New source; the old one stays if it is not given.
+            New source. Without it the copy says so, and of what number the old source spoke.
+
+        Examples
+        --------
+        >>> quantity(2.5, "mm", source="drawing 7").with_value(0.003).source
+        'not stated; changed from 2.5 mm: drawing 7'
         """
-        return replace(self, value=value, source=self.source if source is None else source)
+        new = replace(self, value=value)
+        if source is None:
+            source = self.source if new.value == self.value else changed_source(self._told(), self.source)
+        return replace(new, source=source)
+
+    def _told(self) -> str:
+        return str(self) if len(self.values) <= 4 else f"{len(self.values)} numbers in {self.unit}"
 
     def __str__(self) -> str:
         shown = self.shown
@@ -214,6 +228,20 @@ class Quantity:
             else f"{shown:.6g}"
         )
         return f"{text} {self.unit}" if self.unit != "1" else text
+
+
+def changed_source(old: str, source: str) -> str:
+    """Return the source of a number that was changed without one.
+
+    Parameters
+    ----------
+    old
+        The number as it was, with unit.
+    source
+        Of that number. The first number that had a source is remembered, however often it is changed.
+    """
+    known = source != NOT_STATED and not source.startswith(_CHANGED)
+    return f"{_CHANGED} {old}: {source}" if known else source
 
 
 def quantity(

@@ -300,7 +300,8 @@ def resolved(
     known
         The numbers as they are.
     values
-        Quantities, or numbers in SI, by full name; ``name[3]`` is the third of a row.
+        Quantities, or numbers in SI, by full name; ``name[3]`` is the third of a row. A number without a
+        source says so, and what the old source spoke of.
 
     Raises
     ------

@@ -132,11 +132,11 @@ def sourced(hypothesis: Hypothesis) -> Assembly:
         Fitted.
     """
     fitted = hypothesis.fitted
-    known = fitted.quantities()
+    known, declared = fitted.quantities(), hypothesis.assembly.quantities()
     rows = {name.partition("[")[0] for name in hypothesis.values}
     return fitted.with_values(
         {
-            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {known[n].source}")
+            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {declared[n].source}")
             for n in rows
         }
     )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnitError, ValueRangeError, unknown_name
-from ..quantity import Quantity, same_dimension
+from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .switching import Switching
 
@@ -278,7 +278,9 @@ def _with_start(variable: Variable, given: float | Quantity) -> Variable:
             f"{variable.name} = {value:g} {variable.unit}",
             f"must lie in [{variable.minimum:g}, {variable.maximum:g}] {variable.unit}",
         )
-    source, spread = (
-        (given.source, given.spread) if isinstance(given, Quantity) else (variable.source, variable.spread)
-    )
-    return replace(variable, start=value, source=source, spread=spread)
+    if isinstance(given, Quantity):
+        return replace(variable, start=value, source=given.source, spread=given.spread)
+    source = variable.source
+    if source and value != variable.start:
+        source = changed_source(f"{variable.start:.6g} {variable.unit}", source)
+    return replace(variable, start=value, source=source)

@@ -174,9 +174,24 @@ def test_a_row_is_not_one_number() -> None:
 
 def test_a_copy_keeps_what_is_not_changed() -> None:
     first = quantity(12.5, "mm", source="bench", spread=0.04)
-    assert first.with_value(0.02) == Quantity(0.02, "mm", "bench", 0.04)
+    unsourced = "not stated; changed from 12.5 mm: bench"
+    assert first.with_value(0.02) == Quantity(0.02, "mm", unsourced, 0.04)
+    assert first.with_value(0.0125) == first, "the same number keeps its source"
     assert first.with_value(0.02, "fit").source == "fit"
     assert first.value == 0.0125
+
+
+def test_a_number_changed_without_a_source_says_so() -> None:
+    first = quantity(12.5, "mm", source="Austin 2015, Table I")
+    twice = first.with_value(0.02).with_value(0.03)
+    assert twice.source == "not stated; changed from 12.5 mm: Austin 2015, Table I"
+    assert twice.assumed
+    assert not first.assumed
+    assert quantity(1.0, "m").with_value(2.0).source == "not stated"
+    row = quantity(tuple(float(i) for i in range(6)), "mm", source="table")
+    changed = row.with_value((0.0,) * 6)
+    assert changed.source == "not stated; changed from 6 numbers in mm: table"
+    assert twice.with_value(0.02, "measured").source == "measured"
 
 
 @pytest.mark.parametrize(
