@@ -1,7 +1,7 @@
 """Parts that can be declared; they never learn what they are used for."""
 
-from .arruda_boyce import ArrudaBoyce
 from .ageing import PermanentSet, SelfHeating, StressSoftening
+from .arruda_boyce import ArrudaBoyce
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .bristles import LuGreFriction
@@ -17,9 +17,8 @@ from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel,
 from .encoders import EccentricEncoder
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .gear import Gear, LossyGear
-from .history import PermanentSet, Softening
-from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .guide import CableGuide
+from .history import PermanentSet, Softening
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
 from .misshapen import MisshapenCam
@@ -93,8 +92,6 @@ __all__ = [
     "OneSidedCam",
     "Parallel",
     "Part",
-    "PermanentSet",
-    "Play",
     "PermanentSet",
     "Play",
     "PullOnly",
