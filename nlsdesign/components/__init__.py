@@ -2,6 +2,7 @@
 
 from .ageing import PermanentSet, SelfHeating, StressSoftening
 from .arruda_boyce import ArrudaBoyce
+from .ageing import PermanentSet, SelfHeating, StressSoftening, ViscousHeating
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .bristles import LuGreFriction
@@ -128,6 +129,7 @@ __all__ = [
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
+    "ViscousHeating",
     "ViscousMaterial",
     "VoltageDrivenMotor",
     "WlfShift",

@@ -9,7 +9,7 @@ import casadi as ca
 from ..errors import ArrangementError
 from ..quantity import Quantity
 from ..symbolic import Expression
-from .element import MATERIAL, Combination, Scope, observed_effort
+from .element import MATERIAL, TRANSLATION, Combination, Scope, observed_effort
 from .part import parameter
 
 _LEAST_RATIO = 1e-3
@@ -111,3 +111,29 @@ class SelfHeating(Ageing):
         heating = ca.fabs(inside * rate) / scope.parameter("halving_work")
         scope.derive(heat, heating - heat / scope.parameter("cooling_time"))
         return inside / (1 + heat)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViscousHeating(Ageing):
+    """Heat of viscous loss makes soft: F = F_in/(1 + ϑ), dϑ/dt = ((ẋ/v)² − ϑ)/τ.
+
+    ϑ is the relative loss of stiffness, zero when cold. The loss is that of a dashpot, so a slow motion makes
+    no heat; v is the steady speed at which half of the stiffness would be left. Valid for ϑ below about 0.5
+    and motions slower than the relaxation of the branch that makes the loss. Source: first law with the loss
+    c·ẋ² of a dashpot; Medalia 1991 (heat build-up).
+    """
+
+    halving_speed: Quantity = parameter("m/s", "steady speed v with ϑ = 1", minimum=1e-9, maximum=1e6)
+    cooling_time: Quantity = parameter("s", "time constant τ of cooling", minimum=1e-3, maximum=1e6)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self._inner != TRANSLATION:
+            raise ArrangementError("ViscousHeating", "acts on extension and force")
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the effort of the warm elements."""
+        heat = scope.state("heat", "1", f"relative loss of stiffness of {scope.path} by heat")
+        share = rate / scope.parameter("halving_speed")
+        scope.derive(heat, (share * share - heat) / scope.parameter("cooling_time"))
+        return self._inside(scope, motion, rate) / (1 + heat)

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import CableGuide, Part, PermanentSet, SelfHeating, Spring, StressSoftening
+from nlsdesign.components import (
+    CableGuide,
+    Part,
+    PermanentSet,
+    SelfHeating,
+    Spring,
+    StressSoftening,
+    ViscousHeating,
+)
 
 _INSIDE = (("band", Spring(stiffness=2500.0)),)
 _PARTS: tuple[Part, ...] = (
@@ -10,5 +18,6 @@ _PARTS: tuple[Part, ...] = (
     PermanentSet(members=_INSIDE, share=0.05),
     SelfHeating(members=_INSIDE, halving_work=40.0, cooling_time=8.0),
     StressSoftening(members=_INSIDE, softening=0.2),
+    ViscousHeating(members=_INSIDE, halving_speed=0.3, cooling_time=8.0),
 )
 EXAMPLES: dict[type[Part], Part] = {type(part): part for part in _PARTS}

@@ -27,6 +27,12 @@ ROWS: tuple[Row, ...] = (
         _HERE + "heat_is_the_work_done_less_what_cooled_off",
     ),
     Row(
+        c.ViscousHeating,
+        "first law",
+        ("simulated heat", "quadrature of the loss over an exponential"),
+        _HERE + "viscous_heat_is_the_loss_less_what_cooled_off",
+    ),
+    Row(
         c.CableGuide,
         "capstan",
         ("force", "Euler's differential equation along the wrap, integrated"),

@@ -16,6 +16,7 @@ from nlsdesign.components import (
     SelfHeating,
     Spring,
     StressSoftening,
+    ViscousHeating,
     assembly,
     specimen,
     tie,
@@ -92,6 +93,19 @@ def test_heat_is_the_work_done_less_what_cooled_off() -> None:
     force, signals = forces(SelfHeating(members=BAND, halving_work=work, cooling_time=cooling), times)
     x, v = (np.array([f(t) for t in times]) for f in (place, speed))
     grown = cumulative_trapezoid(np.abs(K * x * v) / work * np.exp(times / cooling), times, initial=0.0)
+    heat = grown * np.exp(-times / cooling)
+    assert heat[-1] > 0.05
+    assert signals["piece.heat"] == pytest.approx(heat, rel=1e-4, abs=1e-6)
+    assert force == pytest.approx(K * x / (1.0 + heat), rel=1e-4, abs=1e-5)
+
+
+def test_viscous_heat_is_the_loss_less_what_cooled_off() -> None:
+    """ϑ(t) = ∫ (ẋ/v)²/τ·e^(−(t − s)/τ) ds."""
+    halving, cooling = 0.02, 3.0
+    times = np.linspace(0.0, 4.0, 8001)
+    force, signals = forces(ViscousHeating(members=BAND, halving_speed=halving, cooling_time=cooling), times)
+    x, v = (np.array([f(t) for t in times]) for f in (place, speed))
+    grown = cumulative_trapezoid((v / halving) ** 2 / cooling * np.exp(times / cooling), times, initial=0.0)
     heat = grown * np.exp(-times / cooling)
     assert heat[-1] > 0.05
     assert signals["piece.heat"] == pytest.approx(heat, rel=1e-4, abs=1e-6)

@@ -8,6 +8,10 @@ import pytest
 
 from nlsdesign.components import (
     Assembly,
+    DrivenPoint,
+    Encoder,
+    ForceSensor,
+    GearedMotor,
     Inertia,
     Spring,
     TorqueSensor,
@@ -18,7 +22,20 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.declare import deck_text, declare
 from nlsdesign.deck import load_deck, read_deck
-from nlsdesign.discrepancy.effects import ALL, Candidate, Effect, Unknown, wrapped
+from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.discrepancy.effects import (
+    ALL,
+    Candidate,
+    Effect,
+    Unknown,
+    angle_sensor_eccentricity,
+    cable_friction,
+    force_sensor_drift,
+    permanent_set,
+    self_heating,
+    stress_softening,
+    wrapped,
+)
 from nlsdesign.discrepancy.effects.cable import stretched
 from nlsdesign.model import flatten
 
@@ -153,3 +170,62 @@ def test_a_user_adds_an_effect_with_one_function() -> None:
     assert "mount.stiffness" in flatten(found.assembly).values
     assert isinstance(found.assembly.element("mount"), TorsionSpring)
     assert not isinstance(found.assembly.element("mount"), Spring)
+
+
+def test_a_specimen_without_motor_ages_and_its_cell_reads_the_aged_force() -> None:
+    strip = declare(load_deck("vhb4910_specimen"))
+    able = {effect.__name__ for effect in ALL if effect(strip)}
+    assert {"stress_softening", "permanent_set", "self_heating", "strain_stiffening"} <= able
+    assert able.isdisjoint(
+        {"drive_delay", "cam_profile_error", "angle_sensor_eccentricity", "cable_friction"}
+    )
+    bare_piece = strip.element("strip.rubber")
+    tied = assembly(
+        "tied", grip=DrivenPoint(), piece=tie(bare_piece, "grip"), cell=ForceSensor(of="piece.force")
+    )
+    for effect in (stress_softening, permanent_set, self_heating):
+        for found in effect(tied):
+            assert found.assembly.sensors()["cell"].of == "piece.force"
+            assert flatten(found.assembly).states
+    (softened,) = stress_softening(tied)
+    model = flatten(softened.assembly.with_values({"piece.softening": 0.5}))
+    largest = [0.02 if v.name == "piece.largest" else 0.0 for v in model.states]
+    soft, virgin = (model.evaluate(state, [0.01, 0.0]) for state in (largest, [0.0] * len(largest)))
+    # Half of half is lost, and the Maxwell branches are softened with the rest.
+    assert soft["cell.reading"] == pytest.approx(0.75 * virgin["cell.reading"])
+
+
+def test_a_motor_without_a_spring_has_the_effects_of_a_drive() -> None:
+    motor = GearedMotor(inertia=1e-3, gear_ratio=10.0, torque_constant=0.05)
+    drive = assembly("drive", motor=motor, encoder=Encoder(of="motor.angle", quantum=1e-3))
+    able = {effect.__name__: len(effect(drive)) for effect in ALL if effect(drive)}
+    assert able == {
+        "coulomb_friction": 1, "stribeck_friction": 1, "quadratic_drag": 1, "torque_ripple": 1,
+        "drive_delay": 1, "torque_constant_saturation": 1, "angle_sensor_eccentricity": 2,
+    }  # fmt: skip
+    once, on_motor = (c.assembly.sensors()["encoder"].order.number for c in angle_sensor_eccentricity(drive))
+    assert (once, on_motor) == (1.0, 10.0)
+
+
+def test_a_guide_stands_on_either_side_of_the_load_cell(rig: Assembly) -> None:
+    before, behind = cable_friction(rig)
+    assert before.assembly.sensors()["force_sensor"].of == "spring.guide.cable.force"
+    assert behind.assembly.sensors()["force_sensor"].of == "spring.guide.force"
+
+
+def test_a_drifting_cell_is_read_without_its_drift(rig: Assembly) -> None:
+    """The balance of the motor sees the force behind the reading: reading less drift so far, at 2 N/s."""
+    (found,) = force_sensor_drift(rig)
+    drifting = found.assembly.with_values({"force_sensor.drift": 2.0})
+    signals = ["motor_encoder.reading", "current_sensor.reading", "force_sensor.reading"]
+    plain, edited = ({b.name: b.model for b in blocks_of(a, signals)}["motor"] for a in (rig, drifting))
+    assert [v.name for v in edited.states] == ["force_sensor.drifted"]
+    assert edited.evaluate([0.0], [0.0] * len(edited.inputs)).keys() >= {"motor.unbalanced"}
+    place = [v.name for v in plain.inputs].index("force_sensor.reading")
+    given = [0.3 if v.name == "motor_encoder.reading" else 0.0 for v in plain.inputs]
+    given[place] = 50.0
+    same = dict(zip([v.name for v in plain.inputs], given, strict=True))
+    later = [same[v.name] + (7.0 if v.name == "force_sensor.reading" else 0.0) for v in edited.inputs]
+    assert edited.evaluate([7.0], later)["motor.unbalanced"] == pytest.approx(
+        plain.evaluate([], given)["motor.unbalanced"]
+    )

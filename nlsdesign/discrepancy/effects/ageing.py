@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ...components import Assembly, PermanentSet, SelfHeating, Specimen, StressSoftening
+from ...components import Assembly, PermanentSet, SelfHeating, Specimen, StressSoftening, ViscousHeating
 from ...components.element import TRANSLATION, Element
 from ...quantity import Quantity
 from .cable import is_inside, stretched
@@ -28,8 +28,9 @@ def _around(
     assembly: Assembly, path: str, name: str, wrapper: Callable[[str, Element], Element]
 ) -> tuple[Assembly, str]:
     """Return the assembly with a wrapper around a piece, and the wrapper's path."""
-    edited = wrapped(assembly, path, name, wrapper, read_outside=True)
     owner = path.rpartition(".")[0]
+    # A tie keeps its name and takes the wrapper; the piece in it gets a name that is no number of the wrapper.
+    edited = wrapped(assembly, path, name if owner else "piece", wrapper, read_outside=True)
     return edited, f"{owner}.{name}" if owner else path
 
 
@@ -91,33 +92,45 @@ def permanent_set(assembly: Assembly) -> Sequence[Candidate]:
 
 
 def self_heating(assembly: Assembly) -> Sequence[Candidate]:
-    """Rubber that grows soft as it is worked, and recovers at rest.
+    """Rubber that grows soft as it is worked and recovers at rest: heat of all work, or of loss.
 
     Parameters
     ----------
     assembly
         As declared.
     """
-    work, cooling = Quantity(100.0, "J", SOURCE), Quantity(10.0, "s", SOURCE)
+    work, speed = Quantity(100.0, "J", SOURCE), Quantity(1.0, "m/s", SOURCE)
+    cooling = Quantity(10.0, "s", SOURCE)
     found = []
     for path in _pieces(assembly, SelfHeating):
-        edited, where = _around(
+        if is_inside(assembly, path, ViscousHeating):
+            continue
+        by_work = _around(
             assembly,
             path,
             "heating",
             lambda n, e: SelfHeating(members=((n, e),), halving_work=work, cooling_time=cooling),
         )
-        found.append(
-            Candidate(
-                "self_heating",
-                path,
-                edited,
-                (
-                    Unknown(f"{where}.halving_work", (20.0,), 1e-3, 1e5),
-                    Unknown(f"{where}.cooling_time", (10.0,), 0.5, 500.0),
-                ),
-                "force that falls while the rubber is worked hard, and comes back at rest",
-                "first law; Medalia 1991",
-            )
+        by_loss = _around(
+            assembly,
+            path,
+            "heating",
+            lambda n, e: ViscousHeating(members=((n, e),), halving_speed=speed, cooling_time=cooling),
         )
+        sizes = ("halving_work", (20.0,), 1e-3, 1e5), ("halving_speed", (0.2,), 1e-3, 1e2)
+        for (edited, where), (size, starts, low, high) in zip((by_work, by_loss), sizes, strict=True):
+            unknowns = (
+                Unknown(f"{where}.{size}", starts, low, high),
+                Unknown(f"{where}.cooling_time", (10.0,), 0.5, 500.0),
+            )
+            found.append(
+                Candidate(
+                    "self_heating",
+                    path,
+                    edited,
+                    unknowns,
+                    "force that falls while the rubber is worked hard, and comes back at rest",
+                    "first law; Medalia 1991",
+                )
+            )
     return found
