@@ -1,8 +1,7 @@
 """Parts that can be declared; they never learn what they are used for."""
 
-from .ageing import PermanentSet, SelfHeating, StressSoftening
-from .arruda_boyce import ArrudaBoyce
 from .ageing import PermanentSet, SelfHeating, StressSoftening, ViscousHeating
+from .arruda_boyce import ArrudaBoyce
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .bristles import LuGreFriction

@@ -29,7 +29,7 @@ def _around(
 ) -> tuple[Assembly, str]:
     """Return the assembly with a wrapper around a piece, and the wrapper's path."""
     owner = path.rpartition(".")[0]
-    # A tie keeps its name and takes the wrapper; the piece in it gets a name that is no number of the wrapper.
+    # A tie keeps its name and takes the wrapper; the piece in it is named unlike any number of it.
     edited = wrapped(assembly, path, name if owner else "piece", wrapper, read_outside=True)
     return edited, f"{owner}.{name}" if owner else path
 
