@@ -1,6 +1,6 @@
 """Parts that can be declared; they never learn what they are used for."""
 
-from .ageing import PermanentSet, SelfHeating, StressSoftening, ViscousHeating
+from .ageing import StressSoftening, TensionSet, ViscousHeating, WorkHeating
 from .arruda_boyce import ArrudaBoyce
 from .assembly import Assembly, assembly
 from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
@@ -119,6 +119,7 @@ __all__ = [
     "StretchyCable",
     "StribeckFriction",
     "Tachometer",
+    "TensionSet",
     "Through",
     "Tie",
     "TorqueRipple",
@@ -132,6 +133,7 @@ __all__ = [
     "ViscousMaterial",
     "VoltageDrivenMotor",
     "WlfShift",
+    "WorkHeating",
     "Yeoh",
     "assembly",
     "burgers",

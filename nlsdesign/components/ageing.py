@@ -65,7 +65,7 @@ class StressSoftening(Ageing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PermanentSet(Ageing):
+class TensionSet(Ageing):
     """Set of rubber: F = F_in(x − s·x_max), the rest length has grown by a share s of the largest motion.
 
     The memory follows a growing motion with the time constant ``following`` and never recovers. Inside a
@@ -85,7 +85,7 @@ class PermanentSet(Ageing):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SelfHeating(Ageing):
+class WorkHeating(Ageing):
     """Heat of working makes soft: F = F_in/(1 + ϑ), dϑ/dt = |F_in·ẋ|/E − ϑ/τ.
 
     ϑ is the relative loss of stiffness, zero when cold. A fixed share of all work becomes heat; E is the work
@@ -100,7 +100,7 @@ class SelfHeating(Ageing):
         super().__post_init__()
         if self._inner == MATERIAL:
             raise ArrangementError(
-                "SelfHeating", "needs work in J; stress times strain rate is work per volume",
+                "WorkHeating", "needs work in J; stress times strain rate is work per volume",
                 next_step="put it around the specimen",
             )  # fmt: skip
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from nlsdesign.components import (
     CableGuide,
     Part,
-    PermanentSet,
-    SelfHeating,
     Spring,
     StressSoftening,
+    TensionSet,
     ViscousHeating,
+    WorkHeating,
 )
 
 _INSIDE = (("band", Spring(stiffness=2500.0)),)
 _PARTS: tuple[Part, ...] = (
     CableGuide(members=_INSIDE, wrap=0.12),
-    PermanentSet(members=_INSIDE, share=0.05),
-    SelfHeating(members=_INSIDE, halving_work=40.0, cooling_time=8.0),
+    TensionSet(members=_INSIDE, share=0.05),
+    WorkHeating(members=_INSIDE, halving_work=40.0, cooling_time=8.0),
     StressSoftening(members=_INSIDE, softening=0.2),
     ViscousHeating(members=_INSIDE, halving_speed=0.3, cooling_time=8.0),
 )

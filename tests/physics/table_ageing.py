@@ -15,13 +15,13 @@ ROWS: tuple[Row, ...] = (
         _HERE + "a_softened_spring_loses_the_work_of_its_first_loop_only",
     ),
     Row(
-        c.PermanentSet,
+        c.TensionSet,
         "geometry",
         ("simulated force", "spring of a longer rest length"),
         _HERE + "a_spring_that_has_set_is_a_longer_spring",
     ),
     Row(
-        c.SelfHeating,
+        c.WorkHeating,
         "first law",
         ("simulated heat", "quadrature of the work over an exponential"),
         _HERE + "heat_is_the_work_done_less_what_cooled_off",

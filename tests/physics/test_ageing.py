@@ -12,11 +12,11 @@ from nlsdesign.components import (
     CableGuide,
     DrivenPoint,
     Element,
-    PermanentSet,
-    SelfHeating,
     Spring,
     StressSoftening,
+    TensionSet,
     ViscousHeating,
+    WorkHeating,
     assembly,
     specimen,
     tie,
@@ -77,7 +77,7 @@ def test_the_exponent_bends_the_way_back_to_virgin_rubber() -> None:
 
 
 def test_a_spring_that_has_set_is_a_longer_spring() -> None:
-    force, signals = forces(PermanentSet(members=BAND, share=0.1, following=1e-4), np.linspace(0.0, 6.0, 601))
+    force, signals = forces(TensionSet(members=BAND, share=0.1, following=1e-4), np.linspace(0.0, 6.0, 601))
     at_half, later = 150, 350
     assert force[at_half] == pytest.approx(K * (0.5 - 0.1) * REACH, rel=2e-3)
     assert force[later] == pytest.approx(force[at_half], rel=1e-4)
@@ -90,7 +90,7 @@ def test_heat_is_the_work_done_less_what_cooled_off() -> None:
     """ϑ(t) = ∫ |F·ẋ|/E·e^(−(t − s)/τ) ds."""
     work, cooling = 2.0, 3.0
     times = np.linspace(0.0, 4.0, 8001)
-    force, signals = forces(SelfHeating(members=BAND, halving_work=work, cooling_time=cooling), times)
+    force, signals = forces(WorkHeating(members=BAND, halving_work=work, cooling_time=cooling), times)
     x, v = (np.array([f(t) for t in times]) for f in (place, speed))
     grown = cumulative_trapezoid(np.abs(K * x * v) / work * np.exp(times / cooling), times, initial=0.0)
     heat = grown * np.exp(-times / cooling)
@@ -115,9 +115,9 @@ def test_viscous_heat_is_the_loss_less_what_cooled_off() -> None:
 def test_heat_needs_work() -> None:
     material = LinearElastic(modulus=1e6)
     with pytest.raises(ArrangementError, match="work"):
-        SelfHeating(members=(("law", material),), halving_work=1.0, cooling_time=1.0)
+        WorkHeating(members=(("law", material),), halving_work=1.0, cooling_time=1.0)
     piece = specimen(area=1e-4, rest_length=0.01, law=material)
-    assert pulled(SelfHeating(members=(("p", piece),), halving_work=1.0, cooling_time=1.0)).states
+    assert pulled(WorkHeating(members=(("p", piece),), halving_work=1.0, cooling_time=1.0)).states
 
 
 def test_a_guide_is_eulers_equation() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ...components import Assembly, PermanentSet, SelfHeating, Specimen, StressSoftening, ViscousHeating
+from ...components import Assembly, Specimen, StressSoftening, TensionSet, ViscousHeating, WorkHeating
 from ...components.element import TRANSLATION, Element
 from ...quantity import Quantity
 from .cable import is_inside, stretched
@@ -74,9 +74,9 @@ def permanent_set(assembly: Assembly) -> Sequence[Candidate]:
     """
     share = Quantity(0.01, "1", SOURCE)
     found = []
-    for path in _pieces(assembly, PermanentSet):
+    for path in _pieces(assembly, TensionSet):
         edited, where = _around(
-            assembly, path, "setting", lambda n, e: PermanentSet(members=((n, e),), share=share)
+            assembly, path, "setting", lambda n, e: TensionSet(members=((n, e),), share=share)
         )
         found.append(
             Candidate(
@@ -102,14 +102,14 @@ def self_heating(assembly: Assembly) -> Sequence[Candidate]:
     work, speed = Quantity(100.0, "J", SOURCE), Quantity(1.0, "m/s", SOURCE)
     cooling = Quantity(10.0, "s", SOURCE)
     found = []
-    for path in _pieces(assembly, SelfHeating):
+    for path in _pieces(assembly, WorkHeating):
         if is_inside(assembly, path, ViscousHeating):
             continue
         by_work = _around(
             assembly,
             path,
             "heating",
-            lambda n, e: SelfHeating(members=((n, e),), halving_work=work, cooling_time=cooling),
+            lambda n, e: WorkHeating(members=((n, e),), halving_work=work, cooling_time=cooling),
         )
         by_loss = _around(
             assembly,
