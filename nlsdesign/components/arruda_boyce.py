@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
 from ..quantity import Quantity
@@ -43,4 +44,4 @@ class ArrudaBoyce(Hyperelastic):
         """Return the series to the fifth power of I₁."""
         first, links = stretch**2 + 2 / stretch, scope.parameter("links")
         terms = [c / links ** (i - 1) * (first**i - 3**i) for i, c in enumerate(_SERIES, start=1)]
-        return scope.parameter("shear_modulus") * sum(terms[1:], start=terms[0])
+        return ca.SX(scope.parameter("shear_modulus") * sum(terms[1:], start=terms[0]))
