@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -256,22 +255,3 @@ def _places(text: str) -> dict[str, tuple[int, int]]:
 
 def _joined(name: str) -> str:
     return re.sub(r"[\s\"']", "", name)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all.
-
-    Parameters
-    ----------
-    path
-        File; its folder is made if needed.
-    text
-        Content.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(path.name + ".part")
-    try:
-        draft.write_text(text, encoding="utf8")
-        os.replace(draft, path)
-    finally:
-        draft.unlink(missing_ok=True)

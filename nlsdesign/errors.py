@@ -114,7 +114,7 @@ class ConvergenceError(NlsError):
 
 
 class ExportError(NlsError):
-    """Generated code could not be written, compiled or loaded."""
+    """A file could not be written, or generated code not compiled or loaded."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel, Variable
 from ..model.linear import LinearModel, jacobian_function
+from ..writing import write_table
 from .rest import rest_states, typical_sizes
 
 Array = NDArray[np.float64]
@@ -126,17 +125,11 @@ class Chart:
             File to write.
         """
         header = [f"{v.name} [{v.unit}]" for v in (self.argument, *self.columns)] + list(self.words)
-        draft = path.with_name(path.name + ".part")
-        try:
-            with draft.open("w", newline="", encoding="utf8") as stream:
-                writer = csv.writer(stream)
-                writer.writerow(header)
-                for i, at in enumerate(self.at):
-                    numbers = [repr(float(value)) for value in (at, *self.values[i])]
-                    writer.writerow(numbers + [text[i] for text in self.words.values()])
-            os.replace(draft, path)
-        finally:
-            draft.unlink(missing_ok=True)
+        rows = [header]
+        for i, at in enumerate(self.at):
+            numbers = [repr(float(value)) for value in (at, *self.values[i])]
+            rows.append(numbers + [text[i] for text in self.words.values()])
+        write_table(path, rows)
 
     def __str__(self) -> str:
         names = [f"{v.name} [{v.unit}]" for v in (self.argument, *self.columns)]

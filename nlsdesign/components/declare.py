@@ -9,9 +9,10 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ..deck import Deck, Written, write_text
+from ..deck import Deck, Written
 from ..errors import DeckError, NlsError, nearest
 from ..quantity import Quantity, parse_unit
+from ..writing import write_text
 from .assembly import Assembly, arrangement_problems
 from .element import Element
 from .gear import Gear

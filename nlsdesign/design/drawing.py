@@ -7,7 +7,6 @@ can be traced to its design. Files appear whole or not at all.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..quantity import Quantity
+from ..writing import write_text
 from .geometry import Contour, turn
 
 Floats = NDArray[np.float64]
@@ -59,14 +59,16 @@ def write_drawings(
         The files, in this order.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     note = " ".join(note.split())
     texts = {
         "csv": csv_text(contour, note=note, cable_radius=cable_radius),
         "svg": svg_text(contour, note=note, cable_radius=cable_radius),
         "dxf": dxf_text(contour, note=note, cable_radius=cable_radius),
     }
-    return [_replaced(folder / f"{name}.{suffix}", text) for suffix, text in texts.items()]
+    paths = [folder / f"{name}.{suffix}" for suffix in texts]
+    for path, text in zip(paths, texts.values(), strict=True):
+        write_text(path, text)
+    return paths
 
 
 def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
@@ -169,13 +171,3 @@ def _svg_line(points: Iterable[Sequence[float]]) -> str:
 
 def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
-def _replaced(path: Path, text: str) -> Path:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-    return path

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from ..components import Assembly
 from ..components.declare import write_deck
-from ..deck import write_text
 from ..identification.evidence import Bench
 from ..identification.measurement import RecordSet
+from ..writing import write_text
 from .compare import Comparison, Hypothesis
 from .cuts import blocks_of
 from .effects import ALL, Effect

@@ -17,10 +17,11 @@ from pathlib import Path
 
 from ..errors import ExportError, ValueRangeError, nearest
 from ..model.flat import FlatModel
+from ..writing import draft
 from .c_text import identifier
 from .compile import Platform, chosen_platforms, compile_library
 from .documentation import icon, page
-from .files import draft, shell
+from .files import shell
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
 import re
-import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +12,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from ..errors import ExportError, nearest
+from ..writing import write_bytes
 from .style import STYLE, TONES, alternative_text
 
 _SVG = "{http://www.w3.org/2000/svg}"
@@ -96,10 +95,10 @@ def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = 
             f"figures as '{suffix}'", "is not a format of figures", did_you_mean=nearest(suffix, SUFFIXES),
             next_step=f"use one of {', '.join(SUFFIXES)}",
         )  # fmt: skip
-    return [
-        _written(Path(folder) / f"{name}{suffix}", _content(figure, suffix))
-        for name, figure in figures.items()
-    ]
+    paths = {Path(folder) / f"{name}{suffix}": figure for name, figure in figures.items()}
+    for path, figure in paths.items():
+        write_bytes(path, _content(figure, suffix))
+    return list(paths)
 
 
 def _content(figure: Figure, suffix: str) -> bytes:
@@ -109,24 +108,6 @@ def _content(figure: Figure, suffix: str) -> bytes:
     with mpl.rc_context(STYLE):
         figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
     return stream.getvalue()
-
-
-def _written(path: Path, content: bytes) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, draft = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(content)
-            os.chmod(draft, 0o644)
-            os.replace(draft, path)
-        finally:
-            Path(draft).unlink(missing_ok=True)
-    except OSError as error:
-        raise ExportError(
-            str(path), f"cannot be written ({error.strerror})", next_step="name another folder"
-        ) from error
-    return path
 
 
 def _drop(root: ET.Element) -> None:

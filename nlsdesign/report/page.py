@@ -11,10 +11,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from ..deck import write_text
 from ..errors import ExportError, ValueRangeError
 from ..figures.style import TONES
 from ..locations import version
+from ..writing import write_text
 from .html import Html, prose, words
 from .sections import Chapter, Place, Section
 

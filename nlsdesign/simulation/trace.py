@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import MeasurementError, unknown_name
 from ..model import Variable
+from ..writing import write_table
 from .events import Event
 
 Array = NDArray[np.float64]
@@ -186,12 +185,4 @@ class Trace:
         """
         header = ["time [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)]
         columns = np.column_stack([self.time, *self.signals.values()])
-        draft = path.with_name(path.name + ".part")
-        try:
-            with draft.open("w", newline="", encoding="utf8") as stream:
-                writer = csv.writer(stream)
-                writer.writerow(header)
-                writer.writerows([[repr(float(v)) for v in row] for row in columns])
-            os.replace(draft, path)
-        finally:
-            draft.unlink(missing_ok=True)
+        write_table(path, [header, *([repr(float(v)) for v in row] for row in columns)])

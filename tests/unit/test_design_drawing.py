@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.design import Contour, contour_from_curvature, fingerprint, write_drawings
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.errors import ExportError, ValueRangeError
 from nlsdesign.quantity import quantity
 
 
@@ -100,7 +100,7 @@ def test_a_write_that_fails_leaves_the_old_file(
         raise OSError("disk full")
 
     monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(ExportError, match=r"cam\.csv: cannot be written \(disk full\)"):
         write_drawings(tmp_path, contour)
     assert [(item.name, item.read_text()) for item in tmp_path.iterdir()] == [("cam.csv", "old")]
 

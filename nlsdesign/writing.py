@@ -1,0 +1,106 @@
+"""Files that appear whole or not at all: every file of the package is written through here."""
+
+from __future__ import annotations
+
+import csv
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import ExportError
+
+
+@contextmanager
+def draft(target: Path) -> Iterator[Path]:
+    """Give a temporary sibling to write to; it takes the place of the target when all went well.
+
+    Parameters
+    ----------
+    target
+        Final path; its folder is made if it is missing.
+
+    Raises
+    ------
+    ExportError
+        If the folder or file cannot be written.
+    """
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as error:
+        raise _not_writable(target, error) from error
+    os.close(handle)
+    try:
+        yield Path(name)
+        # A temporary file is for its owner only.
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except OSError as error:
+        raise _not_writable(target, error) from error
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all, with line ends as they stand.
+
+    Parameters
+    ----------
+    path
+        File; its folder is made if needed.
+    text
+        Content.
+
+    Raises
+    ------
+    ExportError
+        If the folder or file cannot be written.
+    """
+    with draft(path) as name:
+        name.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a binary file whole or not at all.
+
+    Parameters
+    ----------
+    path
+        File; its folder is made if needed.
+    content
+        What it holds.
+
+    Raises
+    ------
+    ExportError
+        If the folder or file cannot be written.
+    """
+    with draft(path) as name:
+        name.write_bytes(content)
+
+
+def write_table(path: Path, rows: Iterable[Sequence[str]]) -> None:
+    """Write a table of comma-separated values whole or not at all.
+
+    Parameters
+    ----------
+    path
+        File; its folder is made if needed.
+    rows
+        Head first.
+
+    Raises
+    ------
+    ExportError
+        If the folder or file cannot be written.
+    """
+    with draft(path) as name, name.open("w", newline="", encoding="utf-8") as stream:
+        csv.writer(stream).writerows(rows)
+
+
+def _not_writable(target: Path, error: OSError) -> ExportError:
+    return ExportError(
+        str(target), f"cannot be written ({error.strerror or error})", next_step="name another file or folder"
+    )
