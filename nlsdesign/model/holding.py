@@ -269,7 +269,7 @@ def switching(
     return Switching(
         laws.switches,
         ca.Function("branch", [*given, modes], ca.cse(branch)),
-        ca.Function("natural", given, [natural_modes(laws)]),
+        ca.Function("natural", given, [ca.densify(natural_modes(laws))]),
         ca.Function("landing", [*given, modes], ca.cse([ca.densify(e) for e in landing])),
         tuple(not rate.is_zero() for rate in laws.rates),
     )

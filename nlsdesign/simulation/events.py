@@ -9,19 +9,18 @@ for the laws that hold a rate, Pfeiffer and Glocker 1996, Multibody Dynamics wit
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
 from ..model import FlatModel
 from ..model.switching import Switching
-
-Array = NDArray[np.float64]
+from .buffered import Array, Buffered
 
 LOCATED = 1e-12
 """An event is known to this share of the distance of two samples, or to four units in the last place."""
@@ -57,6 +56,8 @@ class Event:
 def located(lasts: Callable[[float], float], length: float, finest: float) -> float:
     """Return the shortest length known at which something has ended.
 
+    Source: Chandrupatla 1997, a bracket with inverse quadratic interpolation where that is safe.
+
     Parameters
     ----------
     lasts
@@ -66,23 +67,35 @@ def located(lasts: Callable[[float], float], length: float, finest: float) -> fl
     finest
         Uncertainty that is allowed.
     """
-    low, high = 0.0, length
-    at_low, at_high = np.inf, lasts(length)
-    halve = True
-    while high - low > finest:
-        # A false position that does not shrink the bracket by half is followed by a halving.
-        middle = (low + high) / 2
-        if not halve and np.isfinite(at_low) and at_low > 0.0:
-            share = at_low / (at_low - at_high)
-            middle = min(max(low + share * (high - low), low + finest / 2), high - finest / 2)
-        before, value = high - low, lasts(middle)
-        if value < 0.0:
-            high, at_high = middle, value
+    # At the beginning something may just have changed: there its value says nothing.
+    one, at_one, other, at_other = length, lasts(length), 0.0, np.inf
+    share, last = 0.5, length
+    while abs(other - one) > finest:
+        least = finest / (2 * abs(other - one))
+        last = one + min(max(share, least), 1.0 - least) * (other - one)
+        value = lasts(last)
+        if (value < 0.0) == (at_one < 0.0):
+            third, at_third = one, at_one
         else:
-            low, at_low = middle, value
-        halve = high - low > before / 2
-    lasts(high)
-    return high
+            third, at_third, other, at_other = other, at_other, one, at_one
+        one, at_one = last, value
+        share = _share(one, at_one, other, at_other, third, at_third)
+    ended = one if at_one < 0.0 else other
+    if last != ended:
+        lasts(ended)
+    return ended
+
+
+def _share(one: float, at_one: float, other: float, at_other: float, third: float, at_third: float) -> float:
+    """Return where in the bracket to look next, as a share of the way from one end to the other."""
+    if at_third in (at_one, at_other) or not (math.isfinite(at_other) and math.isfinite(at_third)):
+        return 0.5
+    place, value = (one - other) / (third - other), (at_one - at_other) / (at_third - at_other)
+    if value**2 >= place or (1.0 - value) ** 2 >= 1.0 - place:
+        return 0.5
+    first = at_one / (at_other - at_one) * at_third / (at_other - at_third)
+    second = at_one / (at_third - at_one) * at_other / (at_third - at_other)
+    return first + (third - one) / (other - one) * second
 
 
 class Modes:
@@ -100,12 +113,16 @@ class Modes:
         if model.switching is None:
             raise ValueError("the model has no switches")
         self._model, self._laws = model, model.switching
-        self._parameters = model.start(model.parameters)
+        laws, n = self._laws, len(model.states)
+        self._time, self._state, self._inputs = np.zeros(1), np.zeros(n), np.zeros(len(model.inputs))
+        self.now = np.zeros(len(laws.switches))
+        given = (self._time, self._state, self._inputs, model.start(model.parameters))
+        self._branch, self._natural = Buffered(laws.branch, (*given, self.now)), Buffered(laws.natural, given)
+        self._land = Buffered(laws.landing, (*given, self.now))
         self._nominal = np.array([v.nominal for v in model.states])
         self._recent: deque[float] = deque(maxlen=CROWD)
         self._crowded = CROWDED * span
         self.events: list[Event] = []
-        self.now = np.zeros(len(self._laws.switches))
         self.held = np.zeros(0, dtype=int)
 
     @property
@@ -115,7 +132,7 @@ class Modes:
 
     def begin(self, time: float, state: Array, inputs: Array) -> None:
         """Take the modes that belong to a state, which must lie within all stops."""
-        self.now[:] = np.array(self._laws.natural(time, state, inputs, self._parameters)).ravel()
+        self.now[:] = self._at(self._natural, time, state, inputs)[0]
         self.settle(time, state, inputs, told=False)
 
     def settle(self, time: float, state: Array, inputs: Array, *, told: bool = True) -> None:
@@ -187,18 +204,22 @@ class Modes:
         return []
 
     def _others_after_impact(self, i: int, time: float, state: Array, inputs: Array) -> None:
-        natural = np.array(self._laws.natural(time, state, inputs, self._parameters)).ravel()
+        natural = self._at(self._natural, time, state, inputs)[0]
         others = np.array(self._laws.holds) & (np.arange(len(self.now)) != i)
         self.now[others] = natural[others]
 
+    def _at(self, function: Buffered, time: float, state: Array, inputs: Array) -> tuple[Array, ...]:
+        self._time[0], self._state[:], self._inputs[:] = time, state, inputs
+        function.evaluate()
+        return function.results
+
     def _lasts(self, time: float, state: Array, inputs: Array) -> Array:
-        found = self._laws.branch(time, state, inputs, self._parameters, self.now)[1]
-        return np.array(found, dtype=float).ravel()
+        return self._at(self._branch, time, state, inputs)[1]
 
     def _landing(self, time: float, state: Array, inputs: Array) -> tuple[Array, ...]:
-        found = self._laws.landing(time, state, inputs, self._parameters, self.now)
-        rate, target, leads, reach, slope = (np.array(each, dtype=float) for each in found)
-        return rate.ravel(), target.ravel(), leads.ravel(), reach, slope
+        rate, target, leads, reach, slope = (r.copy() for r in self._at(self._land, time, state, inputs))
+        n, k = len(state), len(rate)
+        return rate, target, leads, reach.reshape((n, k), order="F"), slope.reshape((k, n), order="F")
 
     def _tell(self, time: float, i: int, mode: int) -> None:
         switch = self._laws.switches[i]

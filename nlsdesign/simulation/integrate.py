@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
+from .buffered import Translate, as_it_is
 from .drives import Drive, Drives, drives_of
 from .events import Event
 from .runge_kutta import TooStiffError, integrate_explicitly
@@ -34,6 +35,7 @@ def simulate(
     start: Mapping[str, float] | None = None,
     hold: bool = False,
     tolerance: float = 1e-9,
+    translate: Translate = as_it_is,
 ) -> Trace:
     """Simulate a flat model.
 
@@ -52,6 +54,9 @@ def simulate(
         Whether inputs are held from one sample to the next instead of running linearly between them.
     tolerance
         Error allowed per step, relative to the state and to its nominal size.
+    translate
+        Takes the function of one explicit step and returns a faster one with the same arguments and results,
+        for instance ``nlsdesign.export.natively``.
 
     Returns
     -------
@@ -75,7 +80,7 @@ def simulate(
     if model.sample_time is not None:
         x = _stepped(model, times, drives.samples, x0)
     else:
-        x, events = _integrated(model, drives, x0, tolerance)
+        x, events = _integrated(model, drives, x0, tolerance, translate)
     return replace(_evaluated(model, times, x, drives.samples), events=tuple(events))
 
 
@@ -96,11 +101,13 @@ def _start(model: FlatModel, start: Mapping[str, float]) -> Array:
     return x
 
 
-def _integrated(model: FlatModel, drives: Drives, x0: Array, tolerance: float) -> tuple[Array, list[Event]]:
+def _integrated(
+    model: FlatModel, drives: Drives, x0: Array, tolerance: float, translate: Translate
+) -> tuple[Array, list[Event]]:
     if not model.states:
         return np.zeros((0, len(drives.times))), []
     try:
-        x, events = integrate_explicitly(model, drives, x0, tolerance)
+        x, events = integrate_explicitly(model, drives, x0, tolerance, translate)
     except TooStiffError as found:
         first, events = found.interval, found.events
         rest = integrate_implicitly(model, drives, first, found.states[:, -1], tolerance)

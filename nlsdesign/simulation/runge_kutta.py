@@ -17,6 +17,7 @@ from scipy.integrate import DOP853
 
 from ..errors import ConvergenceError
 from ..model import FlatModel
+from .buffered import Buffered, Translate, as_it_is
 from .drives import Drives
 from .events import LOCATED, Event, Modes, branch_of, located
 
@@ -46,10 +47,10 @@ class TooStiffError(Exception):
 
 @lru_cache(maxsize=16)
 def step_function(branch: ca.Function) -> ca.Function:
-    """Return (t, h, x, U, p, tolerance, nominal, m) -> (x after the step, error, c, d, v).
+    """Return (t, h, x, U, p, tolerance, nominal, m) -> (x after the step, error, c, d, v), all dense.
 
-    The error is relative to the tolerance. c and d say for each switch whether its mode lasts at the end
-    and in the middle of the step, v is the rate at the end.
+    The error is relative to the tolerance. c is not negative if all modes last at the end of the step, d if
+    they do in the middle too; v is the rate of each switch at the end.
 
     Parameters
     ----------
@@ -74,67 +75,66 @@ def step_function(branch: ca.Function) -> ca.Function:
     fifth, third = ca.sumsqr(weighted(DOP853.E5) / scale), ca.sumsqr(weighted(DOP853.E3) / scale)
     # The smallest normal number only keeps 0/0 away.
     error = h * fifth / ca.sqrt(n * (fifth + 0.01 * third) + 2.3e-308)
-    watched: list[ca.MX] = [ca.MX(0, 1)] * 3
+    watched = [ca.MX(1), ca.MX(1), ca.MX(0, 1)]
     if switches:
         last, at_end, rate = branch(t + h, after, u[:, STAGES - 1], p, modes)
         middle = (x + after) / 2 + h / 8 * (rates[0] - last)
-        watched = [at_end, branch(t + h / 2, middle, u[:, STAGES], p, modes)[1], rate]
-    step = ca.Function("step", [t, h, x, u, p, tolerance, nominal, modes], [after, error, *watched])
+        at_middle = branch(t + h / 2, middle, u[:, STAGES], p, modes)[1]
+        watched = [ca.mmin(at_end), ca.mmin(ca.vertcat(at_end, at_middle)), rate]
+    results = [ca.densify(each) for each in (after, error, *watched)]
+    step = ca.Function("step", [t, h, x, u, p, tolerance, nominal, modes], results)
     if branch.n_instructions() >= WRITTEN_OUT:
         return step
     symbols = [step.sx_in(i) for i in range(step.n_in())]
     # What depends on parameters alone is then computed once and not at every stage.
-    return ca.Function("step", symbols, ca.cse([ca.SX(each) for each in step.call(symbols)]))
+    return ca.Function("step", symbols, ca.cse([ca.densify(ca.SX(each)) for each in step.call(symbols)]))
 
 
 class _Stepper:
     """One step at a time through buffers, so that a step costs little more than its arithmetic."""
 
-    def __init__(self, model: FlatModel, drives: Drives, tolerance: float, modes: Array) -> None:
-        n, m, k = len(model.states), len(model.inputs), len(modes)
-        self.drives, self._moments = drives, np.append(NODES, 0.5)[: STAGES + (k > 0)]
-        self.time, self.length = np.zeros(1), np.zeros(1)
-        self.state, self._inputs = np.zeros(n), np.zeros((STAGES + 1, m))
-        self.after, self.error = np.zeros(n), np.zeros(1)
-        self.end, self.middle, self.rate = np.ones(k), np.ones(k), np.zeros(k)
+    def __init__(
+        self, model: FlatModel, drives: Drives, tolerance: float, modes: Array, translate: Translate
+    ) -> None:
+        self._moments = np.append(NODES, 0.5)[: STAGES + (len(modes) > 0)]
+        self._time, self._length = np.zeros(1), np.zeros(1)
+        self.state, self._inputs = np.zeros(len(model.states)), np.zeros((STAGES + 1, len(model.inputs)))
         nominal = np.array([v.nominal for v in model.states])
-        fixed = (model.start(model.parameters), np.array([tolerance]), nominal)
-        self._kept = (self.time, self.length, self.state, self._inputs, *fixed, modes)
-        branch = branch_of(model.switching, model.equations)
-        self._buffer, self._evaluate = step_function(branch).buffer()
-        for i, values in enumerate(self._kept):
-            self._buffer.set_arg(i, memoryview(values))  # type: ignore[call-arg, arg-type]
-        for i, values in enumerate((self.after, self.error, self.end, self.middle, self.rate)):
-            self._buffer.set_res(i, memoryview(values))  # type: ignore[call-arg, arg-type]
+        fixed = (model.start(model.parameters), np.array([tolerance]), nominal, modes)
+        step = translate(step_function(branch_of(model.switching, model.equations)))
+        given = (self._time, self._length, self.state, self._inputs, *fixed)
+        self._step = Buffered(step, given)
+        self.after, self.error, self._end, self._least, self._rate = self._step.results
+        self._drives, self._asked = drives, self._inputs[: len(self._moments)]
 
     def step(self, interval: int, time: float, length: float) -> float:
         """Try a step from ``state`` to ``after`` and return its error; 1 is as large as it may be."""
-        self.time[0], self.length[0] = time, length
-        self.drives.at(interval, time + length * self._moments, self._inputs[: len(self._moments)])
-        self._evaluate()
+        self._time[0], self._length[0] = time, length
+        self._drives.at(interval, time + length * self._moments, self._asked)
+        self._step.evaluate()
         return float(self.error[0])
 
     def ends(self) -> bool:
         """Tell whether a mode has ended in the last step."""
-        return bool(self.end.min() < 0.0 or self.middle.min() < 0.0)
+        return bool(self._least[0] < 0.0)
 
     def settle(self, modes: Modes, time: float) -> None:
         """After a step that was taken, change the modes that have ended and keep what is held."""
         inputs = self._inputs[STAGES - 1]
-        if self.end.min() < 0.0:
+        if self._end[0] < 0.0:
             modes.settle(time, self.state, inputs)
-        elif len(modes.held) and self.rate[modes.held].any():
+        elif len(modes.held) and self._rate[modes.held].any():
             modes.keep(time, self.state, inputs)
 
     def shortened(self, interval: int, length: float, distance: float) -> float:
         """Take the step anew so that it ends where the first mode ends; return its length."""
-        time = float(self.time[0])
+        time = float(self._time[0])
 
         def lasts(length: float) -> float:
             self.step(interval, time, length)
-            return float(self.end.min())
+            return float(self._end[0])
 
-        if self.end.min() >= 0.0:
+        if self._end[0] >= 0.0:
             # Something has ended in the middle of the step, and begun again.
             if lasts(length / 2) >= 0.0:
                 self.step(interval, time, length)
@@ -144,7 +144,7 @@ class _Stepper:
 
 
 def integrate_explicitly(
-    model: FlatModel, drives: Drives, x0: Array, tolerance: float
+    model: FlatModel, drives: Drives, x0: Array, tolerance: float, translate: Translate = as_it_is
 ) -> tuple[Array, list[Event]]:
     """Return the states at the sample times, shape (states, n), and the events.
 
@@ -160,6 +160,8 @@ def integrate_explicitly(
         States at the first time.
     tolerance
         Error allowed per step, relative to the state and to its nominal size.
+    translate
+        Makes the function of a step a faster one.
 
     Raises
     ------
@@ -170,7 +172,7 @@ def integrate_explicitly(
     """
     times = drives.times.tolist()
     modes = Modes(model, times[-1] - times[0]) if model.switching else None
-    stepper = _Stepper(model, drives, tolerance, modes.now if modes else np.zeros(0))
+    stepper = _Stepper(model, drives, tolerance, modes.now if modes else np.zeros(0), translate)
     states = np.zeros((len(x0), len(times)))
     stepper.state[:] = x0
     if modes:
