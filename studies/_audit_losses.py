@@ -48,7 +48,7 @@ def _losses() -> Finding:
         "Loss per cycle at 45° is 0.04/0.4/1.5/3.3 % at 0.1/1/4/9 Hz with the correct law",
         HOLDS if any(agree) else OPEN,
         "The number depends on the cam, which the paper does not print. Three that the figures allow "
-        "lie around the stated row, none on it; the size, far below 17 %, holds for all.",
+        "lie around the stated row, none on the whole of it; the size, far below 17 %, holds for all.",
         (
             step("Far below 1/T the branch is a dashpot:", slow),
             step("Per cent at 0.1/1/4/9 Hz, each harmonic exactly. " + rows),

@@ -42,7 +42,7 @@ def text(findings: Sequence[Finding]) -> str:
 def write_json(findings: Sequence[Finding], path: Path) -> None:
     """Write the audit as data; the file appears whole or not at all."""
     content = {"counts": counts(findings), "findings": [f.record() for f in findings]}
-    nls.deck.write_text(path, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
+    nls.write_text(path, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
 
 
 def counts(findings: Sequence[Finding]) -> dict[str, int]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from typing import Any
 
 from ..errors import ArrangementError, NlsError, unknown_name
 from ..quantity import Quantity
 from .bodies import Body, Fixed
+from .circuit_svg import assembly_svg
 from .drawing import draw
 from .element import Element
 from .gear import Gear, gear_problems
@@ -147,6 +149,16 @@ class Assembly:
 
     def __str__(self) -> str:
         return draw(f"{self.name}: {self.description}".rstrip(": "), self.parts)
+
+    def _repr_html_(self) -> str:
+        """Return the circuits as a picture and the parts with their numbers, for notebooks."""
+        told = f"<details><summary>parts and numbers</summary><pre>{escape(str(self))}</pre></details>"
+        title = f"<p><b>{escape(self.name)}</b> {escape(self.description)}</p>"
+        return f"<div>{title}{assembly_svg(self.name, self.parts)}{told}</div>"
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """Return text and picture; a notebook takes the richest that it can show."""
+        return {"text/plain": str(self), "text/html": self._repr_html_()}
 
 
 def _with_inner(root: Part, path: str, new: Part) -> Part:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ..quantity import Quantity
 from ..symbolic import Expression, smooth_sign
@@ -13,6 +14,8 @@ from .part import parameter
 @dataclass(frozen=True, kw_only=True)
 class Viscous(Element):
     """Base of the laws that need the rate."""
+
+    picture: ClassVar[str] = "friction"
 
     @property
     def needs_rate(self) -> bool:
@@ -28,6 +31,8 @@ class Viscous(Element):
 @dataclass(frozen=True, kw_only=True)
 class Dashpot(Viscous):
     """Newton's law F = c·ė. Source: Newton 1687."""
+
+    picture: ClassVar[str] = "dashpot"
 
     damping: Quantity = parameter("N*s/m", "damping", minimum=1e-9, maximum=1e12)
 
@@ -45,6 +50,8 @@ class Dashpot(Viscous):
 class TorsionDashpot(Viscous):
     """Viscous friction T = b·ω of bearings and gears. Source: Newton 1687."""
 
+    picture: ClassVar[str] = "dashpot"
+
     damping: Quantity = parameter("N*m*s/rad", "damping", minimum=0.0, maximum=1e9)
 
     @property
@@ -60,6 +67,8 @@ class TorsionDashpot(Viscous):
 @dataclass(frozen=True, kw_only=True)
 class ViscousMaterial(Viscous):
     """Newton's law of a material, σ = η·ε̇. Source: Austin et al. 2015, eq. (1)."""
+
+    picture: ClassVar[str] = "dashpot"
 
     viscosity: Quantity = parameter("Pa*s", "viscosity", minimum=1e-6, maximum=1e15)
 

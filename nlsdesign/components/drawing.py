@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .circuit import circuit_lines, circuit_of
 from .gear import Gear
 from .part import Part
 from .sensors import Sensor
@@ -11,7 +12,7 @@ from .tie import Tie
 
 
 def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
-    """Return named parts as a tree with their laws and numbers.
+    """Return named parts with their circuits, and as a tree with their laws and numbers.
 
     Parameters
     ----------
@@ -23,8 +24,11 @@ def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
     lines = [title]
     for name, part in parts:
         if isinstance(part, Tie):
-            ends = " ── ".join((part.between[0], f"[{name}]", *(part.between[1:] or ("frame",))))
+            ends = f" ── [{name}] ── ".join(_ends(part))
             lines.append(f"  {ends}   {part.element.title()}")
+            if part.element.children():
+                circuit = circuit_of(part.element, name)
+                lines += [f"    {line}" for line in circuit_lines(circuit, *_ends(part))]
             lines += _branches(part.element, "    ")
         elif isinstance(part, Gear):
             lines.append(f"  {part.between[0]} ══ [{name}] ══ {part.between[1]}   {part.title()}")
@@ -33,6 +37,10 @@ def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
         else:
             lines.append(f"  ({name})   {part.title()}")
     return "\n".join(lines)
+
+
+def _ends(part: Tie) -> tuple[str, str]:
+    return part.between[0], part.between[1] if len(part.between) == 2 else "frame"
 
 
 def _branches(part: Part, indent: str) -> list[str]:

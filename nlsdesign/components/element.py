@@ -10,7 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol, Self, TypeAlias
+from typing import ClassVar, Protocol, Self, TypeAlias
 
 import casadi as ca
 
@@ -118,6 +118,9 @@ class Scope(OwnNames, Switches, Protocol):
 class Element(Part):
     """A one-port element; final classes say their law in :meth:`effort`."""
 
+    picture: ClassVar[str] = "box"
+    """How it is drawn, by a name of ``GLYPHS`` in :mod:`.circuit`; ``"none"`` for its members alone."""
+
     @property
     @abstractmethod
     def domain(self) -> Domain:
@@ -179,6 +182,8 @@ class Combination(Element):
         Pairs of name and element.
     """
 
+    picture: ClassVar[str] = "around"
+
     members: tuple[tuple[str, Element], ...]
 
     def __post_init__(self) -> None:
@@ -224,6 +229,8 @@ class Combination(Element):
 @dataclass(frozen=True, kw_only=True)
 class Parallel(Combination):
     """Elements that share the motion; their efforts add."""
+
+    picture: ClassVar[str] = "none"
 
     @property
     def needs_rate(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -39,6 +40,8 @@ class StribeckFriction(CoulombFriction):
 class QuadraticDrag(Viscous):
     """Drag of a fan or of churned oil: T = c·ω·|ω|. Source: Newton 1687, book II."""
 
+    picture: ClassVar[str] = "dashpot"
+
     drag: Quantity = parameter("N*m*s^2/rad^2", "drag coefficient", minimum=0.0, maximum=1e9)
 
     @property
@@ -58,6 +61,8 @@ class TorqueRipple(Elastic):
     The order n is the number of periods per turn. It comes from the poles of the motor times
     the gear ratio, or from the teeth of a gear. Source: e.g. Hanselman 2003.
     """
+
+    picture: ClassVar[str] = "box"
 
     sine: Quantity = parameter("N*m", "amplitude of the part in sin(nθ)", minimum=-1e6, maximum=1e6)
     cosine: Quantity = parameter("N*m", "amplitude of the part in cos(nθ)", minimum=-1e6, maximum=1e6)

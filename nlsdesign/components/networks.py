@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 from ..errors import ArrangementError
 from ..quantity import Quantity
@@ -21,6 +21,8 @@ class Specimen(Combination):
     Nominal stress and nominal strain, as in the paper: A₀ and L₀ are those of the unstretched piece.
     Source: Austin et al. 2015, eq. (1), with a = A₀/L₀.
     """
+
+    picture: ClassVar[str] = "none"
 
     area: Quantity = parameter("m^2", "cross-section of the unstretched piece", minimum=1e-8, maximum=1.0)
     rest_length: Quantity = parameter("m", "length of the unstretched piece", minimum=1e-4, maximum=5.0)

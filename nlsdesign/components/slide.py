@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -93,6 +94,8 @@ class ConstantForce(Elastic):
     >>> ConstantForce(load=-3.16).title()
     'ConstantForce(load = -3.16 N)'
     """
+
+    picture: ClassVar[str] = "box"
 
     # Not named "force": every element between bodies has a signal of that name.
     load: Quantity = parameter("N", "constant force", minimum=-1e9, maximum=1e9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -16,6 +17,8 @@ from .part import parameter
 @dataclass(frozen=True, kw_only=True)
 class Elastic(Element):
     """Base of the laws without rate."""
+
+    picture: ClassVar[str] = "spring"
 
     @property
     def needs_rate(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -30,6 +31,8 @@ def _check_order(lower: Quantity, upper: Quantity) -> None:
 @dataclass(frozen=True, kw_only=True)
 class ElasticStops(Viscous):
     """Base of the elastic stops at both ends of the way."""
+
+    picture: ClassVar[str] = "box"
 
     lower: Quantity = parameter("rad", "angle of the lower stop", minimum=-1e3, maximum=1e3)
     upper: Quantity = parameter("rad", "angle of the upper stop", minimum=-1e3, maximum=1e3)
@@ -125,6 +128,8 @@ class RigidStop(Elastic):
     bodies. Valid where the impact is short against all other motion. Sources: Newton 1687 (restitution);
     Pfeiffer and Glocker 1996.
     """
+
+    picture: ClassVar[str] = "box"
 
     lower: Quantity = parameter("rad", "angle of the lower stop", minimum=-1e3, maximum=1e3)
     upper: Quantity = parameter("rad", "angle of the upper stop", minimum=-1e3, maximum=1e3)

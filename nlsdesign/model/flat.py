@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UnitError, ValueRangeError, unknown_name
+from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
+from .notebook import model_html
 from .switching import Switching
+
+if TYPE_CHECKING:
+    from .symbolic_view import Equations
 
 
 @dataclass(frozen=True)
@@ -254,6 +258,56 @@ class FlatModel:
         at |= {v.name: float(inputs[i]) for i, v in enumerate(self.inputs)}
         found = [table.look_up(at[table.argument]) for table in self.tables]
         return np.concatenate(found) if found else np.zeros(0)
+
+    def symbolic_equations(self) -> Equations:
+        """Return the equations as SymPy expressions, which print, and give LaTeX by ``latex()``.
+
+        ``equations`` is the casadi.Function that everything is computed with; this is the view for people.
+
+        Returns
+        -------
+        Equations
+            Derivatives by state, and definitions of signals and outputs in the order of computation.
+
+        Raises
+        ------
+        ExportError
+            If a law uses an operation that has no SymPy counterpart here.
+
+        Examples
+        --------
+        >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+        >>> from nlsdesign.model import flatten
+        >>> spring = tie(TorsionSpring(stiffness=2.0), "wheel")
+        >>> swing = flatten(assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring))
+        >>> swing.symbolic_equations().derivatives["wheel.angle"]
+        wheel.speed
+        """
+        from .symbolic_view import read_equations  # here, because SymPy takes most of a second to load
+
+        columns = [v for table in self.tables for v in table.columns]
+        groups = (self.states, self.inputs, self.parameters, columns)
+        inputs = [["time"], *([v.name for v in group] for group in groups)]
+        results = [[v.name for v in group] for group in (self.states, self.outputs, self.signals)]
+        return read_equations(self.equations, inputs, results, discrete=self.sample_time is not None)
+
+    def _repr_html_(self) -> str:
+        """Return the model as a block with its signals, and its equations, for notebooks."""
+        return model_html(
+            self.name, self.description, (self.inputs, self.states, self.outputs), self._latex()
+        )
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """Return text, equations and picture; a notebook takes the richest that it can show."""
+        latex = self._latex()
+        told = {"text/latex": f"$${latex}$$"} if latex else {}
+        return {"text/plain": str(self), **told, "text/html": self._repr_html_()}
+
+    def _latex(self) -> str:
+        try:
+            return self.symbolic_equations().latex()
+        except ExportError:
+            return ""  # a law without a SymPy counterpart: the notebook shows the rest
 
     def __str__(self) -> str:
         kind = "continuous" if self.sample_time is None else f"every {self.sample_time:g} s"

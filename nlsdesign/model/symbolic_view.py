@@ -1,0 +1,246 @@
+"""Equations as SymPy and LaTeX, read from the instructions of a casadi.Function.
+
+Every named signal becomes a symbol of its own, so that the equations read as they were declared instead of
+as one long expression per state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import sympy
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import BooleanAtom, BooleanFunction
+
+from ..errors import ExportError
+
+LONGEST = 60
+"""A definition with more operations than this is shown as a function of what it depends on."""
+
+_UNARY: dict[int, Callable[[Any], Any]] = {
+    ca.OP_ASSIGN: lambda a: a,
+    ca.OP_NEG: lambda a: -a,
+    ca.OP_EXP: sympy.exp,
+    ca.OP_LOG: sympy.log,
+    ca.OP_LOG1P: lambda a: sympy.log(1 + a),
+    ca.OP_EXPM1: lambda a: sympy.exp(a) - 1,
+    ca.OP_SQRT: sympy.sqrt,
+    ca.OP_SQ: lambda a: a**2,
+    ca.OP_TWICE: lambda a: 2 * a,
+    ca.OP_SIN: sympy.sin,
+    ca.OP_COS: sympy.cos,
+    ca.OP_TAN: sympy.tan,
+    ca.OP_ASIN: sympy.asin,
+    ca.OP_ACOS: sympy.acos,
+    ca.OP_ATAN: sympy.atan,
+    ca.OP_SINH: sympy.sinh,
+    ca.OP_COSH: sympy.cosh,
+    ca.OP_TANH: sympy.tanh,
+    ca.OP_ATANH: sympy.atanh,
+    ca.OP_FABS: sympy.Abs,
+    ca.OP_SIGN: sympy.sign,
+    ca.OP_FLOOR: sympy.floor,
+    ca.OP_CEIL: sympy.ceiling,
+    ca.OP_INV: lambda a: 1 / a,
+}
+_BINARY: dict[int, Callable[[Any, Any], Any]] = {
+    ca.OP_ADD: lambda a, b: a + b,
+    ca.OP_SUB: lambda a, b: a - b,
+    ca.OP_MUL: lambda a, b: a * b,
+    ca.OP_DIV: lambda a, b: a / b,
+    ca.OP_POW: lambda a, b: a**b,
+    ca.OP_CONSTPOW: lambda a, b: a**b,
+    ca.OP_FMIN: sympy.Min,
+    ca.OP_FMAX: sympy.Max,
+    ca.OP_ATAN2: sympy.atan2,
+    ca.OP_LT: sympy.Lt,
+    ca.OP_LE: sympy.Le,
+    ca.OP_EQ: sympy.Eq,
+    ca.OP_NE: sympy.Ne,
+}
+# In CasADi a condition is the number 1 or 0, in SymPy a truth value.
+_LOGIC: dict[int, Callable[..., Any]] = {ca.OP_NOT: sympy.Not, ca.OP_AND: sympy.And, ca.OP_OR: sympy.Or}
+
+
+_TRUTH_VALUES = (Relational, BooleanFunction, BooleanAtom)
+
+
+def _number(value: Any) -> Any:
+    return (
+        sympy.Piecewise((1, value), (0, True), evaluate=False) if isinstance(value, _TRUTH_VALUES) else value
+    )
+
+
+def _truth(value: Any) -> Any:
+    return value if isinstance(value, _TRUTH_VALUES) else sympy.Ne(value, 0)
+
+
+def _value(operation: int, operands: list[Any]) -> Any:
+    if operation in _LOGIC:
+        return _LOGIC[operation](*map(_truth, operands))
+    if operation == ca.OP_IF_ELSE_ZERO:
+        # Not evaluated: SymPy would work out how conditions inside conditions may be merged.
+        pair = (_number(operands[1]), _truth(operands[0]))
+        return sympy.Piecewise(pair, (0, True), evaluate=False)
+    return (_UNARY.get(operation) or _BINARY[operation])(*map(_number, operands))
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Derivatives (or next states) and definitions of signals and outputs.
+
+    Parameters
+    ----------
+    derivatives
+        Right-hand side by state.
+    definitions
+        Right-hand side by signal or output, in the order of computation.
+    discrete
+        Whether the left-hand sides are next states.
+    """
+
+    derivatives: dict[str, sympy.Expr]
+    definitions: dict[str, sympy.Expr]
+    discrete: bool
+
+    def latex(self) -> str:
+        """Return an aligned LaTeX block of all equations."""
+        left = r"{}^{{+}}" if self.discrete else r"\dot{{{}}}"
+        rows = [
+            f"{left.format(_tex(n))} &= {sympy.latex(e, symbol_names=_names(e))}"
+            for n, e in self.derivatives.items()
+        ]
+        rows += [
+            f"{_tex(n)} &= {sympy.latex(e, symbol_names=_names(e))}" for n, e in self.definitions.items()
+        ]
+        return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+    def _repr_latex_(self) -> str:
+        return f"${self.latex()}$"
+
+    def __str__(self) -> str:
+        mark = "next({})" if self.discrete else "der({})"
+        rows = [f"{mark.format(n)} = {e}" for n, e in self.derivatives.items()]
+        return "\n".join(rows + [f"{n} = {e}" for n, e in self.definitions.items()])
+
+
+def _tex(name: str) -> str:
+    return r"\mathrm{" + name.replace("_", r"\_") + "}"
+
+
+def _names(expression: sympy.Expr) -> dict[sympy.Symbol, str]:
+    return {s: _tex(s.name) for s in expression.free_symbols}
+
+
+@dataclass(frozen=True)
+class _Term:
+    """The value of an instruction, with the operations in it and what it depends on."""
+
+    value: Any
+    size: int
+    uses: frozenset[sympy.Symbol]
+
+    @property
+    def shown(self) -> Any:
+        """The value; where it is too long, a function of what it depends on, rows of numbers named once."""
+        if self.size <= LONGEST:
+            return _number(self.value)
+        names = {str(s.name).partition("[")[0] for s in self.uses}
+        return sympy.Function("f")(*[_symbol(name) for name in sorted(names)])
+
+
+def _symbol(name: str) -> sympy.Symbol:
+    return sympy.Symbol(name, real=True)
+
+
+def read_equations(
+    function: ca.Function, inputs: list[list[str]], results: list[list[str]], *, discrete: bool
+) -> Equations:
+    """Return the equations of a function of named numbers.
+
+    Parameters
+    ----------
+    function
+        (t, x, u, p, w) -> (f, y, s, …), as in a flat model.
+    inputs
+        Names of the numbers in each argument.
+    results
+        Names of states, outputs and signals.
+    discrete
+        Whether the first result is the next state.
+
+    Raises
+    ------
+    ExportError
+        If a law uses an operation that has no SymPy counterpart here.
+    """
+    reader = _Reader(function, inputs)
+    reader.run(results)
+    derivatives = {n: reader.terms[reader.results[0, i]].shown for i, n in enumerate(results[0])}
+    return Equations(derivatives, reader.definitions, discrete)
+
+
+class _Reader:
+    """Runs through the instructions of an SX function and turns each into SymPy."""
+
+    def __init__(self, function: ca.Function, inputs: list[list[str]]) -> None:
+        self.function, self.inputs = function, inputs
+        self.terms: list[_Term] = []
+        self.results: dict[tuple[int, int], int] = {}
+        self.definitions: dict[str, sympy.Expr] = {}
+
+    def run(self, results: list[list[str]]) -> None:
+        steps = self._steps()
+        names: dict[int, list[str]] = {}
+        for (port, index), step in self.results.items():
+            if port in (1, 2) and results[port][index] not in names.setdefault(step, []):
+                names[step].append(results[port][index])
+        for number, (operation, operands, extra) in enumerate(steps):
+            term = self._term(operation, [self.terms[i] for i in operands], extra)
+            self.terms.append(self._defined(term, names.get(number, []), operation))
+
+    def _defined(self, term: _Term, names: list[str], operation: int) -> _Term:
+        """Note the names of a value; from then on it goes by the first of them, inputs by their own."""
+        if names and operation not in (ca.OP_INPUT, ca.OP_CONST):
+            own = _symbol(names[0])
+            self.definitions[names.pop(0)] = term.shown
+            term = _Term(own, 0, frozenset([own]))
+        self.definitions |= {name: term.value for name in names if name != str(term.value)}
+        return term
+
+    def _steps(self) -> list[tuple[int, list[int], Any]]:
+        """Return the instructions with each operand as the number of the instruction that made it."""
+        steps: list[tuple[int, list[int], Any]] = []
+        held: dict[int, int] = {}
+        f = self.function
+        for k in range(f.n_instructions()):
+            operation, out, into = f.instruction_id(k), f.instruction_output(k), f.instruction_input(k)
+            if operation == ca.OP_OUTPUT:
+                self.results[out[0], out[1]] = held[into[0]]
+                continue
+            extra = f.instruction_constant(k) if operation == ca.OP_CONST else into
+            operands = [] if operation in (ca.OP_CONST, ca.OP_INPUT) else [held[i] for i in into]
+            steps.append((operation, operands, extra))
+            held[out[0]] = len(steps) - 1
+        return steps
+
+    def _term(self, operation: int, operands: list[_Term], extra: Any) -> _Term:
+        if operation == ca.OP_CONST:
+            whole = float(extra).is_integer()
+            return _Term(sympy.Integer(int(extra)) if whole else sympy.Float(extra), 0, frozenset())
+        if operation == ca.OP_INPUT:
+            symbol = _symbol(self.inputs[extra[0]][extra[1]])
+            return _Term(symbol, 0, frozenset([symbol]))
+        if operation not in {*_UNARY, *_BINARY, *_LOGIC, ca.OP_IF_ELSE_ZERO}:
+            raise ExportError(
+                f"operation {operation}", "has no SymPy counterpart", next_step="add it in equations.py"
+            )
+        # CasADi names two operands also where there is one.
+        used = operands[:1] if operation in _UNARY or operation == ca.OP_NOT else operands
+        size = 1 + sum(term.size for term in used)
+        # What is too long to be shown is not even built: written out, shared parts multiply.
+        value = _value(operation, [term.value for term in used]) if size <= LONGEST else None
+        return _Term(value, size, frozenset().union(*[term.uses for term in used]))
