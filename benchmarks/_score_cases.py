@@ -108,14 +108,17 @@ def sample(seeds: Sequence[int], strength: str, others: int) -> list[Case]:
         Number of clean sets, of sets with an effect outside the catalogue, and of pairs.
     """
     actuators = list(ACTUATORS)
-    singles = [e for e in EFFECTS if e != "none"]
-    chosen = [("single", (effect,)) for effect in singles]
-    for i in range(others):
-        chosen += [("clean", ()), ("outside", (OUTSIDE_ANY_CATALOGUE[i % len(OUTSIDE_ANY_CATALOGUE)],))]
-        chosen += [("pair", PAIRS[i % len(PAIRS)])]
-    found = []
+    chosen = [("single", (effect,)) for effect in EFFECTS if effect != "none"]
+    # The other kinds stand in between, so that a run that is broken off has some of each.
+    apart = max(len(chosen) // (others + 1), 1)
+    for i in reversed(range(others)):
+        outside = (OUTSIDE_ANY_CATALOGUE[i % len(OUTSIDE_ANY_CATALOGUE)],)
+        place = (i + 1) * apart
+        chosen[place:place] = [("clean", ()), ("outside", outside), ("pair", PAIRS[i % len(PAIRS)])]
+    found, n, clean = [], len(seeds), 0
     for i, (kind, effects) in enumerate(chosen):
-        seed = seeds[i % len(seeds)]
-        actuator = actuators[(i // len(seeds) + i) % 2] if effects else actuators[(i // 3) % 2]
-        found.append(Case(kind, actuator, effects, strength if effects else "", seed))
+        k = i if effects else clean
+        clean += not effects
+        actuator = actuators[(k + (k // n if n % 2 == 0 else 0)) % 2]
+        found.append(Case(kind, actuator, effects, strength if effects else "", seeds[k % n]))
     return found
