@@ -68,9 +68,12 @@ def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_j
     predicted.write_csv(out)
     rows = agreement_rows(names[record.stem].trace, predicted)
     if as_json:
-        show_json({"file": out, "rms": {name: float(rms) for name, rms, _ in rows}})
+        rms = {name: float(value) for name, value, _ in rows}
+        show_json({"file": out, "rms": rms, "warnings": [str(each) for each in predicted.warnings]})
         return
     show_table(f"{record.name} against {actuator.name}", ("signal", "rms error", "unit"), rows)
+    for each in predicted.warnings:
+        click.echo(f"warning: {each}")
     click.echo(f"written: {out}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,7 +11,7 @@ import casadi as ca
 from ..errors import ValueRangeError
 from ..quantity import Quantity
 from ..symbolic import Expression, positive_part
-from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Scope
+from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Range, Scope
 from .part import parameter
 
 
@@ -111,6 +112,11 @@ class StrainStiffening(Elastic):
     def domain(self) -> Domain:
         """Strain and stress."""
         return MATERIAL
+
+    @property
+    def valid(self) -> Range:
+        """Tension: in compression the law gives no stress at all."""
+        return (0.0, math.inf)
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the sum over the engaged moduli."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArrangementError, ValueRangeError, unknown_name
 from ..model import FlatModel
-from ..simulation import Trace
+from ..simulation import Trace, range_warnings
 from .sampled import DiscreteStepper, PlantStepper
 
 Array = NDArray[np.float64]
@@ -255,4 +255,5 @@ class _Run:
         ]  # fmt: skip
         signals = {f"{o}.{v.name}": rows[i] for o, group, rows in groups for i, v in enumerate(group)}
         units = {f"{o}.{v.name}": v.unit for o, group, _ in groups for v in group}
-        return Trace(time, signals, units, f"closed loop of {loop.plant.name}")
+        warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
+        return Trace(time, signals, units, f"closed loop of {plant.name}", warnings=warnings)

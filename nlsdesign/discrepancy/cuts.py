@@ -145,8 +145,7 @@ def _driven(
     states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
     readings = _Readings(assembly, model, (s.parameter, s.state))
     inferred = readings.inferred
-    old, instead = [], []
-    prescribed: list[str] = []
+    old, instead, prescribed = [], [], list[str]()
     for known in given:
         if known.truth in states:
             pair = [known.truth, _speed_of(known.truth)]
@@ -172,8 +171,11 @@ def _driven(
         place = next(i for i, v in enumerate(model.signals) if v.name == target)
         result, variable = s.signal[place], model.signals[place]
     kept = [i for i, n in enumerate(states) if n not in prescribed]
-    derivative = ca.SX(ca.vertcat(*[s.derivative[i] for i in kept])) if kept else ca.SX(0, 1)
-    rows = ca.substitute([derivative, result], [ca.vertcat(*old)], [ca.vertcat(*instead)])
+    derivative = ca.SX(ca.vertcat(ca.SX(0, 1), *[s.derivative[i] for i in kept]))
+    # Signals with a stated range stay, so that a prediction can say where it is left.
+    bounded = [i for i, v in enumerate(model.signals) if v.bounded]
+    ranged = ca.SX(ca.vertcat(ca.SX(0, 1), *[s.signal[i] for i in bounded]))
+    rows = ca.substitute([derivative, result, ranged], [ca.vertcat(*old)], [ca.vertcat(*instead)])
     resting = [i for i, n in enumerate(inputs) if not any(n in (k.truth, _speed_of(k.truth)) for k in given)]
     columns = [
         s.time,
@@ -185,13 +187,13 @@ def _driven(
     if target is None and drive is not None:
         rows[1] = _in_drive_units(rows[1], readings.reading(drive, 0), s.parameter, model)
     equations = ca.Function(
-        "equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], ca.SX(0, 1), ca.SX(0, 1)]
+        "equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], rows[2], ca.SX(0, 1)]
     )
     pruned = replace(
         model,
         equations=equations,
         states=tuple(model.states[i] for i in kept),
-        signals=(),
+        signals=tuple(model.signals[i] for i in bounded),
         outputs=(variable,),
         inputs=(*[v for v, _ in readings.new.values()], *[model.inputs[i] for i in resting]),
     )

@@ -105,7 +105,7 @@ def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
     """
     n = len(record.trace)
     matrix = smoothing(n, block.width, STRIDE)
-    inputs = _inputs(block, record)
+    inputs = measured_inputs(block, record)
     if block.moving is not None:
         speed = np.abs(inputs[[v.name for v in block.model.inputs].index(block.moving)])
         level = noise.level[block.drives[block.moving].signal] * rate_noise_gain() / record.step
@@ -117,7 +117,16 @@ def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
     return replace(floor, sigma=np.sqrt(variance[floor.places]))
 
 
-def _inputs(block: Block, record: Record) -> Array:
+def measured_inputs(block: Block, record: Record) -> Array:
+    """Return the inputs of a block's model from a record, shape (inputs, n); those not measured rest.
+
+    Parameters
+    ----------
+    block
+        As declared.
+    record
+        Holds all signals that drive the block.
+    """
     model = block.model
     inputs = np.repeat(model.start(model.inputs)[:, None], len(record.trace), axis=1)
     for i, variable in enumerate(model.inputs):

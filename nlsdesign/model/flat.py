@@ -53,6 +53,11 @@ class Variable:
     source: str = ""
     spread: float = 0.0
 
+    @property
+    def bounded(self) -> bool:
+        """Whether a range is stated."""
+        return math.isfinite(self.minimum) or math.isfinite(self.maximum)
+
 
 @dataclass(frozen=True, eq=False)
 class Table:

@@ -15,7 +15,7 @@ from .sections import (
     TableSection,
     TextSection,
 )
-from .tables import PublishedNumber, comparison_table, numbers_table
+from .tables import PublishedNumber, comparison_table, numbers_table, range_table
 from .verdict import VerdictSection
 
 __all__ = [
@@ -36,6 +36,7 @@ __all__ = [
     "VerdictSection",
     "comparison_table",
     "numbers_table",
+    "range_table",
     "report_text",
     "verdict_sections",
     "write_report",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..figures.numbers import compact, shown_unit, significant
 from ..quantity import Quantity, sources
+from ..simulation import Trace
 from .sections import TableSection
 
 _LONGEST_ROW = 8
@@ -70,6 +71,31 @@ class PublishedNumber:
     here: float
     unit: str
     remark: str = ""
+
+
+def range_table(title: str, traces: Mapping[str, Trace]) -> TableSection:
+    """Return the table of laws that were used beyond their stated range; it says so if there is none.
+
+    Parameters
+    ----------
+    title
+        Heading.
+    traces
+        Results by their label in the report.
+    """
+    rows = tuple(
+        (label, w.name, f"{w.minimum:g} to {w.maximum:g}", shown_unit(w.unit), compact(w.furthest, 4),
+         compact(w.time, 4))
+        for label, trace in traces.items()
+        for w in trace.warnings
+    )  # fmt: skip
+    columns = ("result", "signal", "range", "unit", "reaches", "first at s")
+    caption = (
+        "Laws that were used beyond the range in which they are stated to hold."
+        if rows
+        else ("Every law was used within the range in which it is stated to hold.")
+    )
+    return TableSection(title, columns, rows, caption=caption, marked=frozenset(range(len(rows))))
 
 
 def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: str = "") -> TableSection:

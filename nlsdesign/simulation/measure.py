@@ -69,4 +69,4 @@ def measure(run: Trace, assembly: Assembly, *, seed: int) -> Trace:
         chance = np.random.default_rng([seed, zlib.crc32(name.encode())])
         readings[f"{name}.reading"] = sensor.recorded(run.time, known[sensor.of], chance)
         units[f"{name}.reading"] = sensor.reading_unit(unit)
-    return Trace(run.time, readings, {n: units[n] for n in readings}, run.name)
+    return Trace(run.time, readings, {n: units[n] for n in readings}, run.name, warnings=run.warnings)

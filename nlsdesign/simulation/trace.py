@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -70,7 +69,7 @@ def range_warnings(
     found = []
     for v in variables:
         values = signals.get(prefix + v.name)
-        if values is None or (math.isinf(v.minimum) and math.isinf(v.maximum)):
+        if values is None or not v.bounded:
             continue
         over = np.maximum(v.minimum - values, values - v.maximum)
         # A strain that should be zero is a rounding error beside it.

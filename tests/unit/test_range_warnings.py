@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import json
 import math
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from nlsdesign.components import DrivenPoint, LinearElastic, NeoHooke, Spring, assembly, specimen, tie
+from nlsdesign.cli.main import program
+from nlsdesign.components import (
+    DrivenPoint,
+    LinearElastic,
+    NeoHooke,
+    Spring,
+    StrainStiffening,
+    assembly,
+    series,
+    specimen,
+    tie,
+)
 from nlsdesign.model import Variable, flatten
+from nlsdesign.report import range_table, report_text
 from nlsdesign.simulation import Trace, range_warnings, simulate
-from tests.stretched import LENGTH, pulled, run
+from tests.stretched import LENGTH, pulled, run, stress_at
 
 TIMES = np.linspace(0.0, 1.0, 101)
 
@@ -61,8 +76,6 @@ def test_a_member_in_series_is_watched_by_its_own_strain() -> None:
     assert simulate(inside, TIMES, inputs={"grip.position": 0.6 * LENGTH}).warnings
     piece = specimen(area=1e-4, rest_length=LENGTH, law=NeoHooke(shear_modulus=0.4e6))
     chain = {"soft": Spring(stiffness=100.0), "piece": piece}
-    from nlsdesign.components import series
-
     made = assembly("chain", grip=DrivenPoint(), line=tie(series(**chain), "grip"))
     trace = simulate(flatten(made), TIMES, inputs={"grip.position": 0.6 * LENGTH})
     assert trace.warnings == ()
@@ -76,3 +89,63 @@ def test_rounding_at_the_edge_is_no_warning_but_a_small_excess_is() -> None:
     (found,) = range_warnings([variable], time, {"x.a.strain": np.array([0.0, -1e-6])}, "x.")
     assert found.name == "x.a.strain"
     assert found.time == 1.0
+
+
+DECK = """
+[deck]
+name = "pulled"
+description = "a piece of rubber in a grip"
+[grip]
+component = "DrivenPoint"
+[rubber]
+component = "Specimen"
+between = ["grip"]
+area = {value = 100, unit = "mm^2", source = "test"}
+rest_length = {value = 12.5, unit = "mm", source = "test"}
+[rubber.law]
+component = "NeoHooke"
+shear_modulus = {value = 0.4, unit = "MPa", source = "test"}
+[cell]
+component = "ForceSensor"
+of = "rubber.force"
+"""
+
+
+@pytest.mark.parametrize(("most", "said"), [(0.3, False), (0.8, True)])
+def test_the_command_line_says_where_a_record_leaves_the_range(
+    tmp_path: Path, most: float, said: bool
+) -> None:
+    (tmp_path / "deck.toml").write_text(DECK, encoding="utf8")
+    records, out = tmp_path / "records", str(tmp_path / "out.csv")
+    records.mkdir()
+    times = np.linspace(0.0, 2.0, 401)
+    position = LENGTH * most * np.sin(np.pi * times / 2) ** 2
+    force = 1e-4 * stress_at(pulled(law=NeoHooke(shear_modulus=0.4e6)), list(position / LENGTH))
+    columns = np.column_stack([times, position, force])
+    head = "time [s],grip.position [m],cell.reading [N]"
+    for name in ("again", "pull", "third"):
+        np.savetxt(records / f"{name}.csv", columns, delimiter=",", header=head, comments="")
+    arguments = ["simulate", "--deck", str(tmp_path / "deck.toml"), "--record", str(records / "pull.csv")]
+    result = CliRunner().invoke(program, [*arguments, "--out", out])
+    assert result.exit_code == 0, result.output
+    assert ("warning: rubber.law.strain leaves [-0.4, 0.4]" in result.output) is said
+    as_json = CliRunner().invoke(program, [*arguments, "--out", str(tmp_path / "out.csv"), "--json"])
+    assert bool(json.loads(as_json.output)["warnings"]) is said
+
+
+def test_the_report_lists_what_was_left_and_says_so_if_nothing_was() -> None:
+    table = range_table("Stated ranges", {"hard pull": stretched_to(0.8), "soft pull": stretched_to(0.2)})
+    (row,) = table.rows
+    assert row[:3] == ("hard pull", "rubber.law.strain", "-0.4 to 0.4")
+    assert table.marked == {0}
+    quiet = range_table("Stated ranges", {"soft pull": stretched_to(0.2)})
+    assert quiet.rows == ()
+    assert "within the range" in quiet.caption
+    assert "within the range" in report_text(Path(), [quiet], title="quiet")
+
+
+def test_a_piecewise_law_of_tension_says_when_it_is_compressed() -> None:
+    model = pulled(law=StrainStiffening(modulus=(1e6,), knots=(0.0,)))
+    pressed = run(model, TIMES, lambda t: -0.1 * t, lambda t: -0.1)
+    assert [w.name for w in pressed.warnings] == ["rubber.law.strain"]
+    assert run(model, TIMES, lambda t: 0.1 * t, lambda t: 0.1).warnings == ()
