@@ -19,11 +19,11 @@ READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
 
 @dataclass(frozen=True)
 class _Known:
-    """A variable of the model whose value follows from a measurement."""
+    """A variable of the model whose value follows from a measurement, and the sensors between, last first."""
 
     truth: str
     signal: str
-    sensor: str | None
+    sensors: tuple[str, ...]
 
 
 class _SensorNumbers:
@@ -84,13 +84,11 @@ def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
 
 
 def _known(assembly: Assembly, signal: str) -> _Known:
-    owner, _, last = signal.rpartition(".")
-    sensors = assembly.sensors()
-    return (
-        _Known(sensors[owner].of, signal, owner)
-        if last == "reading" and owner in sensors
-        else _Known(signal, signal, None)
-    )
+    sensors, chain, truth = assembly.sensors(), [], signal
+    while truth.endswith(".reading") and (owner := truth.rpartition(".")[0]) in sensors:
+        chain.append(owner)
+        truth = sensors[owner].of
+    return _Known(truth, signal, tuple(chain))
 
 
 def _speed_of(motion: str) -> str:
@@ -119,17 +117,26 @@ class _Readings:
         """Return the symbol of a reading or of one of its derivatives."""
         label = known.signal + (".rate", ".acceleration")[order - 1] if order else known.signal
         if label not in self.new:
-            late = self._sensors[known.sensor].late_by if known.sensor else None
-            self.drives[label] = Drive(known.signal, order, f"{known.sensor}.{late}" if late else None)
+            self.drives[label] = Drive(known.signal, order, self._late_by(known))
             self.new[label] = Variable(label, "", f"measured {known.signal}"), ca.SX.sym(label)
         return self.new[label][1]
+
+    def _late_by(self, known: _Known) -> str | None:
+        late = [f"{s}.{self._sensors[s].late_by}" for s in known.sensors if self._sensors[s].late_by]
+        if len(late) > 1:
+            raise MeasurementError(
+                f"signal '{known.signal}'",
+                f"is late by {' and '.join(late)}, which cannot be told apart",
+                next_step="put both delays into one sensor",
+            )
+        return late[0] if late else None
 
     def inferred(self, known: _Known, order: int) -> Expression:
         """Return what the sensor must have seen, or its derivative."""
         value = self.reading(known, 0)
-        if known.sensor is not None:
-            numbers = _SensorNumbers(self._model, self._symbols, known.sensor)
-            value = self._sensors[known.sensor].infer(numbers, value)
+        for sensor in known.sensors:
+            numbers = _SensorNumbers(self._model, self._symbols, sensor)
+            value = self._sensors[sensor].infer(numbers, value)
         if order == 0:
             return value
         # A reading is a static function of what it reads, so rates follow by its slope.

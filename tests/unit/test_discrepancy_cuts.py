@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly, Fixed, Inertia, TorsionSpring, assembly, tie
+from nlsdesign.components import (
+    Assembly,
+    Fixed,
+    Inertia,
+    SampleAndHold,
+    TorsionSpring,
+    TransportDelay,
+    assembly,
+    tie,
+)
 from nlsdesign.components.declare import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy.cuts import blocks_of
@@ -26,10 +35,10 @@ def rig() -> Assembly:
     return declare(load_deck("test_rig"))
 
 
-def simulated(declared: Assembly) -> Record:
+def simulated(declared: Assembly, signals: tuple[str, ...] = SIGNALS) -> Record:
     """The whole model under current, with readings free of rounding."""
     fine = declared.with_values({"motor_encoder.quantum": 1e-9})
-    model = flatten(fine, outputs=list(SIGNALS))
+    model = flatten(fine, outputs=list(signals))
     current = 1.5 * (1.0 - np.cos(2 * np.pi * 1.5 * TIME))
     return Record("run", simulate(model, TIME, inputs={"motor.current": current}))
 
@@ -50,6 +59,33 @@ def test_both_blocks_vanish_on_records_of_the_model_itself(rig: Assembly, change
         error = (record.trace[block.target] if block.target else 0.0) - output
         seen = smoothing(len(TIME), block.width, 5) @ error
         assert np.sqrt(np.mean(seen**2)) < 2e-3 * sizes[block.name], block.name
+
+
+def test_a_chain_of_sensors_is_read_back_to_what_its_first_one_sees(rig: Assembly) -> None:
+    """Bias in the cell, delay on the bus behind it, a hold behind the encoder."""
+    edited = rig.with_values({"force_sensor.bias": 2.0}).with_part(
+        "bus", TransportDelay(of="force_sensor.reading", delay=0.006)
+    )
+    edited = edited.with_part("held", SampleAndHold(of="motor_encoder.reading", sample_rate=1000.0))
+    signals = ("held.reading", "current_sensor.reading", "bus.reading")
+    record = simulated(edited, signals)
+    spring, motor = blocks_of(edited, signals)
+    assert (spring.target, motor.moving) == ("bus.reading", "held.reading.rate")
+    assert {d.late_by for d in motor.drives.values()} == {None, "bus.delay"}
+    sizes = {"spring": np.max(record.trace["bus.reading"]), "motor": 0.755 * 3.0}
+    for block in (spring, motor):
+        driven = DrivenBlock(block, [])
+        output = driven.respond(driven.samples(record, {}), {}).output
+        error = (record.trace[block.target] if block.target else 0.0) - output
+        seen = smoothing(len(TIME), block.width, 5) @ error
+        assert np.sqrt(np.mean(seen**2)) < 2e-3 * sizes[block.name], block.name
+
+
+def test_two_delays_on_one_line_cannot_be_told_apart(rig: Assembly) -> None:
+    late = rig.with_part("bus", TransportDelay(of="force_sensor.reading", delay=0.006))
+    late = late.with_part("log", TransportDelay(of="bus.reading", delay=0.002))
+    with pytest.raises(MeasurementError, match=r"'log.reading'.*log.delay and bus.delay"):
+        blocks_of(late, ("motor_encoder.reading", "current_sensor.reading", "log.reading"))
 
 
 def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
