@@ -33,6 +33,11 @@ class OneSidedCam(Cam):
     [0, 1], plus θ − w where θ > w. So q = 0 for θ ≤ 0, exactly, and q = θ − w/2 beyond w. h = H(q)·q' is
     dδ/dθ. δ is C², h is C¹; for θ ≤ 0 the cable lies slack or at its pretension without a lever arm.
     Source: virtual work; de Boor 1978 (B-splines).
+
+    Examples
+    --------
+    >>> OneSidedCam(lever_arm=(0.01,) * 6, last_angle=1.5).onset.number
+    0.001
     """
 
     lever_arm: Quantity = parameter(
@@ -77,6 +82,12 @@ class AnchoredCam(Cam):
     :class:`TwoSidedCam` with ``lever_arm`` = ``support``. The sides change over the angle w, C∞:
     q = √(θ² + w²) − w, h = p(φ)·θ/√(θ² + w²). δ is C³ along a side, h is C².
     Source: support function of a convex curve, any text on convex geometry.
+
+    Examples
+    --------
+    >>> row = (0.006, 0.008, 0.01, 0.012, 0.013)
+    >>> AnchoredCam(support=row, last_direction=1.2, anchor_distance=0.03).anchor_distance.number
+    0.03
     """
 
     support: Quantity = parameter(

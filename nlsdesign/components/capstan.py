@@ -21,6 +21,13 @@ class CapstanFriction(Combination):
     holds back to e^(−µφ). The power lost, F_in·(e^(…) − 1)·ė, is never negative. A push, F_in < 0, passes
     unchanged, for no cable pushes. C∞ in the rate, with a corner at F_in = 0; at rest it creeps instead of
     sticking. Several guides multiply: their µφ add. Source: Euler 1769, Eytelwein 1808.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import Spring
+    >>> rope = (("rubber", Spring(stiffness=2500.0)),)
+    >>> CapstanFriction(members=rope, friction=0.1, wrap_angle=1.5).needs_rate
+    True
     """
 
     friction: Quantity = parameter("1", "friction coefficient of cable and guide", minimum=0.0, maximum=2.0)

@@ -38,6 +38,11 @@ class TransportDelay(Sensor):
     The states are a, which rests at the value, and b = τ·ȧ; the delayed value is v − b.
     In records the delay is exact; before the first sample the value stood still.
     Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
+
+    Examples
+    --------
+    >>> TransportDelay(of="load_cell.reading", delay=1e-3).title()
+    'TransportDelay(delay = 0.001 s)'
     """
 
     delay: Quantity = parameter("s", "transport delay", minimum=1e-6, maximum=10.0)
@@ -85,6 +90,11 @@ class DriftingForceSensor(ForceSensor):
 
     The drift so far is a state that starts at zero, so a model does not depend on the clock. Valid for runs
     that are short against the time of warming up. Source: data sheets, "temperature coefficient of zero".
+
+    Examples
+    --------
+    >>> DriftingForceSensor(of="spring.force", drift=0.01).parameters()["drift"].unit
+    'N/s'
     """
 
     drift: Quantity = parameter("N/s", "change of the bias", minimum=-1e4, maximum=1e4)

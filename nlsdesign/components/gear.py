@@ -27,6 +27,11 @@ class Gear(Part):
     ----------
     between
         Names of the two bodies, the motor's side first.
+
+    Examples
+    --------
+    >>> Gear(between=("motor", "drum"), ratio=4.0).title()
+    'Gear(ratio = 4)'
     """
 
     ratio: Quantity = parameter(
@@ -69,6 +74,12 @@ class LossyGear(Gear):
     piecewise linear equation. Continuous, with corners at zero load and at rest, elsewhere C∞; at rest the
     gear does not stick. Source: Coulomb 1785 with the load as normal force; e.g. Niemann and Winter,
     Maschinenelemente.
+
+    Examples
+    --------
+    >>> worm = LossyGear(between=("motor", "drum"), ratio=40.0, efficiency=0.6, back_efficiency=0.33)
+    >>> worm.efficiency.number
+    0.6
     """
 
     efficiency: Quantity = parameter(

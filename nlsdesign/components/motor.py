@@ -55,6 +55,12 @@ class CurrentDrivenMotor(ElectricMotor):
     at this speed, (±U_max − k·ω)/R: above U_max/k the supply brakes. So the torque-speed curve is
     T = k·min(I_max, (U_max − k·ω)/R). Continuous, with corners at the limits, elsewhere C∞. Valid for changes
     slower than the current loop and than L/R; :class:`VoltageDrivenMotor` has the inductance.
+
+    Examples
+    --------
+    >>> numbers = dict(inertia=1.4e-5, torque_constant=0.03, resistance=0.3)
+    >>> CurrentDrivenMotor(**numbers, current_limit=20.0, voltage_limit=24.0).domain.effort
+    'torque'
     """
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
@@ -76,6 +82,12 @@ class VoltageDrivenMotor(ElectricMotor):
     U is the wanted voltage, held so that the current approaches ±I_max no faster than
     (±I_max − I)/τ — the amplifier's own limiter, so a current within the limit stays there — and then within
     ±U_max. Continuous, with corners at the limits, elsewhere C∞. Time constant of the winding L/R.
+
+    Examples
+    --------
+    >>> numbers = dict(inertia=1.4e-5, torque_constant=0.03, resistance=0.3, inductance=8e-5)
+    >>> VoltageDrivenMotor(**numbers, current_limit=20.0, voltage_limit=24.0).limiter_time.number
+    0.0001
     """
 
     inductance: Quantity = parameter("H", "inductance of the winding", minimum=1e-9, maximum=1e3)

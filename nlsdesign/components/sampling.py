@@ -46,6 +46,11 @@ class SampledEncoder(Encoder):
     """Encoder that is read f times a second: reading = q·round(θ(t_k)/q) for t_k ≤ t < t_k + 1/f.
 
     In the flat model it rounds only, piecewise constant; on average a held reading is half a sample late.
+
+    Examples
+    --------
+    >>> SampledEncoder(of="motor.angle", quantum=1e-3, sample_rate=1e3).title()
+    'SampledEncoder(quantum = 0.001 rad, sample_rate = 1000 Hz)'
     """
 
     sample_rate: Quantity = parameter("Hz", "readings per second", minimum=1e-3, maximum=1e9)
@@ -63,6 +68,11 @@ class SampleAndHold(Sensor):
 
     What it latches is the last value that stands in the run, so a count stays a count. In the flat model the
     value passes unchanged; on average a held reading is half a sample late.
+
+    Examples
+    --------
+    >>> SampleAndHold(of="load_cell.reading", sample_rate=1e3).title()
+    'SampleAndHold(sample_rate = 1000 Hz)'
     """
 
     sample_rate: Quantity = parameter("Hz", "samples per second", minimum=1e-3, maximum=1e9)
@@ -87,6 +97,11 @@ class Tachometer(Sensor):
     as smooth as what it reads. In records the same filter acts on differences of samples,
     y_k = a·y_(k−1) + (1 − a)·(θ_k − θ_(k−1))·f_s with a = e^(−2πf_c/f_s), from rest. One count of an encoder
     shows as a step of (1 − a)·q·f_s. Source: any text on digital filters; the filter is exact for held input.
+
+    Examples
+    --------
+    >>> Tachometer(of="motor_encoder.reading", bandwidth=60.0, sample_rate=1e3).title()
+    'Tachometer(bandwidth = 60 Hz, sample_rate = 1000 Hz)'
     """
 
     units: ClassVar[tuple[str, ...]] = ("rad", "m")

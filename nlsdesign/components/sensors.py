@@ -178,7 +178,13 @@ class ForceSensor(Sensor):
 
 @dataclass(frozen=True, kw_only=True)
 class TorqueSensor(Sensor):
-    """Torque transducer: reading = gain·T + bias; ``noise`` is the standard deviation of a sample, white."""
+    """Torque transducer: reading = gain·T + bias; ``noise`` is the standard deviation of a sample, white.
+
+    Examples
+    --------
+    >>> TorqueSensor(of="spring.torque", noise=5e-3).title()
+    'TorqueSensor(gain = 1, bias = 0 N*m, noise = 0.005 N*m)'
+    """
 
     units: ClassVar[tuple[str, ...]] = ("N*m",)
 

@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 
 from models import one_sided_cable_drive
 from nlsdesign.analysis import Observability, Stability, over_angle
+from nlsdesign.components import VoltageDrivenMotor
 from nlsdesign.components.declare import deck_text, declare
 from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.export import CompiledStep, export_c, export_fmu
@@ -177,6 +178,23 @@ def test_the_chart_over_the_angle_shows_the_slope_of_the_torque() -> None:
     assert np.all(chart["stiffness.fast"] > chart["stiffness.slow"])
     assert np.all(chart["observability.rank"] == 3)
     assert np.all(chart["decay"] < 0.0)
+
+
+def test_the_same_drive_at_a_voltage_has_the_current_as_a_state_and_the_same_stiffness() -> None:
+    winding = DRIVE["motor"].parameters()
+    made = DRIVE.with_part("motor", VoltageDrivenMotor(**winding, inductance=8e-5)).without_part(
+        "current_sensor"
+    )
+    angles, views = RATIO * np.array([0.3, 0.8]), [Observability(measured=("motor.angle",)), Stability()]
+    charts = []
+    for each in (DRIVE, made):
+        model = flatten(each, outputs=["motor.angle", "spring.torque"])
+        charts.append(over_angle(model, views, angles=angles, angle="motor.angle"))
+    assert "motor.current" in [v.name for v in flatten(made).states]
+    assert list(charts[1]["observability.rank"]) == [4, 4]
+    assert charts[1]["stiffness.slow"] == pytest.approx(charts[0]["stiffness.slow"], rel=1e-9)
+    # Shorted at its clamps the motor brakes, k²/R; an ideal current source lets it go.
+    assert np.all(charts[1]["damping_ratio"] >= charts[0]["damping_ratio"])
 
 
 def test_the_deck_and_the_function_say_the_same(tmp_path: Path) -> None:
