@@ -25,7 +25,7 @@ from .misshapen import MisshapenCam
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
 from .part import Part
-from .play import Backlash, LooseCable, Play, Slack, Turned
+from .play import Backlash, InertialBacklash, LooseCable, Play, Slack, Turned
 from .sampling import SampleAndHold, SampledEncoder, Tachometer
 from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .slide import ConstantForce, LinearDrive, SlidingFriction
@@ -78,6 +78,7 @@ __all__ = [
     "GearedMotor",
     "Hyperelastic",
     "Inertia",
+    "InertialBacklash",
     "InextensibleCable",
     "LinearDrive",
     "LinearElastic",

@@ -68,6 +68,47 @@ class Backlash(Shifting):
 
 
 @dataclass(frozen=True, kw_only=True)
+class InertialBacklash(Combination):
+    """Play before a driven side that has an inertia of its own, so that it coasts through the gap.
+
+    J·φ̈ = T − Σ(efforts at φ),  T = ⟨c·(p₊ + 2τ·ṗ₊)⟩ − ⟨c·(p₋ + 2τ·ṗ₋)⟩,  p± = ±(θ − φ) − g/2,  c = J/τ²
+
+    A stop only pushes and does not rebound: τ, far below every other time, is how long contact takes to
+    settle. Valid where the stops are stiffer than all else. Source: Nordin and Gutman 2002, sec. 2.
+    """
+
+    gap: Quantity = parameter("rad", "angle from stop to stop", minimum=0.0, maximum=1.0)
+    inertia: Quantity = parameter("kg*m^2", "moment of inertia behind the play", minimum=1e-12, maximum=1e6)
+    contact_time: Quantity = parameter(
+        "s", "time in which contact settles", minimum=1e-6, maximum=0.1, default=2e-4
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self._inner != ROTATION:
+            raise ArrangementError(type(self).__name__, "acts on angle and torque")
+
+    @property
+    def needs_rate(self) -> bool:
+        """True: contact damps."""
+        return True
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return T."""
+        angle = scope.state("inner_angle", "rad", f"angle behind the play of {scope.path}")
+        speed = scope.state("inner_speed", "rad/s", f"speed behind the play of {scope.path}")
+        time, inertia = scope.parameter("contact_time"), scope.parameter("inertia")
+        half = scope.parameter("gap") / 2
+        apart, moving = motion - angle, 2 * time * (rate - speed)
+        torque = ca.fmax(apart - half + moving, 0) - ca.fmax(-apart - half - moving, 0)
+        torque *= inertia / time**2
+        efforts = [observed_effort(m, scope.child(n), angle, speed) for n, m in self.members]
+        scope.derive(angle, speed)
+        scope.derive(speed, (torque - sum(efforts[1:], start=efforts[0])) / inertia)
+        return torque
+
+
+@dataclass(frozen=True, kw_only=True)
 class Slack(Shifting):
     """A cable too long by s: the element inside is stretched by ⟨e − s⟩, rounded over w.
 

@@ -2,82 +2,56 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ConvergenceError
+from ..identification.block import Block
+from ..identification.crew import shared_out
 from ..identification.driven import DrivenBlock
-from ..identification.evidence import Bench, Evidence
-from ..identification.fit import Fit, Parameter, declared_parameter, fit, predicted_cost
+from ..identification.evidence import Bench, Evidence, Floor
+from ..identification.measurement import Record
 from ..identification.residuals import effective_size
 from ..model import Assembly, Variable
 from .cuts import blocks_of
 from .effects.candidate import Candidate, Unknown
+from .hypothesis import Hypothesis
+from .trial import Trials
 
 Array = NDArray[np.float64]
 
 _LONGEST_ROW = 12
-_FULL_STARTS = 3
-_EVALUATIONS, _COARSE_EVALUATIONS, _COARSE_TOLERANCE = 40, 20, 3e-4
-"""So many starts are fitted to the end; where there are more, the best by a linear look ahead."""
 
 
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """An assembly fitted to the records.
+class Judged:
+    """What a fitted hypothesis says of one record, seen by one block.
 
     Parameters
     ----------
-    assembly
-        With declared numbers, and the effects added so far.
-    added
-        The effects, in the order in which they were added.
-    values
-        Fitted numbers by name.
-    fits
-        One for each group of blocks that share parameters, by the names of the blocks.
-    chi2
-        Sum of squared residuals in units of the noise floor by block and record.
-    rows
-        Number of residuals by block and record.
-    worth
-        How many independent residuals these are worth, coloured as they are.
-    coarse
-        Whether it was fitted to thinned records only.
+    block, record, floor
+        Which block, which record, and how it is read.
+    predicted
+        Unfiltered output over the record.
+    residual
+        Filtered error in units of the noise floor.
     """
 
-    assembly: Assembly
-    added: tuple[Candidate, ...]
-    values: Mapping[str, float]
-    fits: Mapping[tuple[str, ...], Fit]
-    chi2: Mapping[tuple[str, str], float]
-    rows: Mapping[tuple[str, str], int]
-    worth: Mapping[tuple[str, str], float]
-    coarse: bool = False
+    block: Block
+    record: Record
+    floor: Floor
+    predicted: Array
+    residual: Array
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Identifiers of the effects."""
-        return tuple(c.effect for c in self.added)
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Numbers that the effects brought along."""
-        return tuple(u for c in self.added for u in c.unknowns)
-
-    @property
-    def prior(self) -> float:
-        """Sum of squared departures from declared numbers, in standard deviations of their spread."""
-        return float(sum(s**2 for f in self.fits.values() for s in f.strain().values()))
-
-    @property
-    def fitted(self) -> Assembly:
-        """The assembly with the fitted numbers."""
-        return self.assembly.with_values(self.values)
+    def error(self) -> Array:
+        """Filtered error in the unit of the block."""
+        result: Array = self.residual * self.floor.sigma
+        return result
 
 
 class Comparison:
@@ -93,7 +67,8 @@ class Comparison:
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
         self.bench = bench
-        self._sizes = sizes
+        self._trials = Trials(bench, sizes)
+        self._known: list[tuple[Hypothesis, tuple[Judged, ...]]] = []
 
     def base(self, assembly: Assembly) -> Hypothesis:
         """Refit the declared assembly, so that a wrong number is not taken for a wrong structure.
@@ -116,7 +91,9 @@ class Comparison:
         """
         return self._refitted(replace(hypothesis, coarse=True), _groups(self._driven(hypothesis)))
 
-    def with_effect(self, hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
+    def with_effect(
+        self, hypothesis: Hypothesis, candidate: Candidate, wanted: Collection[str] = ()
+    ) -> Hypothesis | None:
         """Fit a hypothesis with one more effect; blocks that it does not touch stay as they are.
 
         Parameters
@@ -125,13 +102,14 @@ class Comparison:
             Fitted, coarsely or not.
         candidate
             Made from ``hypothesis.assembly``.
+        wanted
+            Names of blocks; ``None`` is returned for an effect that touches none of them.
         """
-        renamed = _renamed(hypothesis, candidate.assembly)
-        old = tuple(replace(u, name=renamed.get(u.name, u.name)) for u in hypothesis.unknowns)
-        values = {renamed.get(n, n): v for n, v in hypothesis.values.items()}
-        added = (*_with_unknowns(hypothesis.added, old), candidate)
-        before = replace(hypothesis, assembly=candidate.assembly, added=added, values=values)
-        return self._refitted(before, self._touched(before, candidate.unknowns), candidate.unknowns)
+        before = _edited(hypothesis, candidate)
+        groups = self._touched(before, candidate.unknowns)
+        if wanted and not any(b.block.name in wanted for g in groups for b in g):
+            return None
+        return self._refitted(before, groups, candidate.unknowns)
 
     def polished(self, hypothesis: Hypothesis) -> Hypothesis:
         """Refit a coarse hypothesis to all samples, from where it stands.
@@ -143,18 +121,38 @@ class Comparison:
         """
         return self._refitted(replace(hypothesis, coarse=False), _groups(self._driven(hypothesis)))
 
-    def evidence(self, hypothesis: Hypothesis) -> list[Evidence]:
-        """Return what all records say about all blocks of a hypothesis, on all samples.
+    def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a coarsely fitted hypothesis, its numbers as they are, with what all samples say of it.
 
         Parameters
         ----------
         hypothesis
             Fitted.
         """
-        records = self.bench.records.records
-        return [
-            e for b in self._driven(hypothesis) for e in self.bench.evidence(b, records, hypothesis.values)
-        ]
+        chi2, rows, worth = {}, {}, {}
+        for each in self.judged(hypothesis):
+            key = each.block.name, each.record.name
+            chi2[key], rows[key] = float(each.residual @ each.residual), len(each.residual)
+            worth[key] = effective_size(each.residual)
+        return replace(hypothesis, chi2=chi2, rows=rows, worth=worth, coarse=False)
+
+    def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
+        """Return what all records say about all blocks of a hypothesis, on all samples.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted; the answer is remembered.
+        """
+        if not any(known is hypothesis for known, _ in self._known):
+            fitted = [DrivenBlock(b, ()) for b in blocks_of(hypothesis.fitted, self.bench.records.signals)]
+            seen = [e for b in fitted for e in self.bench.evidence(b, self.bench.records.records, {})]
+            found = tuple(shared_out(lambda k: _judged(seen[k]), len(seen)))
+            told = tuple(
+                Judged(e.driven.block, e.record, e.floor, *pair) for e, pair in zip(seen, found, strict=True)
+            )
+            self._known.append((hypothesis, told))
+        return next(told for known, told in self._known if known is hypothesis)
 
     def _driven(self, hypothesis: Hypothesis) -> list[DrivenBlock]:
         found = []
@@ -173,67 +171,32 @@ class Comparison:
     ) -> Hypothesis:
         values, fits = dict(before.values), dict(before.fits)
         chi2, rows, worth = dict(before.chi2), dict(before.rows), dict(before.worth)
-        for group in groups:
-            best, evidence = self._best_fit(before, group, new)
+        done = shared_out(lambda k: self._trials.settled(before, groups[k], new), len(groups))
+        for group, (best, told) in zip(groups, done, strict=True):
+            if isinstance(best, ConvergenceError):
+                raise best
             values |= best.values
             names = tuple(b.block.name for b in group)
             fits = {k: f for k, f in fits.items() if not set(k) & set(names)} | {names: best}
-            for each in evidence:
-                key = each.driven.block.name, each.record.name
-                residual = each.residual(values)[0]
-                chi2[key], rows[key] = float(residual @ residual), len(residual)
-                worth[key] = effective_size(residual)
+            for key, (square, count, size) in told.items():
+                chi2[key], rows[key], worth[key] = square, count, size
         return replace(before, values=values, fits=fits, chi2=chi2, rows=rows, worth=worth)
 
-    def _best_fit(
-        self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
-    ) -> tuple[Fit, list[Evidence]]:
-        free = list(dict.fromkeys(name for b in group for name in b.free))
-        mine = [u for u in new if u.name in free]
-        variables = {v.name: v for b in group for v in b.block.model.parameters}
-        known = {u.name: u for u in before.unknowns}
-        starts = [
-            dict(zip([u.name for u in mine], s, strict=True))
-            for s in itertools.product(*[[v * self._scale(u) for v in u.starts] for u in mine])
-        ]
-        choices = [
-            [self._parameter(variables[n], known.get(n), start.get(n, before.values.get(n))) for n in free]
-            for start in starts
-        ]
-        begin = {p.name: p.start for p in choices[0]}
-        everything = [
-            e
-            for b in group
-            for e in self.bench.evidence(b, self.bench.records.records, begin, coarse=before.coarse)
-        ]
-        seen = [e for e in everything if e.record.role == "fit"]
-        if len(choices) > _FULL_STARTS:
-            choices = sorted(choices, key=lambda ps: predicted_cost(seen, ps))[:_FULL_STARTS]
-        limits = (_COARSE_EVALUATIONS, _COARSE_TOLERANCE) if before.coarse else (_EVALUATIONS, 0.0)
-        fits = (fit(seen, ps, evaluations=limits[0], tolerance=limits[1]) for ps in choices)
-        return min(fits, key=lambda f: f.cost), everything
 
-    def _scale(self, unknown: Unknown) -> float:
-        return self._sizes.get(unknown.of, 1.0) if unknown.of else 1.0
+def _judged(evidence: Evidence) -> tuple[Array, Array]:
+    output = evidence.predicted({})
+    target = evidence.driven.block.target
+    error = (evidence.record.trace[target] if target else 0.0) - output
+    return output, (evidence.floor.filter @ error) / evidence.floor.sigma
 
-    def _parameter(self, variable: Variable, unknown: Unknown | None, start: float | None) -> Parameter:
-        if unknown is None:
-            return declared_parameter(variable, start)
-        scale = self._scale(unknown)
-        low, high = unknown.lower * scale, unknown.upper * scale
-        begin = variable.start if start is None else start
-        log = unknown.lower > 0.0
-        return Parameter(
-            variable.name,
-            variable.unit,
-            begin,
-            begin,
-            float("inf"),
-            max(low, variable.minimum),
-            min(high, variable.maximum),
-            "log" if log else "linear",
-            1.0 if log else 0.1 * (high - low),
-        )
+
+def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
+    """Return a hypothesis with the effect in its assembly, not fitted yet."""
+    renamed = _renamed(hypothesis, candidate.assembly)
+    old = tuple(replace(u, name=renamed.get(u.name, u.name)) for u in hypothesis.unknowns)
+    values = {renamed.get(n, n): v for n, v in hypothesis.values.items()}
+    added = (*_with_unknowns(hypothesis.added, old), candidate)
+    return replace(hypothesis, assembly=candidate.assembly, added=added, values=values)
 
 
 def _refittable(parameters: Sequence[Variable]) -> list[Variable]:

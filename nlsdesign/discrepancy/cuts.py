@@ -11,7 +11,7 @@ from ..errors import MeasurementError
 from ..identification.block import Block, Drive
 from ..model import Assembly, FlatModel, Variable, flatten
 from ..model.transform import cut, without_idle_states
-from ..symbolic import Expression
+from ..symbolic import Expression, depends
 
 READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
 """Filter widths in samples. A balance holds a second derivative, whose noise asks for more."""
@@ -69,10 +69,12 @@ def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
     moving = [k for k in known if k.truth in states and _speed_of(k.truth) in states]
     efforts = [k for k in known if k.truth not in states | inputs]
     driven = [k for k in known if k.truth in inputs]
+    opened = cut(model, [e.truth for e in efforts], keep=True) if efforts else model
     found = [
-        _reading_block(assembly, model, effort, moving + driven) for effort in efforts if moving + driven
+        _reading_block(assembly, opened, effort, moving + driven + efforts)
+        for effort in efforts
+        if moving + driven
     ]
-    opened = cut(model, [e.truth for e in efforts]) if efforts else model
     found += [_balance_block(assembly, opened, body, moving + driven + efforts) for body in moving]
     if not found:
         raise MeasurementError(
@@ -97,7 +99,13 @@ def _speed_of(motion: str) -> str:
 
 def _reading_block(assembly: Assembly, model: FlatModel, effort: _Known, given: Sequence[_Known]) -> Block:
     name = effort.truth.partition(".")[0]
-    return _driven(assembly, model, given, (name, effort.signal, effort.signal))
+    # Where an effort acts back on a body inside, the measured one acts.
+    s, inputs = model.symbols(), [v.name for v in model.inputs]
+    led = {n for k in given for n in (k.truth, _speed_of(k.truth))}
+    own = ca.vertcat(*[s.derivative[i] for i, v in enumerate(model.states) if v.name not in led])
+    cuts = {v.name for v in model.signals} & set(inputs)
+    used = [k for k in given if k.truth not in cuts or depends(own, s.input[inputs.index(k.truth)])]
+    return _driven(assembly, model, used, (name, effort.signal, effort.signal))
 
 
 def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Sequence[_Known]) -> Block:
@@ -108,14 +116,19 @@ def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Se
 class _Readings:
     """What readings of sensors say of the variables of a model, as symbols that they drive."""
 
-    def __init__(self, assembly: Assembly, model: FlatModel, symbols: tuple[Expression, Expression]) -> None:
+    def __init__(
+        self, assembly: Assembly, model: FlatModel, symbols: tuple[Expression, Expression], output: str
+    ) -> None:
         self._sensors, self._model, self._symbols = assembly.sensors(), model, symbols
+        self._output = output
         self.drives: dict[str, Drive] = {}
         self.new: dict[str, tuple[Variable, Expression]] = {}
 
     def reading(self, known: _Known, order: int) -> Expression:
         """Return the symbol of a reading or of one of its derivatives."""
-        label = known.signal + (".rate", ".acceleration")[order - 1] if order else known.signal
+        # The same reading may be predicted and drive a body inside.
+        label = known.signal + ("", ".rate", ".acceleration")[order]
+        label += ".measured" if label == self._output else ""
         if label not in self.new:
             self.drives[label] = Drive(known.signal, order, self._late_by(known))
             self.new[label] = Variable(label, "", f"measured {known.signal}"), ca.SX.sym(label)
@@ -150,7 +163,7 @@ def _driven(
     name, output, target = what
     s = model.symbols()
     states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
-    readings = _Readings(assembly, model, (s.parameter, s.state))
+    readings = _Readings(assembly, model, (s.parameter, s.state), output)
     inferred = readings.inferred
     old, instead, prescribed = [], [], list[str]()
     for known in given:

@@ -16,9 +16,10 @@ from ..components.declare import write_deck
 from ..identification.evidence import Bench
 from ..identification.measurement import RecordSet
 from ..writing import write_text
-from .compare import Comparison, Hypothesis
+from .compare import Comparison
 from .cuts import blocks_of
 from .effects import ALL, Effect
+from .hypothesis import Hypothesis
 from .locate import DECLARED, Excess, excesses
 from .outcome import course_of, gaps_of, shapes_of
 from .search import Outcome, Step, search

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..identification.evidence import Bench
 from ..identification.measurement import Role
-from .compare import Hypothesis
+from .hypothesis import Hypothesis
 
 LEAST_EXCESS = 0.4
 """Mean square above the floor that is let pass: filters and rounding are known no better."""

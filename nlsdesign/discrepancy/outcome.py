@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.evidence import STRIDE, Evidence
+from ..identification.evidence import STRIDE
 from ..identification.filters import derivative
 from ..identification.residuals import Binned, shapes
-from .compare import Comparison, Hypothesis
+from .compare import Comparison
+from .hypothesis import Hypothesis
 from .verdict import Course, RecordGap
 
 
@@ -22,20 +23,14 @@ def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tu
     comparison
         Knows the records.
     """
-    later = {_key(e): e for e in comparison.evidence(after)}
     found = []
-    for each in comparison.evidence(before):
-        sigma = each.floor.sigma
-        then, now = (
-            each.residual(before.values)[0] * sigma,
-            later[_key(each)].residual(after.values)[0] * sigma,
+    for then, now in zip(comparison.judged(before), comparison.judged(after), strict=True):
+        first, last, floor = (
+            float(np.sqrt(np.mean(np.square(r)))) for r in (then.error, now.error, then.floor.sigma)
         )
-        unit = each.driven.block.model.outputs[0].unit
-        first, last, floor = (float(np.sqrt(np.mean(np.square(row)))) for row in (then, now, sigma))
-        name = each.driven.block.name
-        found.append(
-            RecordGap(name, each.record.name, each.record.role, first, last, floor, len(sigma), unit)
-        )
+        name, record, unit = then.block.name, then.record, then.block.model.outputs[0].unit
+        count = len(then.residual)
+        found.append(RecordGap(name, record.name, record.role, first, last, floor, count, unit))
     return tuple(found)
 
 
@@ -49,28 +44,21 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
     block
         Name.
     """
-    mine = [e for e in comparison.evidence(before) if e.driven.block.name == block]
-    held = [e for e in mine if e.record.role == "held_out"] or mine
-    worst = max(held, key=lambda e: float(np.mean(np.square(e.residual(before.values)[0] * e.floor.sigma))))
-    later = {_key(e): e for e in comparison.evidence(after)}[_key(worst)]
-    target = worst.driven.block.target
-    trace = worst.record.trace
-    measured = trace[target] if target else np.zeros(len(trace))
-    output = worst.driven.block.model.outputs[0]
+    pairs = zip(comparison.judged(before), comparison.judged(after), strict=True)
+    mine = [(a, b) for a, b in pairs if a.block.name == block]
+    held = [pair for pair in mine if pair[0].record.role == "held_out"] or mine
+    then, now = max(held, key=lambda pair: float(np.mean(np.square(pair[0].error))))
+    target, trace, output = then.block.target, then.record.trace, then.block.model.outputs[0]
     return Course(
-        worst.record.name,
+        then.record.name,
         target or output.description,
         output.unit,
         trace.time,
-        measured,
-        worst.predicted(before.values),
-        later.predicted(after.values),
-        float(np.mean(worst.floor.raw_sigma)),
+        trace[target] if target else np.zeros(len(trace)),
+        then.predicted,
+        now.predicted,
+        float(np.mean(then.floor.raw_sigma)),
     )
-
-
-def _key(evidence: Evidence) -> tuple[str, str]:
-    return evidence.driven.block.name, evidence.record.name
 
 
 def shapes_of(
@@ -89,8 +77,8 @@ def shapes_of(
 
 def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[str, Binned]:
     bench = comparison.bench
-    mine = [e for e in comparison.evidence(hypothesis) if e.driven.block.name == block]
-    error = np.concatenate([e.residual(hypothesis.values)[0] * e.floor.sigma for e in mine])
+    mine = [e for e in comparison.judged(hypothesis) if e.block.name == block]
+    error = np.concatenate([e.error for e in mine])
 
     def gathered(signal: str, order: int) -> NDArray[np.float64]:
         rows = [derivative(e.record.trace[signal], e.record.step, order=order)[e.floor.places] for e in mine]

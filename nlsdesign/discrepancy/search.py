@@ -1,13 +1,16 @@
-"""The search for what is missing: one effect after the other, while a block stays open."""
+"""The search for what is missing: effects are added while a block stays open, dropped when superfluous."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from ..errors import ConvergenceError
-from .compare import Comparison, Hypothesis
+from ..identification.crew import shared_out
+from .compare import Comparison
 from .effects.candidate import Candidate, Effect
+from .hypothesis import Hypothesis
 from .locate import DECLARED, Excess, excesses, explained, total_excess
 
 LEAST_SHARE = 0.5
@@ -18,10 +21,10 @@ CLOSED_SHARE = 0.75
 """A block of which so much is explained counts as named, even if its form is not quite right."""
 SAME = 0.02
 """A simpler hypothesis is taken if its excess is more by less than this share of the first excess."""
-ALIAS = 0.003
-"""Hypotheses whose excess differs by less than this share of the first excess cannot be told apart."""
 _NOISE = 50.0
 _MOST_EFFECTS = 3
+_PAIRED = 5
+"""Where no effect helps alone, so many of the best are tried in pairs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +39,12 @@ class Step:
         Share of the excess of the block that it explains best.
     aliases
         Identifiers of effects that explain as much with as few numbers.
-    tried
-        All hypotheses of this step.
     """
 
     chosen: Hypothesis
     share_fit: float
     share_held_out: float
     aliases: tuple[str, ...]
-    tried: tuple[Hypothesis, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,38 +85,133 @@ def search(
     progress
         Told what is being tried.
     """
-    present, bench = comparison.coarsely(base), comparison.bench
-    first = before = excesses(present, bench)
-    steps: list[Step] = []
-    ranking: tuple[tuple[Candidate, float], ...] = ()
-    while any(e.open for e in before.values()) and len(steps) < _MOST_EFFECTS:
-        tried = _tried(comparison, present, catalogue, progress)
-        ranking = ranking or _ranked(comparison, before, tried)
-        step = _best_step(comparison, (first, before), tried)
-        if step is None:
-            break
-        present, steps = step.chosen, [*steps, step]
-        before = excesses(present, bench)
-    steps = _without_superfluous(comparison, steps, first)
+    seeker = _Seeker(comparison, catalogue, progress)
+    start = comparison.coarsely(base)
+    first = excesses(start, comparison.bench)
+    steps, ranking = seeker.forward(start)
+    steps = seeker.backward(start, steps)
     if not steps:
         return Outcome(base, (), ranking, not any(e.open for e in first.values()))
     progress("fitting what was found to all samples")
     last = comparison.polished(steps[-1].chosen)
-    return Outcome(last, tuple(steps), ranking, is_explained(first, excesses(steps[-1].chosen, bench)))
+    found = excesses(steps[-1].chosen, comparison.bench)
+    return Outcome(last, tuple(steps), ranking, is_explained(first, found))
 
 
-def _tried(
-    comparison: Comparison, present: Hypothesis, catalogue: Sequence[Effect], progress: Callable[[str], None]
-) -> list[Hypothesis]:
-    found = []
-    for effect in catalogue:
-        for candidate in effect(present.assembly):
-            progress(f"trying {candidate.effect} at {candidate.location}")
+class _Seeker:
+    """Tries candidates on hypotheses, on all cores."""
+
+    def __init__(
+        self, comparison: Comparison, catalogue: Sequence[Effect], progress: Callable[[str], None]
+    ) -> None:
+        self._comparison, self._catalogue, self._progress = comparison, catalogue, progress
+
+    def forward(self, start: Hypothesis) -> tuple[list[Step], tuple[tuple[Candidate, float], ...]]:
+        """Return the effects that help, one after the other, and how far each goes alone."""
+        bench = self._comparison.bench
+        first = before = excesses(start, bench)
+        steps: list[Step] = []
+        ranking: tuple[tuple[Candidate, float], ...] = ()
+        present = start
+        while self._worthwhile(start, present) and len(steps) < _MOST_EFFECTS:
+            tried = self._tried(present, before)
+            ranking = ranking or _ranked(self._comparison, before, tried)
+            step = _best_step(self._comparison, (first, before), tried)
+            steps += [step] if step else self._pair(tried, (first, before))
+            if not steps or steps[-1].chosen is present:
+                break
+            present = steps[-1].chosen
+            before = excesses(present, bench)
+        return steps, ranking
+
+    def backward(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
+        """Drop the effects that later ones have made superfluous, the first added first."""
+        bench, place = self._comparison.bench, 0
+        first = excesses(start, bench)
+        while len(steps) > 1 and place < len(steps) - 1:
+            self._progress(f"trying without {steps[place].chosen.added[-1].effect}")
+            rest = [s for k, s in enumerate(steps) if k != place]
+            fewer = self._rebuilt(start, rest)
+            enough = total_excess(excesses(steps[-1].chosen, bench)) + SAME * total_excess(first) + _NOISE
+            if fewer and total_excess(excesses(fewer[-1].chosen, bench)) <= enough:
+                steps = fewer
+            else:
+                place += 1
+        return steps
+
+    def _worthwhile(self, start: Hypothesis, present: Hypothesis) -> bool:
+        """Tell whether some open block still lacks enough for a further effect to count."""
+        bench, full = self._comparison.bench, self._comparison.on_all_samples
+        first, now = excesses(full(start), bench), excesses(full(present), bench)
+        return any(e.open and sum(e.excess) >= LEAST_SECOND * sum(first[n].excess) for n, e in now.items())
+
+    def _candidates(self, present: Hypothesis) -> list[Candidate]:
+        return [c for effect in self._catalogue for c in effect(present.assembly)]
+
+    def _tried(self, present: Hypothesis, before: dict[str, Excess]) -> list[Hypothesis]:
+        """Return fits of the candidates that act on an open block."""
+        wanted = {n for n, e in before.items() if e.open}
+        tasks = [(present, c) for c in self._candidates(present)]
+        return self._fits(tasks, set() if wanted == {DECLARED} else wanted)
+
+    def _fits(
+        self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
+    ) -> list[Hypothesis]:
+        def fitted(number: int) -> Hypothesis | None:
             try:
-                found.append(comparison.with_effect(present, candidate))
+                return self._comparison.with_effect(*tasks[number], wanted)
             except ConvergenceError:
-                continue  # no response anywhere near its starts: it explains nothing
-    return found
+                return None  # no response anywhere near its starts: it explains nothing
+
+        found = []
+        for (_, candidate), one in zip(tasks, shared_out(fitted, len(tasks)), strict=True):
+            self._progress(f"trying {candidate.effect} at {candidate.location}")
+            found += [one] if one else []
+        return found
+
+    def _pair(
+        self, tried: Sequence[Hypothesis], known: tuple[dict[str, Excess], dict[str, Excess]]
+    ) -> list[Step]:
+        """Return two effects that help together where none helps alone."""
+        bench = self._comparison.bench
+        best = sorted(tried, key=lambda h: total_excess(excesses(h, bench)))[:_PAIRED]
+        tasks = [
+            (one, again)
+            for one, other in itertools.combinations(best, 2)
+            for again in [self._again(one, other.added[-1])]
+            if again is not None
+        ]
+        pairs = self._fits(tasks)
+        step = _best_step(self._comparison, known, pairs)
+        if step is None:
+            return []
+        lone = next(h for h in best if h.added[-1].effect == step.chosen.added[-2].effect)
+        before = known[1]
+        return [Step(lone, *_best_shares(before, excesses(lone, bench)), ()), step]
+
+    def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
+        """Return the same effect at the same kind of place of another assembly."""
+        same = [c for c in self._candidates(hypothesis) if c.effect == wanted.effect]
+        ends = [c for c in same if c.location.split(".")[-1] == wanted.location.split(".")[-1]]
+        return next(iter(ends or same), None)
+
+    def _rebuilt(self, start: Hypothesis, steps: Sequence[Step]) -> list[Step]:
+        """Return the steps anew on another beginning; nothing if one of them no longer fits."""
+        bench, present, found = self._comparison.bench, start, []
+        for step in steps:
+            candidate = self._again(present, step.chosen.added[-1])
+            if candidate is None:
+                return []
+            try:
+                later = self._comparison.with_effect(present, candidate)
+            except ConvergenceError:
+                return []
+            if later is None:
+                return []
+            before, after = excesses(present, bench), excesses(later, bench)
+            found.append(Step(later, *_best_shares(before, after), step.aliases))
+            present = later
+        return found
 
 
 def _best_step(
@@ -133,12 +228,14 @@ def _best_step(
     chosen, after = min(equal, key=lambda pair: (len(pair[0].added[-1].unknowns), total_excess(pair[1])))
     size = len(chosen.added[-1].unknowns)
     aliases = [h.added[-1].effect for h, _ in equal if h is not chosen and len(h.added[-1].unknowns) <= size]
-    return Step(chosen, *_best_shares(before, after), tuple(dict.fromkeys(aliases)), tuple(tried))
+    return Step(chosen, *_best_shares(before, after), tuple(dict.fromkeys(aliases)))
 
 
 def _best_shares(before: dict[str, Excess], after: dict[str, Excess]) -> tuple[float, float]:
     """Return the share explained on fitted and on held-out records, of the block that gains most."""
     shares = explained(before, after)
+    if not shares:
+        return 0.0, 0.0
     block = max(shares, key=lambda name: shares[name])
     pairs = zip(before[block].excess, after[block].excess, strict=True)
     fitted, held = (1.0 - b / a if a > 0.0 else 1.0 for a, b in pairs)
@@ -162,20 +259,6 @@ def _ranked(
     whole = max(total_excess(before), 1.0)
     shares = [(h.added[-1], 1.0 - total_excess(excesses(h, comparison.bench)) / whole) for h in tried]
     return tuple(sorted(shares, key=lambda pair: -pair[1]))
-
-
-def _without_superfluous(comparison: Comparison, steps: list[Step], first: dict[str, Excess]) -> list[Step]:
-    """Drop the first effect if a later one, alone, explains as much as all of them together."""
-    if len(steps) < 2:
-        return steps
-    bench = comparison.bench
-    enough = total_excess(excesses(steps[-1].chosen, bench)) + SAME * total_excess(first) + _NOISE
-    later = {s.chosen.added[-1].effect for s in steps[1:]}
-    for alone in steps[0].tried:
-        after = excesses(alone, bench)
-        if alone.added[-1].effect in later and total_excess(after) <= enough:
-            return [Step(alone, *_best_shares(first, after), (), steps[0].tried)]
-    return steps
 
 
 def is_explained(first: dict[str, Excess], last: dict[str, Excess]) -> bool:

@@ -9,7 +9,8 @@ import numpy as np
 from ..identification.measurement import RecordSet
 from ..identification.quality import Finding
 from ..model import Assembly, flatten
-from .compare import Comparison, Hypothesis
+from .compare import Comparison
+from .hypothesis import Hypothesis
 
 _FACTOR = 4.0
 
@@ -47,11 +48,11 @@ def suspicions_of(comparison: Comparison, base: Hypothesis) -> list[Finding]:
         Refitted declared model.
     """
     found = []
-    for evidence in comparison.evidence(base):
-        target = evidence.driven.block.target
+    for evidence in comparison.judged(base):
+        target = evidence.block.target
         if target is None:
             continue
-        measured, predicted = evidence.record.trace[target], evidence.predicted(base.values)
+        measured, predicted = evidence.record.trace[target], evidence.predicted
         ratio = float(measured @ predicted) / max(float(predicted @ predicted), 1e-300)
         if not 1.0 / _FACTOR < ratio < _FACTOR:
             head = comparison.bench.records.column(target).name

@@ -39,7 +39,13 @@ class Minimum(NamedTuple):
 
 
 def minimise(
-    rows: Rows, start: Array, box: tuple[Array, Array], *, evaluations: int, share: float = 0.0
+    rows: Rows,
+    start: Array,
+    box: tuple[Array, Array],
+    *,
+    evaluations: int,
+    share: float = 0.0,
+    least: float = 0.0,
 ) -> Minimum:
     """Return the minimum of half a sum of squares within bounds.
 
@@ -55,6 +61,8 @@ def minimise(
         At most so many; a point where there is no response counts as a bad one.
     share
         Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
+    least
+        Ends too when the predicted gain is below this.
     """
     low, high = box
     x, damping = start, _FIRST_DAMPING
@@ -64,7 +72,7 @@ def minimise(
         gradient, curvature = slope.T @ residual, slope.T @ slope
         step = _step(gradient, curvature, damping, (x, low, high))
         gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
-        if gain < max(ENOUGH, share * cost) * (1.0 if damping <= 1.0 else 1e-2):
+        if gain < max(ENOUGH, share * cost, least) * (1.0 if damping <= 1.0 else 1e-2):
             return Minimum(x, cost, True)
         try:
             trial, trial_slope = rows(x + step)

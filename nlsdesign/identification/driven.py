@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -15,9 +15,12 @@ from .batch import Batch
 from .block import Block, Drive
 from .filters import derivative
 from .measurement import Record
-from .stepping import Stage, exact_step, is_short, rosenbrock_step, stages_of
+from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
 
 Array = NDArray[np.float64]
+
+_PROBES = 50
+"""Samples at which it is looked how fast a block is."""
 
 
 class Response(NamedTuple):
@@ -44,6 +47,20 @@ class Samples(NamedTuple):
     begin: Array
     end: Array
     step: float
+
+
+class _Walk(NamedTuple):
+    """Functions of a step: tables over the parameters, and the step itself.
+
+    ``near`` holds the states of the stages that take their derivative from the start of the record; ``stiff``
+    tells whether there are short implicit steps, ``mean`` whether the mean output over these is taken.
+    """
+
+    tables: ca.Function
+    step: Batch
+    near: list[list[int]]
+    stiff: bool
+    mean: bool
 
 
 class _Equations(NamedTuple):
@@ -90,15 +107,13 @@ class DrivenBlock:
         self._digest, self._size = Batch(e.digest), e.state.numel()
         self._late = [str(d.late_by) for d in _late_drives(block, self.free)]
         self._output = Batch(_output_function(e))
+        self._equations = e
         if self._size:
-            stages = stages_of(e.derivative, e.state, e.digested)
-            self._tables, step = _walk_functions(e, stages)
-            self._walk = Batch(step, chained=True)
+            self._stages = stages_of(e.derivative, e.state, e.digested)
             arguments = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
             slope = ca.jacobian(e.derivative, e.state)
-            far = [g for g in stages if not g.linear and not is_short(e.derivative[g.states])]
-            near = _column([ca.vec(slope[g.states, g.states]) for g in far])
-            self._rate = ca.Function("rate", arguments, [e.derivative, slope, ca.densify(near)])
+            self._rate = ca.Function("rate", arguments, [e.derivative, ca.densify(slope)])
+        self._walk: _Walk | None = None
 
     def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
         """Return the inputs of the block from a record.
@@ -130,6 +145,23 @@ class DrivenBlock:
         """Whether the samples depend on free parameters, that is, whether a free delay advances a signal."""
         return bool(self._late)
 
+    def prepare(self, given: Samples, values: Mapping[str, float]) -> None:
+        """Make the functions of a step, if there are none yet; they suit all records.
+
+        Parameters
+        ----------
+        given, values
+            As for :meth:`respond`.
+        """
+        if self._size and self._walk is None:
+            p = np.array([values[name] for name in (*self.free, *self._late)])
+            self._walk = self._made_walk(self._rest(given.begin[:, 0], p), given, p)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether some states move faster than the samples, as contact does; known once prepared."""
+        return self._walk is not None and self._walk.stiff
+
     def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
         """Return the output and its derivatives.
 
@@ -147,8 +179,8 @@ class DrivenBlock:
         """
         p = np.array([values[name] for name in (*self.free, *self._late)])
         n = given.at.shape[1]
-        states = self._states(given, p) if self._size else np.zeros((0, n))
-        found = self._output(n, [states, given.at, p])
+        states, mean = self._states(given, p) if self._size else (np.zeros((0, n)), None)
+        found = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
         if not np.all(np.isfinite(found)):
             raise ConvergenceError(
                 f"block '{self.block.name}'",
@@ -157,13 +189,35 @@ class DrivenBlock:
             )
         return Response(found[0], found[1:].T)
 
-    def _states(self, given: Samples, p: Array) -> Array:
+    def _states(self, given: Samples, p: Array) -> tuple[Array, Array | None]:
+        """Return states and sensitivities, and the mean output over each step where the walk takes it."""
         (n, size), begin, end = (given.at.shape[1], self._size), given.begin, given.end
-        start = np.zeros(size * (1 + len(self.free)))
-        start[:size] = self._rest(begin[:, 0], p)
-        w = self._rate(start[:size], begin.mean(axis=1), p)[2].full().ravel(order="F")
-        constant = np.concatenate([p, self._tables(p, given.step).full().ravel(order="F"), w, [given.step]])
-        return np.column_stack([start, self._walk(n - 1, [start, begin, end, constant])])
+        rest = self._rest(begin[:, 0], p)
+        walk, many = self._walk or self._made_walk(rest, given, p), size * (1 + len(self.free))
+        self._walk = walk
+        start = np.zeros(many + (1 + len(self.free) if walk.mean else 0))
+        start[:size] = rest
+        slope = self._rate(rest, begin.mean(axis=1), p)[1].full()
+        near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
+        tables = walk.tables(p, given.step).full().ravel(order="F")
+        constant = np.concatenate([p, tables, *near, [given.step]])
+        found = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
+        return found[:many], found[many:] if walk.mean else None
+
+    def _made_walk(self, rest: Array, given: Samples, p: Array) -> _Walk:
+        """Return the functions of a step, with short implicit steps for what is faster than a sample."""
+        few = given.begin[:, :: max(1, given.begin.shape[1] // _PROBES)].T
+        slopes = [self._rate(rest, column, p)[1].full() for column in few]
+        steepest = [
+            max(float(np.linalg.norm(m[np.ix_(g.states, g.states)], 2)) for m in slopes) for g in self._stages
+        ]
+        stiff = [not g.linear and s * given.step > STIFF for g, s in zip(self._stages, steepest, strict=True)]
+        # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
+        mean = any(stiff) and self.block.target is None
+        tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
+        rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
+        near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
+        return _Walk(tables, Batch(step, chained=True), near, stiff=any(stiff), mean=mean)
 
     def _ends(self, inputs: Array, rates: Array, at: Array, step: float) -> tuple[Array, Array]:
         """Return what is known at both ends of every step; rates are those of the line in between."""
@@ -184,13 +238,22 @@ class DrivenBlock:
         """Return the state in which the block rests at the first sample: bench records start at rest."""
         x = self.block.model.start(self.block.model.states)
         for _ in range(3):
-            rate, slope, _ = (m.full() for m in self._rate(x, begin, p))
+            rate, slope = (m.full() for m in self._rate(x, begin, p))
             if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
                 raise ConvergenceError(
                     f"block '{self.block.name}'", "has no state of rest at the first sample"
                 )
             x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
         return x
+
+
+def _centred(mean: Array) -> Array:
+    """Return means over the steps, of which the first column is void, as values at the samples."""
+    steps = mean[:, 1:]
+    result: Array = 0.5 * (
+        np.concatenate([steps[:, :1], steps], axis=1) + np.concatenate([steps, steps[:, -1:]], axis=1)
+    )
+    return result
 
 
 def _advanced(time: Array, signal: Array, late: float) -> tuple[Array, Array]:
@@ -261,33 +324,36 @@ def _output_function(e: _Equations) -> ca.Function:
     return ca.Function("output", [everything, e.digested, ca.vertcat(e.parameter, e.now)], [column])
 
 
-def _walk_functions(e: _Equations, stages: Sequence[Stage]) -> tuple[ca.Function, ca.Function]:
-    """Return the tables of the exact steps over the parameters, and one step of states and sensitivities."""
+def _walk_functions(
+    e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
+) -> tuple[ca.Function, ca.Function]:
+    """Return the tables of the exact steps over the parameters, and one step of states and sensitivities.
+
+    With ``mean`` the step gives out the mean of the output over a stiff stage's short steps as well.
+    """
     h, free = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now)
-    tables, symbols, matrices = [], [], []
+    tables, symbols, matrices, outputs = [], [], [], []
+    guess: list[Expression] = []
+    guessed: list[Expression] = []
     new = ca.SX(e.state)
     right = ca.SX.sym("right", e.digested.shape)
-    for stage in stages:
+    for stage, fast in zip(stages, stiff, strict=True):
         inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
         rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
-        n = inner.numel()
-
-        def at(
-            x: Expression, v: Expression, rate: Expression = rate, states: list[int] = stage.states
-        ) -> Expression:
-            # v is everything else: states and samples at the start of the step, or the new ones at its end.
-            place = ca.SX(v)
-            for k, i in enumerate(states):
-                place[i] = x[k]
-            return ca.SX(ca.substitute(rate, ca.vertcat(e.state, e.digested), place))
-
-        ends = ca.vertcat(e.state, e.digested), ca.vertcat(new, right)
+        n, ends = inner.numel(), (ca.vertcat(e.state, e.digested), ca.vertcat(new, right))
+        at = _placed(rate, e, stage.states)
         if stage.linear:
             table = ca.SX.sym("table", n, 3 * n)
             tables.append(ca.vec(ca.densify(exact_step(ca.jacobian(rate, inner), h))))
             symbols.append(ca.vec(table))
             zero = ca.SX.zeros(n)
             later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
+        elif fast:
+            found = implicit_steps(at, inner, ends, h)
+            later, guess, guessed = found.states[-1], guess + found.guess, guessed + found.guessed
+            seen, count = _placed(e.output, e, stage.states), len(found.states)
+            corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
+            outputs += [seen(x, v) / count for x, v in zip(found.states, corners, strict=True)]
         else:
             w = None if is_short(rate) else ca.SX.sym("w", n, n)
             matrices += [] if w is None else [w]
@@ -299,12 +365,37 @@ def _walk_functions(e: _Equations, stages: Sequence[Stage]) -> tuple[ca.Function
     prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
     slope, everything = _sensitivities(e)
     along = ca.SX.sym("along", table.numel(), e.parameter.numel())
-    new_slope = (
-        ca.jacobian(new, e.state) @ slope + ca.jacobian(new, e.parameter) + ca.jacobian(new, symbol) @ along
-    )
+
+    def with_slope(value: Expression) -> Expression:
+        total = ca.jacobian(value, e.state) @ slope + ca.jacobian(value, e.parameter)
+        return ca.SX(ca.vertcat(value, ca.vec(total + ca.jacobian(value, symbol) @ along)))
+
+    column = with_slope(new)
+    if mean:
+        column = ca.vertcat(column, with_slope(sum(outputs, start=ca.SX(0))))
+        everything = ca.vertcat(everything, ca.SX.sym("before", 1 + e.parameter.numel()))
+    if guess:
+        # Backwards: each symbol stands for an expression of those before it.
+        for name, value in zip(reversed(guess), reversed(guessed), strict=True):
+            column = ca.substitute(column, name, value)
     constant = ca.vertcat(free, symbol, ca.vec(along), _column([ca.vec(w) for w in matrices]), h)
-    column = ca.cse(ca.densify(ca.vertcat(new, ca.vec(new_slope))))
-    return prepare, ca.Function("step", [everything, e.digested, right, constant], [column])
+    return prepare, ca.Function(
+        "step", [everything, e.digested, right, constant], [ca.cse(ca.densify(column))]
+    )
+
+
+def _placed(
+    value: Expression, e: _Equations, states: Sequence[int]
+) -> Callable[[Expression, Expression], Expression]:
+    """Return an expression as a function of some states and of everything else, all states and samples."""
+
+    def at(x: Expression, v: Expression) -> Expression:
+        place = ca.SX(v)
+        for k, i in enumerate(states):
+            place[i] = x[k]
+        return ca.SX(ca.substitute(value, ca.vertcat(e.state, e.digested), place))
+
+    return at
 
 
 def _column(items: Sequence[Expression]) -> Expression:

@@ -219,7 +219,7 @@ class Bench:
         self.noise = estimate_noise(records)
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
-        self._thin: dict[tuple[str, str], tuple[Record, Floor]] = {}
+        self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
         for block in blocks:
             for record in records.records:
                 floor = noise_floor(block, record, self.noise)
@@ -252,17 +252,20 @@ class Bench:
             Free parameters by name, by which late signals are advanced.
         coarse
             Whether blocks with a target are simulated on every k-th sample alone and compared unfiltered: a
-            quick look, less sharp by the square root of the number of samples left out.
+            quick look, less sharp by the square root of the number of samples left out. Blocks that are
+            faster than a sample are simulated on all.
         """
         name = driven.block.name
         found = []
         for record in records:
             if (name, record.name) in self.floors:
-                thin = coarse and driven.block.target is not None
-                seen, floor = (
-                    self._thinned(name, record) if thin else (record, self.floors[name, record.name])
-                )
-                found.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
+                seen, floor = record, self.floors[name, record.name]
+                given = driven.samples(record, values)
+                driven.prepare(given, values)
+                if coarse and driven.block.target is not None:
+                    seen, floor = self._thinned(name, record, whole=driven.stiff)
+                    given = given if driven.stiff else driven.samples(seen, values)
+                found.append(Evidence(driven, seen, floor, given))
         return found
 
     def typical_floor(self, block: str) -> float:
@@ -276,17 +279,20 @@ class Bench:
         rows = np.concatenate([f.sigma for (name, _), f in self.floors.items() if name == block])
         return float(np.sqrt(np.mean(rows**2)))
 
-    def _thinned(self, block: str, record: Record) -> tuple[Record, Floor]:
-        key = block, record.name
+    def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, Floor]:
+        """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""
+        key = block, record.name, whole
         if key not in self._thin:
             k = self._skip(record)
             trace = record.trace
-            thin = Trace(
-                trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
-            )
-            raw = self.floors[key].raw_sigma[::k]
-            one = scipy.sparse.csr_array(scipy.sparse.identity(len(thin)))
-            self._thin[key] = replace(record, trace=thin), Floor(one, raw, raw)
+            raw = self.floors[block, record.name].raw_sigma[::k]
+            one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr")[::k])
+            if not whole:
+                trace = Trace(
+                    trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
+                )
+                one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace)))
+            self._thin[key] = replace(record, trace=trace), Floor(one, raw, raw)
         return self._thin[key]
 
     def _skip(self, record: Record) -> int:

@@ -186,6 +186,7 @@ def fit(
     *,
     evaluations: int = _EVALUATIONS,
     tolerance: float = 0.0,
+    least: float = 0.0,
 ) -> Fit:
     """Fit parameters to everything that the records say.
 
@@ -200,6 +201,9 @@ def fit(
     tolerance
         Ends too when the predicted gain is below this share of the cost: enough to tell a bad hypothesis.
 
+    least
+        Ends too when the predicted gain is below this.
+
     Raises
     ------
     ConvergenceError
@@ -207,7 +211,7 @@ def fit(
     """
     rows = _Rows(evidence, parameters)
     low, high, start = _box(parameters)
-    found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance)
+    found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
     if not np.isfinite(found.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
     residual, slope = rows(found.x)

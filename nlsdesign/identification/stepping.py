@@ -6,6 +6,7 @@ step; between samples b runs linearly:
 
     x⁺ = φ₀(Ah)·x + h·(φ₁ − φ₂)(Ah)·b₀ + h·φ₂(Ah)·b₁
 
+A stage whose own rates are faster than a sample, such as a stop that is hit, takes short implicit steps.
 Any other takes a Rosenbrock step with a matrix W ≈ ∂f/∂x, second order whatever W is, L-stable if W is near:
 the present derivative where that is cheap, else that at the start of the record.
 Source: Hochbruck and Ostermann 2010 (φ functions); Verwer et al. 1999 (ROS2).
@@ -27,6 +28,9 @@ _HALVINGS = 8
 _SHORT = 200
 _PARTS = 4
 _GAMMA = 1.0 - 0.5**0.5
+_SHORT_STEPS, _GUESSES = 4, 1
+STIFF = 2.0
+"""A stage is stiff if the norm of its derivative times the step is above this."""
 
 
 class Stage(NamedTuple):
@@ -139,6 +143,61 @@ def rosenbrock_step(
         corners = [left + (right - left) * (j / _PARTS) for j in (k, k + 1)]
         x = step(x, *corners, h / _PARTS, *free)
     return x
+
+
+class ImplicitSteps(NamedTuple):
+    """What :func:`implicit_steps` returns.
+
+    Parameters
+    ----------
+    states
+        At the end of each short step; they contain ``guess`` symbols.
+    guess, guessed
+        Symbols of iterates, and what to put in for them, earlier ones first. Derivatives are taken with the
+        symbols in place: at the root the derivative of one more Newton step is that of the root itself.
+    """
+
+    states: list[Expression]
+    guess: list[Expression]
+    guessed: list[Expression]
+
+
+def implicit_steps(
+    rate: Callable[[Expression, Expression], Expression],
+    state: Expression,
+    ends: tuple[Expression, Expression],
+    length: Expression,
+) -> ImplicitSteps:
+    """Return the states along short implicit Euler steps, each solved by two Newton iterations.
+
+    These end at the root where the right-hand side is piecewise linear, as contact is; there the first goes
+    to the wrong side of a stop and the second comes back. Nothing rebounds. First order.
+
+    Parameters
+    ----------
+    rate, state, ends, length
+        As for :func:`rosenbrock_step`.
+    """
+    (left, right), h = ends, length / _SHORT_STEPS
+    at, old, now = (ca.SX.sym(n, x.shape) for n, x in (("at", state), ("old", state), ("now", left)))
+    own, short = rate(at, now), ca.SX.sym("short")
+    system = ca.SX.eye(state.numel()) - short * ca.jacobian(own, at)
+    better = ca.cse(at - ca.solve(system, at - old - short * own))
+    newton = ca.Function("newton", [at, old, now, short], [better], {"allow_free": True})
+    free = newton.free_sx()
+    newton = ca.Function("newton", [at, old, now, short, *free], [better])
+    found, x = ImplicitSteps([], [], []), state
+    for k in range(1, _SHORT_STEPS + 1):
+        corner = left + (right - left) * (k / _SHORT_STEPS)
+        guess = x
+        for _ in range(_GUESSES):
+            guess = newton(guess, x, corner, h, *free)
+        symbol = ca.SX.sym(f"guess_{k}", state.shape)
+        x = newton(symbol, x, corner, h, *free)
+        found.states.append(x)
+        found.guess.append(symbol)
+        found.guessed.append(guess)
+    return found
 
 
 def _stages(

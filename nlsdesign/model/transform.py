@@ -146,7 +146,7 @@ def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
     return _rebuilt(model, changed, states=states, signals=signals)
 
 
-def cut(model: FlatModel, names: Sequence[str]) -> FlatModel:
+def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatModel:
     """Return the model cut open at named signals: each becomes an input, whatever it came from.
 
     What lay only before the cut drops out of the equations behind it. It works on the graph of the
@@ -158,6 +158,8 @@ def cut(model: FlatModel, names: Sequence[str]) -> FlatModel:
         Continuous or discrete.
     names
         Signals, for instance ``["spring.rubber.extension"]``.
+    keep
+        Whether signals stay what they were: then only derivatives, outputs and checks follow the new inputs.
 
     Raises
     ------
@@ -176,12 +178,12 @@ def cut(model: FlatModel, names: Sequence[str]) -> FlatModel:
             raise ArrangementError(f"signal '{name}'", "is only another name of a state, input or constant")
         found[known[name].element_hash()] = ca.SX.sym(name)
     fresh = [found[known[name].element_hash()] for name in names]
-    kept = [i for i, v in enumerate(model.signals) if v.name not in names]
+    kept = [i for i, v in enumerate(model.signals) if keep or v.name not in names]
     rest = _column([s.signal[i] for i in kept])
     columns = _regrown([s.derivative, s.output, rest, s.residual], found)
     changed = s._replace(
         input=_column([s.input, *fresh]),
-        derivative=columns[0], output=columns[1], signal=columns[2], residual=columns[3],
+        derivative=columns[0], output=columns[1], signal=rest if keep else columns[2], residual=columns[3],
     )  # fmt: skip
     opened = tuple(replace(model.variable(name), start=_at_start(model, name)) for name in names)
     return _rebuilt(

@@ -16,6 +16,7 @@ from nlsdesign.components import (
     ForceSensor,
     GearedMotor,
     Inertia,
+    InertialBacklash,
     InextensibleCable,
     LinearElastic,
     LoadFriction,
@@ -52,6 +53,7 @@ FORCE = "spring.rubber.force"
 
 _PARTS: tuple[Part, ...] = (
     Backlash(members=(("cam", HOUSING),), gap=0.01),
+    InertialBacklash(members=(("cam", HOUSING),), gap=0.01, inertia=9e-4, contact_time=1e-2),
     CoulombFriction(sliding_torque=0.02, creep_speed=0.02),
     CurrentSensor(of="motor.current", bias=0.05),
     Dashpot(damping=12.0),

@@ -145,6 +145,12 @@ ROWS: tuple[Row, ...] = (
         _PLAY + "torque_behind_a_backlash_is_the_slope_of_its_energy",
     ),
     Row(
+        c.InertialBacklash,
+        "momentum",
+        ("simulation of an impact", "common speed of two wheels that stay together"),
+        _PLAY + "what_meets_the_far_side_of_a_play_takes_it_along",
+    ),
+    Row(
         c.Slack,
         "rigid limit",
         ("smooth law", "max(e − s, 0)"),

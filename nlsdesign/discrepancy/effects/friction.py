@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from ...components import (
     Assembly,
-    Backlash,
     CoulombFriction,
     Element,
+    GearedMotor,
+    Inertia,
+    InertialBacklash,
     LoadFriction,
     QuadraticDrag,
     StribeckFriction,
@@ -223,29 +226,51 @@ def _springs(assembly: Assembly, wrapper: type[Element]) -> list[str]:
 
 
 def backlash(assembly: Assembly) -> Sequence[Candidate]:
-    """Play between a freely turning body and a spring tied to it.
+    """Play between a freely turning body and a spring tied to it, with part of the inertia behind the play.
 
     Parameters
     ----------
     assembly
-        As declared.
+        As declared. Where the body's inertia is declared as a whole, a tenth of it is put behind the play at
+        first, and its spread allows for any share up to a third.
     """
     found = []
-    for name in _springs(assembly, Backlash):
-        edited = wrapped(
-            assembly, name, "behind_play", lambda n, e: Backlash(members=((n, e),), gap=_number(0.01, "rad"))
+    for name in _springs(assembly, InertialBacklash):
+        drivers = [b for b in _ends(assembly, name) if isinstance(assembly[b], GearedMotor | Inertia)]
+        if not drivers:
+            continue
+        driver = drivers[0]
+        whole = assembly.quantities()[f"{driver}.inertia"]
+        own = replace(whole.with_value(0.9 * whole.number, whole.source), spread=max(whole.spread, 0.15))
+        behind = Quantity(0.1 * whole.number, "kg*m^2", SOURCE)
+        edited = wrapped(assembly, name, "behind_play", _loose(behind)).with_values(
+            {f"{driver}.inertia": own}
         )
         found.append(
             Candidate(
                 "backlash",
                 name,
                 edited,
-                (Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),),
+                (
+                    Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),
+                    Unknown(f"{name}.inertia", (0.1 * whole.number,), 1e-3 * whole.number, whole.number),
+                ),
                 "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
                 "Nordin and Gutman 2002",
             )
         )
     return found
+
+
+def _ends(assembly: Assembly, name: str) -> tuple[str, ...]:
+    part = assembly[name]
+    return part.between if isinstance(part, Tie) else ()
+
+
+def _loose(inertia: Quantity) -> Callable[[str, Element], Element]:
+    return lambda name, element: InertialBacklash(
+        members=((name, element),), gap=_number(0.01, "rad"), inertia=inertia
+    )
 
 
 def _sliding(of: str) -> Callable[[str], tuple[Unknown, ...]]:

@@ -1,0 +1,150 @@
+"""How one hypothesis is fitted to one group of blocks: starts, limits, and what is reported of it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..errors import ConvergenceError
+from ..identification.driven import DrivenBlock
+from ..identification.evidence import Bench, Evidence
+from ..identification.fit import Fit, Parameter, declared_parameter, fit, predicted_cost
+from ..identification.residuals import effective_size
+from ..model import Variable
+from .effects.candidate import Unknown
+from .hypothesis import Hypothesis
+
+_FULL_STARTS = 3
+"""So many starts are fitted to the end, the best by a linear look ahead."""
+_EVALUATIONS, _COARSE_EVALUATIONS, _COARSE_TOLERANCE = 40, 20, 3e-4
+_POLISHED, _DEAR = 2e-5, 6
+_SMALL = 1e-3
+"""A coarse fit ends when it promises to gain less than this share of the cost without the effect."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """Starts of the free numbers of a group of blocks, all evidence, and that which fits may see."""
+
+    choices: list[list[Parameter]]
+    everything: list[Evidence]
+    seen: list[Evidence]
+
+
+class Trials:
+    """Fits groups of blocks to the records.
+
+    Parameters
+    ----------
+    bench
+        Records with filters and noise floors.
+    sizes
+        Largest value of each signal of the declared model on the records, by name.
+    """
+
+    def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
+        self._bench, self._sizes = bench, sizes
+
+    def settled(
+        self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
+    ) -> tuple[Fit | ConvergenceError, dict[tuple[str, str], tuple[float, int, float]]]:
+        """Fit a group of blocks.
+
+        Parameters
+        ----------
+        before
+            Hypothesis with the effect in its assembly.
+        group
+            Blocks that share free numbers.
+        new
+            Numbers that have starts of their own.
+
+        Returns
+        -------
+        tuple
+            The fit, or why there is none; and sum of squares, rows and worth of each block and record.
+        """
+        try:
+            best, evidence = self._best_fit(before, group, new)
+        except ConvergenceError as error:
+            return error, {}
+        told = {}
+        for each in evidence:
+            residual = each.residual(best.values)[0]
+            told[each.driven.block.name, each.record.name] = (
+                float(residual @ residual),
+                len(residual),
+                effective_size(residual),
+            )
+        return best, told
+
+    def _best_fit(
+        self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
+    ) -> tuple[Fit, list[Evidence]]:
+        task = self._task(before, group, new)
+        limits = (
+            (_COARSE_EVALUATIONS, _COARSE_TOLERANCE)
+            if before.coarse
+            else (_EVALUATIONS, _POLISHED if before.added else 0.0)
+        )
+        fitted, names = {r.name for r in self._bench.records.of("fit")}, {b.block.name for b in group}
+        now = 0.5 * sum(c for (b, r), c in before.chi2.items() if b in names and r in fitted)
+        least = _SMALL * now if before.coarse and new else 0.0
+        if any(e.driven.stiff for e in task.seen):
+            # Short steps are dear, and where a body flies freely the valley is rough at the bottom.
+            limits = _DEAR, limits[1]
+        choices = [
+            (predicted_cost(task.seen, ps) if len(task.choices) > 1 else 0.0, ps) for ps in task.choices
+        ]
+        best: Fit | None = None
+        for promised, choice in sorted(choices, key=lambda pair: pair[0])[:_FULL_STARTS]:
+            # What does not even promise to reach the best so far is left alone.
+            if best is None or promised < best.cost:
+                found = fit(task.seen, choice, evaluations=limits[0], tolerance=limits[1], least=least)
+                best = found if best is None or found.cost < best.cost else best
+        assert best is not None
+        return best, task.everything
+
+    def _task(self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]) -> _Task:
+        free = list(dict.fromkeys(name for b in group for name in b.free))
+        mine = [u for u in new if u.name in free]
+        variables = {v.name: v for b in group for v in b.block.model.parameters}
+        known = {u.name: u for u in before.unknowns}
+        starts = [
+            dict(zip([u.name for u in mine], s, strict=True))
+            for s in itertools.product(*[[v * self._scale(u) for v in u.starts] for u in mine])
+        ]
+        choices = [
+            [self._parameter(variables[n], known.get(n), start.get(n, before.values.get(n))) for n in free]
+            for start in starts
+        ]
+        begin = {p.name: p.start for p in choices[0]}
+        everything = [
+            e
+            for b in group
+            for e in self._bench.evidence(b, self._bench.records.records, begin, coarse=before.coarse)
+        ]
+        return _Task(choices, everything, [e for e in everything if e.record.role == "fit"])
+
+    def _scale(self, unknown: Unknown) -> float:
+        return self._sizes.get(unknown.of, 1.0) if unknown.of else 1.0
+
+    def _parameter(self, variable: Variable, unknown: Unknown | None, start: float | None) -> Parameter:
+        if unknown is None:
+            return declared_parameter(variable, start)
+        scale = self._scale(unknown)
+        low, high = unknown.lower * scale, unknown.upper * scale
+        begin = variable.start if start is None else start
+        log = unknown.lower > 0.0
+        return Parameter(
+            variable.name,
+            variable.unit,
+            begin,
+            begin,
+            float("inf"),
+            max(low, variable.minimum),
+            min(high, variable.maximum),
+            "log" if log else "linear",
+            1.0 if log else 0.1 * (high - low),
+        )
