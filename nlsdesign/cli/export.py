@@ -9,6 +9,7 @@ import click
 from ..components.assembly import Assembly
 from ..components.declare import declare
 from ..deck import load_deck
+from ..errors import ArrangementError
 from ..export import export_c, export_fmu
 from ..model import FlatModel, flatten
 from ..observer import design_observer
@@ -16,6 +17,17 @@ from .output import deck_option, out_option
 from .units import Number
 
 _sample_time = click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
+
+
+def is_actuator(assembly: Assembly) -> bool:
+    """Tell whether an assembly has a motor and a spring, as a series elastic actuator does.
+
+    Parameters
+    ----------
+    assembly
+        Any.
+    """
+    return {"motor", "spring"} <= {name for name, _ in assembly.parts}
 
 
 def observer_of(assembly: Assembly, sample_time: float) -> FlatModel:
@@ -27,7 +39,18 @@ def observer_of(assembly: Assembly, sample_time: float) -> FlatModel:
         With parts ``motor`` and ``spring``.
     sample_time
         In s.
+
+    Raises
+    ------
+    ArrangementError
+        If the assembly is no actuator.
     """
+    if not is_actuator(assembly):
+        raise ArrangementError(
+            f"deck '{assembly.name}'",
+            "has no parts 'motor' and 'spring', so there is no spring torque to observe",
+            next_step="nlsdesign export fmu writes the plant alone, with its C sources inside",
+        )
     return design_observer(flatten(assembly), estimate="spring.torque", sample_time=sample_time)
 
 
@@ -78,10 +101,14 @@ def export_observer(deck_name: str, sample_time: float, out: Path, real: str) ->
 def export_fmus(
     deck_name: str, sample_time: float, out: Path, version: str, platforms: tuple[str, ...]
 ) -> None:
-    """Write plant and observer as co-simulation FMUs."""
+    """Write plant and, for an actuator, its observer as co-simulation FMUs."""
     assembly = declare(load_deck(deck_name))
     chosen = list(platforms) or None
-    plant = export_fmu(flatten(assembly), out / "plant.fmu", version=version, platforms=chosen)
-    watching = observer_of(assembly, sample_time)
-    estimate = export_fmu(watching, out / "observer.fmu", version=version, platforms=chosen)
-    click.echo(f"written: {plant}, {estimate}")
+    models = {"plant": flatten(assembly)}
+    if is_actuator(assembly):
+        models["observer"] = observer_of(assembly, sample_time)
+    written = [
+        export_fmu(model, out / f"{name}.fmu", version=version, platforms=chosen)
+        for name, model in models.items()
+    ]
+    click.echo(f"written: {', '.join(map(str, written))}")

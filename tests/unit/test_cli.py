@@ -144,3 +144,15 @@ def test_every_part_that_a_deck_can_name_is_listed_with_its_law(run: Run) -> Non
     status, _, err = run("parts", "StribekFriction")
     assert status == 2
     assert "did you mean 'StribeckFriction'?" in err
+
+
+@pytest.mark.parametrize("deck", ["janot2019_positioning_drive", "vhb4910_specimen"])
+def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_path: Path) -> None:
+    status, out, err = run("export", "fmu", "--deck", deck, "--out", "fmu")
+    assert (status, err) == (0, ""), err
+    assert "plant.fmu" in out
+    assert [file.name for file in (tmp_path / "fmu").iterdir()] == ["plant.fmu"]
+    status, _, err = run("export", "c", "--deck", deck, "--out", "c")
+    assert status == 2
+    assert "no parts 'motor' and 'spring'" in err
+    assert not (tmp_path / "c").exists()
