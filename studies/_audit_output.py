@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import nlsdesign as nls
+from nlsdesign.deck import write_text
 
 from ._audit_finding import Finding
 
@@ -42,7 +43,7 @@ def text(findings: Sequence[Finding]) -> str:
 def write_json(findings: Sequence[Finding], path: Path) -> None:
     """Write the audit as data; the file appears whole or not at all."""
     content = {"counts": counts(findings), "findings": [f.record() for f in findings]}
-    nls.write_text(path, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
+    write_text(path, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
 
 
 def counts(findings: Sequence[Finding]) -> dict[str, int]:

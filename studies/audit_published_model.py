@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import nlsdesign as nls
+from nlsdesign.deck import write_text
 
 from . import (
     _audit_cam,
@@ -77,7 +78,7 @@ def main(out: Path, fast: bool = False, steps: Any = None) -> dict[str, float]:
     everything = [finding for found in chapters.values() for finding in found]
     out.mkdir(parents=True, exist_ok=True)
     write_json(everything, out / "audit.json")
-    nls.write_text(out / "audit.txt", text(everything))
+    write_text(out / "audit.txt", text(everything))
     with steps.step("page"):
         write_page(chapters, out)
     # On standard error, like all that accompanies a run: with --json standard output is data alone.
