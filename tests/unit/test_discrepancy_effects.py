@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.declare import deck_text, declare
 from nlsdesign.deck import load_deck, read_deck
+from nlsdesign.discrepancy.compare import Hypothesis, _renamed
 from nlsdesign.discrepancy.cuts import blocks_of
 from nlsdesign.discrepancy.effects import (
     ALL,
@@ -229,3 +231,17 @@ def test_a_drifting_cell_is_read_without_its_drift(rig: Assembly) -> None:
     assert edited.evaluate([7.0], later)["motor.unbalanced"] == pytest.approx(
         plain.evaluate([], given)["motor.unbalanced"]
     )
+
+
+@pytest.mark.parametrize("first", ALL, ids=lambda e: e.__name__)
+def test_a_second_effect_keeps_the_numbers_of_the_first(first: Effect, rig: Assembly) -> None:
+    """Whatever is added next, an effect's own numbers stay, under a name that the search finds again."""
+    for one in first(rig):
+        blank = Hypothesis(one.assembly, (one,), {}, {}, {}, {}, {})
+        for second in ALL:
+            for two in second(one.assembly):
+                numbers = {n.partition("[")[0] for n in two.assembly.quantities()}
+                assert {u.name.partition("[")[0] for u in two.unknowns} <= numbers, two.effect
+                moved = _renamed(replace(blank, values={u.name: 1.0 for u in one.unknowns}), two.assembly)
+                names = {moved.get(u.name, u.name).partition("[")[0] for u in one.unknowns}
+                assert names <= numbers, f"{one.effect}, then {two.effect}"

@@ -39,7 +39,7 @@ def stretched(assembly: Assembly) -> list[str]:
         if isinstance(element, Through):
             inner = f"{path}.{element.behind[0]}"
             while (
-                isinstance(assembly[inner], PullOnly | InextensibleCable | Slack)
+                isinstance(assembly[inner], PullOnly | InextensibleCable | Slack | CableGuide)
                 and len(assembly[inner].children()) == 1
             ):
                 inner = f"{inner}.{next(iter(assembly[inner].children()))}"
