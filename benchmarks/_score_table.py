@@ -148,7 +148,11 @@ def _numbers(results: Sequence[Result]) -> list[str]:
     if held:
         lines.append(f"True value inside the 95 % interval: {_share(held)}.  ")
     if seconds:
-        lines.append(f"Seconds per diagnosis: median {np.median(seconds):.0f}, largest {max(seconds):.0f}.")
+        worked = [r.get("cpu_seconds", r["seconds"]) for r in sound]
+        lines.append(
+            f"Seconds per diagnosis: median {np.median(seconds):.0f}, largest {max(seconds):.0f}; "
+            f"of the processor: median {np.median(worked):.0f}, largest {max(worked):.0f}."
+        )
     return lines
 
 
