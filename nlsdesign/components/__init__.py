@@ -21,6 +21,7 @@ from .guide import CableGuide
 from .history import PermanentSet, Softening
 from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .hysteresis import SlidingFillers
+from .library import Material, Property, material, materials
 from .misshapen import MisshapenCam
 from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
@@ -87,6 +88,7 @@ __all__ = [
     "LossyGear",
     "LuGreFriction",
     "Mass",
+    "Material",
     "MisshapenCam",
     "NeoHooke",
     "Ogden",
@@ -95,6 +97,7 @@ __all__ = [
     "Part",
     "PermanentSet",
     "Play",
+    "Property",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
@@ -141,6 +144,8 @@ __all__ = [
     "control_values",
     "generalised_maxwell",
     "kelvin_voigt",
+    "material",
+    "materials",
     "maxwell",
     "parallel",
     "pull_only",
