@@ -55,6 +55,13 @@ class Softening(MaterialCombination):
     reversal, and W_m lags by about seven widths, so η is off by about ten times ``width``/r. What softens is
     lost: (erf(W_m/m) − erf((W_m − W)/m))/r per rise of W_m. Valid for what the first pull to a strain does;
     there is no recovery, no set and no loss on reloading. Source: Ogden and Roxburgh 1999.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import NeoHooke
+    >>> gum = NeoHooke(shear_modulus=0.6e6)
+    >>> Softening(members=(("gum", gum),), strength=1.8, scale=0.12e6).domain.motion
+    'strain'
     """
 
     strength: Quantity = parameter(
@@ -102,6 +109,13 @@ class PermanentSet(MaterialCombination):
     strain and state and the rate of ε_m is C⁰ at a reversal. What is lost is σ·ds/dt, never negative for laws
     whose memory fades. A set that is known and no longer grows is :class:`Slack`. Valid for c up to a few
     tenths, as tension sets are measured. Source: ISO 2285 (tension set as a part of the strain).
+
+    Examples
+    --------
+    >>> from nlsdesign.components import NeoHooke
+    >>> gum = NeoHooke(shear_modulus=0.6e6)
+    >>> PermanentSet(members=(("gum", gum),), share=0.05).title()
+    'PermanentSet(share = 0.05, width = 0.0001)'
     """
 
     share: Quantity = parameter("1", "part c of the greatest strain that stays", minimum=0.0, maximum=0.9)

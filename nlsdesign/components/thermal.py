@@ -28,6 +28,13 @@ class SelfHeating(MaterialCombination):
     it energy is conserved exactly. b = −1/T₀ is the entropy spring of unfilled rubber, b > 0 filled. One
     temperature for the whole piece: thinner than about a centimetre. Valid while T' < 1/(2·b).
     Sources: Schapery 1964; Holzapfel 2000, ch. 7.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import LinearElastic
+    >>> law = (("law", LinearElastic(modulus=1e6)),)
+    >>> SelfHeating(members=law, heat_capacity=1.8e6, cooling=4e4, softening=3e-3).ambient.number
+    293.15
     """
 
     heat_capacity: Quantity = parameter("J/m^3/K", "heat capacity C per volume", minimum=1e3, maximum=1e8)
@@ -99,6 +106,13 @@ class WlfShift(TimeShift):
     With T_r about 50 K above the glass transition, c₁ and c₂ are nearly the same for all amorphous polymers.
     Valid from the glass transition to 100 K above it; moduli are taken as they are. Source: Williams,
     Landel and Ferry 1955.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import maxwell
+    >>> branch = (("branch", maxwell(modulus=1e6, viscosity=3e4)),)
+    >>> WlfShift(members=branch, temperature=293.15, reference=263.15).c1.number
+    8.86
     """
 
     c1: Quantity = parameter("1", "constant c₁", minimum=0.1, maximum=100.0, default=8.86)
@@ -125,6 +139,13 @@ class ArrheniusShift(TimeShift):
 
     Valid where one activation energy E_a rules; for rubber more than 100 K above its glass transition.
     Sources: Arrhenius 1889; Ferry 1980, ch. 11.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import maxwell
+    >>> branch = (("branch", maxwell(modulus=1e6, viscosity=3e4)),)
+    >>> ArrheniusShift(members=branch, temperature=320.0, reference=293.15, activation=6e3).needs_rate
+    False
     """
 
     activation: Quantity = parameter(

@@ -40,6 +40,7 @@ _UNARY: dict[int, Callable[[Any], Any]] = {
     ca.OP_COSH: sympy.cosh,
     ca.OP_TANH: sympy.tanh,
     ca.OP_ATANH: sympy.atanh,
+    ca.OP_ERF: sympy.erf,
     ca.OP_FABS: sympy.Abs,
     ca.OP_SIGN: sympy.sign,
     ca.OP_FLOOR: sympy.floor,
