@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-NAMES = ("observer_step", "bench_simulation")
+NAMES = ("observer_step", "bench_simulation", "bench_events")
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ from .compile import ALL_PLATFORMS, PLATFORMS, host_platform
 from .cosimulation import CoSimulation, cosimulate
 from .cosimulation_system import Late
 from .fmu import export_fmu
+from .native import natively
 from .running import CompiledStep
 
 __all__ = [
@@ -18,4 +19,5 @@ __all__ = [
     "export_c",
     "export_fmu",
     "host_platform",
+    "natively",
 ]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel
+from .signals import Sine
 
 Array = NDArray[np.float64]
 Drive: TypeAlias = Callable[[float], float] | Array | float
@@ -66,6 +67,9 @@ class Drives:
             np.multiply(since[:, None], self.slopes[:, interval], out=found)
             found += self.samples[:, interval]
         for (name, number), function in self.functions.items():
+            if isinstance(function, Sine):
+                found[:, number] = function.at(moments)
+                continue
             values = [float(function(t)) for t in moments.tolist()]
             if not math.isfinite(sum(values)):
                 raise _not_finite(name, moments, np.array(values))

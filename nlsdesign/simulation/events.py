@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import ConvergenceError
 from ..model import FlatModel
-from ..model.switching import Switching
+from ..model.switching import Switch, Switching
 from .buffered import Array, Buffered
 
 LOCATED = 1e-12
@@ -27,6 +27,9 @@ LOCATED = 1e-12
 
 REBOUND = 2
 MOST_AT_ONCE = 40
+MOST_DRIFT = 1e-6
+"""Change of a rate that is held in one step, relative to the nominal size, beyond rounding."""
+
 CROWD, CROWDED = 200, 1e-7
 """So many events within this share of the whole time are taken for infinitely many."""
 
@@ -98,6 +101,49 @@ def _share(one: float, at_one: float, other: float, at_other: float, third: floa
     return first + (third - one) / (other - one) * second
 
 
+class Story:
+    """What has happened, unless it never ends.
+
+    Parameters
+    ----------
+    model
+        Name, for messages.
+    switches
+        In the order of their numbers.
+    span
+        Whole time that is simulated, in s.
+    """
+
+    def __init__(self, model: str, switches: Sequence[Switch], span: float) -> None:
+        self._model, self._switches, self._crowded = model, switches, CROWDED * span
+        self._recent: deque[float] = deque(maxlen=CROWD)
+        self.events: list[Event] = []
+
+    def tell(self, time: float, i: int, mode: int) -> None:
+        """Record that a mode of a switch has begun."""
+        switch = self._switches[i]
+        self.events.append(Event(time, switch.name, switch.told(mode)))
+        self._recent.append(time)
+        if len(self._recent) == CROWD and time - self._recent[0] < self._crowded:
+            raise self.endless(i, time)
+
+    def endless(self, i: int, time: float) -> ConvergenceError:
+        """Return the error for events that accumulate."""
+        return ConvergenceError(
+            f"simulation of {self._model}",
+            f"events of '{self._switches[i].name}' accumulate at t = {time:g} s",
+            next_step="give a stop a speed below which it rests, or take the smooth form of the law",
+        )
+
+    def running_away(self, i: int, time: float) -> ConvergenceError:
+        """Return the error for a rate that should be held and is not."""
+        return ConvergenceError(
+            f"simulation of {self._model}",
+            f"'{self._switches[i].name}' sticks, but its rate has changed by t = {time:g} s",
+            next_step="give the acceleration of the driven body as an input too",
+        )
+
+
 class Modes:
     """The modes of all switches, what changes them, and what has happened.
 
@@ -112,7 +158,7 @@ class Modes:
     def __init__(self, model: FlatModel, span: float) -> None:
         if model.switching is None:
             raise ValueError("the model has no switches")
-        self._model, self._laws = model, model.switching
+        self._laws = model.switching
         laws, n = self._laws, len(model.states)
         self._time, self._state, self._inputs = np.zeros(1), np.zeros(n), np.zeros(len(model.inputs))
         self.now = np.zeros(len(laws.switches))
@@ -120,9 +166,7 @@ class Modes:
         self._branch, self._natural = Buffered(laws.branch, (*given, self.now)), Buffered(laws.natural, given)
         self._land = Buffered(laws.landing, (*given, self.now))
         self._nominal = np.array([v.nominal for v in model.states])
-        self._recent: deque[float] = deque(maxlen=CROWD)
-        self._crowded = CROWDED * span
-        self.events: list[Event] = []
+        self.story = Story(model.name, laws.switches, span)
         self.held = np.zeros(0, dtype=int)
 
     @property
@@ -154,15 +198,15 @@ class Modes:
             for i in ended.tolist():
                 rebounds += self._changed(i, time, state, inputs)
         else:
-            raise self._too_many(int(ended[0]), time)
+            raise self.story.endless(int(ended[0]), time)
         self.held = np.flatnonzero((self.now == 0.0) & np.array(self._laws.holds))
         self.keep(time, state, inputs)
         if told:
             for i in rebounds:
-                self._tell(time, i, REBOUND)
+                self.story.tell(time, i, REBOUND)
             for i, (old, new) in enumerate(zip(before.tolist(), self.now.tolist(), strict=True)):
                 if old != new:
-                    self._tell(time, i, int(new))
+                    self.story.tell(time, i, int(new))
 
     def keep(self, time: float, state: Array, inputs: Array) -> None:
         """Bring the rates that are held back to exactly zero, without changing any momentum."""
@@ -173,7 +217,8 @@ class Modes:
         if np.any(rate[held]):
             change = np.linalg.solve(slope[held] @ reach[:, held], -rate[held])
             state += reach[:, held] @ change
-            self._check_small(time, np.max(np.abs(reach[:, held] @ change) / self._nominal), int(held[0]))
+            if np.max(np.abs(reach[:, held] @ change) / self._nominal) > MOST_DRIFT:
+                raise self.story.running_away(int(held[0]), time)
             for i in held.tolist():
                 # What rounding has left.
                 left = self._landing(time, state, inputs)[0][i]
@@ -220,28 +265,6 @@ class Modes:
         rate, target, leads, reach, slope = (r.copy() for r in self._at(self._land, time, state, inputs))
         n, k = len(state), len(rate)
         return rate, target, leads, reach.reshape((n, k), order="F"), slope.reshape((k, n), order="F")
-
-    def _tell(self, time: float, i: int, mode: int) -> None:
-        switch = self._laws.switches[i]
-        self.events.append(Event(time, switch.name, switch.told(mode)))
-        self._recent.append(time)
-        if len(self._recent) == CROWD and time - self._recent[0] < self._crowded:
-            raise self._too_many(i, time)
-
-    def _check_small(self, time: float, change: float, i: int) -> None:
-        if change > 1e-6:
-            raise ConvergenceError(
-                f"simulation of {self._model.name}",
-                f"'{self._laws.switches[i].name}' sticks, but its rate has changed by t = {time:g} s",
-                next_step="give the acceleration of the driven body as an input too",
-            )
-
-    def _too_many(self, i: int, time: float) -> ConvergenceError:
-        return ConvergenceError(
-            f"simulation of {self._model.name}",
-            f"events of '{self._laws.switches[i].name}' accumulate at t = {time:g} s",
-            next_step="give a stop a speed below which it rests, or take the smooth form of the law",
-        )
 
 
 def branch_of(switching: Switching | None, equations: ca.Function) -> ca.Function:

@@ -204,11 +204,11 @@ def integrate_explicitly(
             done += 1
             if done > budget:
                 if can_be_handed_over and _held_by_stability(model, drives, k, stepper.state, wanted):
-                    raise TooStiffError(k, states[:, : k + 1], modes.events if modes else [])
+                    raise TooStiffError(k, states[:, : k + 1], modes.story.events if modes else [])
                 budget *= 2.0
         states[:, k + 1] = stepper.state
         budget += 40.0
-    return states, modes.events if modes else []
+    return states, modes.story.events if modes else []
 
 
 def _held_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, wanted: float) -> bool:

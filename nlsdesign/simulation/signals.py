@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 @dataclass(frozen=True)
 class Sine:
@@ -34,6 +37,18 @@ class Sine:
             In s.
         """
         return self.offset + self.amplitude * math.sin(2.0 * math.pi * self.frequency * time + self.phase)
+
+    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values at many times at once.
+
+        Parameters
+        ----------
+        times
+            In s, any shape.
+        """
+        phase = 2.0 * math.pi * self.frequency * times + self.phase
+        result: NDArray[np.float64] = self.offset + self.amplitude * np.sin(phase)
+        return result
 
 
 def sine(name: str, amplitude: float, frequency: float, *, offset: float = 0.0) -> dict[str, Sine]:
