@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.deck import write_text
+from nlsdesign.writing import write_text
 
 from ._audit_finding import Finding
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import nlsdesign as nls
-from nlsdesign.deck import write_text
+from nlsdesign.writing import write_text
 
 from . import (
     _audit_cam,
