@@ -172,11 +172,13 @@ def _model(
     )  # fmt: skip
     _check_unique(ledger)
     values = [v.start for v, _ in ledger.parameters.values()]
-    if not all(math.isfinite(v) for v in _probe(equations, values)):
+    named = [*(f"der({n})" for n in states), *given, *ledger.signals, *ledger.checks]
+    broken = [n for n, v in zip(named, _probe(equations, values), strict=True) if not math.isfinite(v)]
+    if broken:
         raise ArrangementError(
             f"assembly '{assembly.name}'",
-            "the equations are singular",
-            next_step="look for springs or dashpots of zero stiffness in series",
+            f"the equations are singular: {broken[0]} has no finite value",
+            next_step="look there for springs or dashpots of zero stiffness in series",
         )
     return FlatModel(
         assembly.name, assembly.description,
