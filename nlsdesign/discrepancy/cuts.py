@@ -10,7 +10,8 @@ import casadi as ca
 from ..errors import MeasurementError
 from ..identification.block import Block, Drive
 from ..model import Assembly, FlatModel, Variable, flatten
-from ..model.transform import cut, without_idle_states
+from ..model.flat import Symbols
+from ..model.transform import cut, named, without_idle_states
 from ..symbolic import Expression, depends
 
 READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
@@ -182,10 +183,10 @@ def _driven(
     if target is None:
         body = next(k for k in given if k.truth.rpartition(".")[0] == name and k.truth in states)
         result, variable = (
-            _unbalanced(model, s.derivative, s.parameter, name),
+            _unbalanced(model, s, name),
             Variable(output, _effort_unit(model, name), f"sum of all efforts on {name}"),
         )
-        result = _inertia(model, s.parameter, name) * inferred(body, 2) - result
+        result = _inertia(model, s, name) * inferred(body, 2) - result
         drive = next((k for k in given if k.truth in inputs and k.truth.startswith(f"{name}.")), None)
     else:
         place = next(i for i, v in enumerate(model.signals) if v.name == target)
@@ -228,18 +229,20 @@ def _driven(
     )
 
 
-def _inertia(model: FlatModel, parameter: Expression, body: str) -> Expression:
-    names = [v.name for v in model.parameters]
-    return next(parameter[names.index(f"{body}.{n}")] for n in ("inertia", "mass") if f"{body}.{n}" in names)
+def _inertia(model: FlatModel, s: Symbols, body: str) -> Expression:
+    """Return what moves with a body: of a train of gears, the inertia seen from its leading body."""
+    known = named(model, s)
+    names = (f"{body}.{n}" for n in ("train_inertia", "inertia", "mass"))
+    return next(known[name] for name in names if name in known)
 
 
 def _effort_unit(model: FlatModel, body: str) -> str:
     return "N*m" if f"{body}.inertia" in model.values else "N"
 
 
-def _unbalanced(model: FlatModel, derivative: Expression, parameter: Expression, body: str) -> Expression:
+def _unbalanced(model: FlatModel, s: Symbols, body: str) -> Expression:
     place = [v.name for v in model.states].index(f"{body}.speed")
-    return _inertia(model, parameter, body) * derivative[place]
+    return _inertia(model, s, body) * s.derivative[place]
 
 
 def _in_drive_units(

@@ -158,38 +158,55 @@ def balance_train(
     efforts
         Sum of the torques of all elements on each body.
     """
-    lead = motions[root.name][0]
-    wheels, own = list(root.wheels()), scopes[root.name]
-    acting = [w.body.drive(scopes[w.name], motions[w.name][0]) + efforts[w.name] for w in wheels]
-    # The equation is solved in stand-ins, so that a step of the solution does not repeat the whole spring.
-    stand_ins = [symbol(f"{w.name}.acting") for w in wheels]
-    unknown, speed = symbol(f"{root.name}.sought"), symbol(f"{root.name}.turning")
+    lead, own = motions[root.name][0], scopes[root.name]
+    acting = {
+        w.name: w.body.drive(scopes[w.name], motions[w.name][0]) + efforts[w.name] for w in root.wheels()
+    }
     turns = {name: turn for name, (_, turn) in motions.items()}
-    load = _Load(dict(zip(turns, stand_ins, strict=True)), turns, scopes, speed, unknown)
-    carried: dict[str, tuple[Expression, Expression]] = {}
-    lacking = load.missing(root, carried)
-    lossy = any(isinstance(joint.gear, LossyGear) for _, joint in root.gears())
-    found = _root(lacking, unknown)
-    pairs = ca.vertcat(lacking, *[torque for pair in carried.values() for torque in pair])
-    results = ca.vertcat(found, ca.substitute(pairs, unknown, found))
-    results = ca.substitute(results, ca.vertcat(*stand_ins, speed), ca.vertcat(*acting, lead.rate))
-    acceleration, remainder, *torques = ca.vertsplit(ca.SX(results))
-    if lossy:
-        size = sum((ca.fabs(torque) for torque in torques), start=ca.SX(1))
-        own.check(f"{root.name}.acceleration", remainder / size)
+    acceleration, carried = _solved(root, scopes, turns, acting, lead.rate)
     own.derive(lead.motion, lead.rate)
     own.derive(lead.rate, acceleration)
+    moved = sum(
+        (w.body.inertia_of(scopes[w.name]) * turns[w.name] ** 2 for w in root.wheels()), start=ca.SX(0)
+    )
+    own.signal(
+        "train_inertia", moved, "kg*m^2", f"inertia of all that is geared to {root.name}, seen from there"
+    )
     for name, (motion, turn) in motions.items():
         scopes[name].signal("angle", motion.motion, "rad", f"angle of {name}")
         scopes[name].signal("speed", motion.rate, "rad/s", f"speed of {name}")
         scopes[name].signal("acceleration", turn * acceleration, "rad/s^2", f"acceleration of {name}")
     for name, gear in ((joint.name, joint.gear) for _, joint in root.gears()):
-        place = 2 * list(carried).index(name)
-        given, got = torques[place], torques[place + 1]
+        given, got = carried[name]
         first, second = (motions[end][0].rate for end in gear.between)
         scopes[name].signal("input_torque", given, "N*m", f"what {gear.between[0]} gives to {name}")
         scopes[name].signal("torque", got, "N*m", f"what {gear.between[1]} gets from {name}")
         scopes[name].signal("loss", given * first - got * second, "W", f"heat in {name}")
+
+
+def _solved(
+    root: Wheel,
+    scopes: Mapping[str, Scope],
+    turns: Mapping[str, Expression],
+    acting: Mapping[str, Expression],
+    speed: Expression,
+) -> tuple[Expression, dict[str, tuple[Expression, Expression]]]:
+    """Return the acceleration of the leading body, and what each gear takes and gives."""
+    # The equation is solved in stand-ins, so that a step of the solution does not repeat the whole spring.
+    stand_ins = {name: symbol(f"{name}.acting") for name in acting}
+    unknown, turning = symbol(f"{root.name}.sought"), symbol(f"{root.name}.turning")
+    carried: dict[str, tuple[Expression, Expression]] = {}
+    lacking = _Load(stand_ins, turns, scopes, turning, unknown).missing(root, carried)
+    found = _root(lacking, unknown)
+    rest = ca.vertcat(lacking, *[torque for pair in carried.values() for torque in pair])
+    results = ca.vertcat(found, ca.substitute(rest, unknown, found))
+    old, new = ca.vertcat(*stand_ins.values(), turning), ca.vertcat(*acting.values(), speed)
+    acceleration, remainder, *torques = ca.vertsplit(ca.SX(ca.substitute(results, old, new)))
+    if any(isinstance(joint.gear, LossyGear) for _, joint in root.gears()):
+        size = sum((ca.fabs(torque) for torque in torques), start=ca.SX(1))
+        scopes[root.name].check(f"{root.name}.acceleration", remainder / size)
+    pairs = zip(torques[::2], torques[1::2], strict=True)
+    return acceleration, dict(zip(carried, pairs, strict=True))
 
 
 def _root(lacking: Expression, unknown: Expression) -> Expression:

@@ -7,7 +7,10 @@ import pytest
 
 from nlsdesign.components import (
     Assembly,
+    CurrentDrivenMotor,
+    Encoder,
     Fixed,
+    Gear,
     Inertia,
     SampleAndHold,
     TorsionSpring,
@@ -79,6 +82,38 @@ def test_a_chain_of_sensors_is_read_back_to_what_its_first_one_sees(rig: Assembl
         error = (record.trace[block.target] if block.target else 0.0) - output
         seen = smoothing(len(TIME), block.width, 5) @ error
         assert np.sqrt(np.mean(seen**2)) < 2e-3 * sizes[block.name], block.name
+
+
+def geared(rig: Assembly) -> Assembly:
+    """The rig with its inertia split between a rotor and a drum; the rubber pulls at the drum."""
+    winding = {"resistance": 0.5, "current_limit": 100.0, "voltage_limit": 1e4}
+    motor = CurrentDrivenMotor(inertia=2e-5, torque_constant=0.0302, **winding)
+    declared = {name: part for name, part in rig.parts if name not in ("motor", "spring", "bearing")}
+    spring = tie(rig.element("spring"), "drum", "load")
+    return assembly(
+        "geared",
+        drum=Inertia(inertia=4e-3),
+        motor=motor,
+        gear=Gear(between=("motor", "drum"), ratio=25.0),
+        spring=spring,
+        bearing=tie(rig.element("bearing"), "drum"),
+        **{**declared, "motor_encoder": Encoder(of="drum.angle", quantum=1e-9)},
+    )
+
+
+def test_the_balance_of_a_geared_train_is_in_torque_at_its_leading_body(rig: Assembly) -> None:
+    """A drum that is 1 g·m² heavier than declared shows as that times its acceleration."""
+    declared = geared(rig)
+    record = simulated(declared.with_values({"drum.inertia": 5e-3}))
+    assert flatten(declared).evaluate([0.0] * 3)["drum.train_inertia"] == pytest.approx(4e-3 + 625 * 2e-5)
+    (motor,) = (b for b in blocks_of(declared, SIGNALS) if b.target is None)
+    driven = DrivenBlock(motor, [])
+    output = driven.respond(driven.samples(record, {}), {}).output
+    seen = smoothing(len(TIME), motor.width, 5) @ output
+    assert motor.name == "drum"
+    expected = 1e-3 * (smoothing(len(TIME), motor.width, 5) @ record.trace["drum.acceleration"])
+    assert np.std(expected) > 0.05
+    assert np.std((seen + expected)[50:-50]) < 0.02 * np.std(expected)
 
 
 def test_two_delays_on_one_line_cannot_be_told_apart(rig: Assembly) -> None:
