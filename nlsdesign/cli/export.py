@@ -98,17 +98,19 @@ def export_observer(deck_name: str, sample_time: float, out: Path, real: str) ->
     multiple=True,
     help="For instance x86_64-windows; this machine by default; repeatable.",
 )
+@click.option("--plant-only", is_flag=True, help="Write the plant alone; for a system without an observer.")
 def export_fmus(
-    deck_name: str, sample_time: float, out: Path, version: str, platforms: tuple[str, ...]
+    deck_name: str, sample_time: float, out: Path, version: str, platforms: tuple[str, ...], plant_only: bool
 ) -> None:
     """Write plant and, for an actuator, its observer as co-simulation FMUs."""
     assembly = declare(load_deck(deck_name))
-    chosen = list(platforms) or None
     models = {"plant": flatten(assembly)}
-    if is_actuator(assembly):
+    if is_actuator(assembly) and not plant_only:
+        # Before anything is written: not every system has an observer.
         models["observer"] = observer_of(assembly, sample_time)
+    chosen = list(platforms) or None
     written = [
         export_fmu(model, out / f"{name}.fmu", version=version, platforms=chosen)
         for name, model in models.items()
     ]
-    click.echo(f"written: {', '.join(map(str, written))}")
+    click.echo(f"written: {', '.join(str(path) for path in written)}")

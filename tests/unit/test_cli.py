@@ -156,3 +156,25 @@ def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_
     assert status == 2
     assert "no parts 'motor' and 'spring'" in err
     assert not (tmp_path / "c").exists()
+
+
+def test_a_drive_without_an_observer_is_exported_as_its_plant_alone(run: Run, tmp_path: Path) -> None:
+    words = ("export", "fmu", "--deck", "one_sided_cable_drive", "--out", "o")
+    status, _, err = run(*words)
+    assert status != 0
+    assert "has no observer" in err
+    assert not (tmp_path / "o").exists(), "nothing half-written"
+    status, out, _ = run(*words, "--plant-only")
+    assert status == 0
+    assert "plant.fmu" in out
+    assert [path.name for path in (tmp_path / "o").iterdir()] == ["plant.fmu"]
+
+
+def test_a_drive_with_a_gear_is_analysed_over_the_angle_of_its_motor(run: Run, tmp_path: Path) -> None:
+    over = ("--to", "700 deg", "--count", "3", "--out", "o", "--json")
+    status, out, _ = run("analyse", "--deck", "one_sided_cable_drive", *over)
+    assert status == 0
+    chart = json.loads(out)
+    assert chart["observability.rank"][1:] == [3, 3]
+    assert chart["stiffness.slow"][0] < chart["stiffness.slow"][1] < chart["stiffness.slow"][2]
+    assert (tmp_path / "o" / "over_angle.csv").exists()
