@@ -20,7 +20,8 @@ class CapstanFriction(Combination):
     F_in is the pull of the elements behind the guide: pulled in it takes e^(µφ) times as much, let out it
     holds back to e^(−µφ). The power lost, F_in·(e^(…) − 1)·ė, is never negative. A push, F_in < 0, passes
     unchanged, for no cable pushes. C∞ in the rate, with a corner at F_in = 0; at rest it creeps instead of
-    sticking. Several guides multiply: their µφ add. Source: Euler 1769, Eytelwein 1808.
+    sticking. Several guides multiply: their µφ add. :class:`CableGuide` has µφ as one number, for fits.
+    Source: Euler 1769, Eytelwein 1808.
 
     Examples
     --------
@@ -59,5 +60,17 @@ class CapstanFriction(Combination):
         forces = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
         inside = sum(forces[1:], start=forces[0])
         exponent = scope.parameter("friction") * scope.parameter("wrap_angle")
-        factor = ca.exp(exponent * smooth_sign(rate, scope.parameter("creep_speed")))
-        return inside + ca.fmax(inside, 0) * (factor - 1)
+        return tightened(inside, exponent * smooth_sign(rate, scope.parameter("creep_speed")))
+
+
+def tightened(pull: Expression, exponent: Expression) -> Expression:
+    """Return the pull in front of a guide; a push passes unchanged.
+
+    Parameters
+    ----------
+    pull
+        Behind the guide.
+    exponent
+        µφ with the sign of the rate.
+    """
+    return pull + ca.fmax(pull, 0) * (ca.exp(exponent) - 1)

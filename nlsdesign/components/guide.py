@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from ..errors import ArrangementError
 from ..quantity import Quantity
 from ..symbolic import Expression, smooth_sign
+from .capstan import tightened
 from .element import TRANSLATION, Combination, Scope, observed_effort
 from .part import parameter
 
@@ -19,8 +18,9 @@ class CableGuide(Combination):
 
     Pulled out, the cable is tighter in front of the guide by the factor e^(µα), let in, looser by as much;
     µα is the coefficient of friction times the angle of wrap. Smooth at standstill over the speed v_s: there
-    it creeps instead of sticking. Valid without bending stiffness and weight. Source: Euler 1769, Eytelwein
-    1808.
+    it creeps instead of sticking. A push passes unchanged, for no cable pushes. Where friction and angle are
+    known apart, :class:`CapstanFriction` says both. Valid without bending stiffness and weight. Source: Euler
+    1769, Eytelwein 1808.
     """
 
     wrap: Quantity = parameter("1", "friction times angle of wrap, µα", minimum=0.0, maximum=10.0)
@@ -42,4 +42,4 @@ class CableGuide(Combination):
         """Return F_in·e^(µα·tanh(ẋ/v_s))."""
         forces = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
         direction = smooth_sign(rate, scope.parameter("creep_speed"))
-        return sum(forces[1:], start=forces[0]) * ca.exp(scope.parameter("wrap") * direction)
+        return tightened(sum(forces[1:], start=forces[0]), scope.parameter("wrap") * direction)

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from nlsdesign.components import (
     Assembly,
     CurrentDrivenMotor,
+    DryFriction,
     Gear,
     GearedMotor,
     Inertia,
@@ -178,6 +179,25 @@ def test_a_rigid_gear_is_the_limit_of_a_stiff_shaft() -> None:
     expected, run = simulate(flatten(soft), times, inputs=push), simulate(flatten(stiff), times, inputs=push)
     assert run["two.angle"] == pytest.approx(expected["two.angle"], abs=2e-4 * np.ptp(expected["two.angle"]))
     assert len(flatten(stiff).states) == 2
+
+
+@pytest.mark.parametrize(("at", "level"), [("wheel", 0.1), ("motor", 0.1 / 8.0)])
+def test_dry_friction_anywhere_in_a_train_sticks_as_on_the_reflected_body(at: str, level: float) -> None:
+    """On the motor's shaft a gear makes an n-th of the friction torque as strong."""
+    ratio, wheel, spring = 8.0, 2e-3, tie(TorsionSpring(stiffness=0.3), "wheel")
+    friction, gear = tie(DryFriction(sliding_torque=level), at), Gear(between=("motor", "wheel"), ratio=ratio)
+    made = assembly("a", motor=by_current(), wheel=Inertia(inertia=wheel), gear=gear, s=spring, f=friction)
+    dry = tie(DryFriction(sliding_torque=0.1), "wheel")
+    one = assembly("b", wheel=Inertia(inertia=wheel + ratio**2 * ROTOR), s=spring, f=dry)
+    times = np.linspace(0.0, 1.5, 1501)
+    run = simulate(flatten(made), times, inputs={"motor.current": lambda t: 0.8 * math.sin(8.0 * t)})
+    expected = simulate(
+        flatten(one), times, inputs={"wheel.torque": lambda t: ratio * CONSTANT * 0.8 * math.sin(8.0 * t)}
+    )
+    assert run["wheel.angle"] == pytest.approx(expected["wheel.angle"], abs=1e-6)
+    stuck = run["wheel.speed"] == 0.0
+    assert np.array_equal(stuck, expected["wheel.speed"] == 0.0)
+    assert 20 < np.sum(stuck) < 1000
 
 
 def lossy(ratio: float = 8.0, **more: float) -> LossyGear:
