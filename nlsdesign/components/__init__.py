@@ -15,6 +15,7 @@ from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .drives import DelayedMotor, SaturatingMotor
 from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
 from .encoders import EccentricEncoder
+from .flowing import FlowingChains
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .gear import Gear, LossyGear
 from .guide import CableGuide
@@ -74,6 +75,7 @@ __all__ = [
     "ExtendedTube",
     "Fixed",
     "FixedPoint",
+    "FlowingChains",
     "ForceSensor",
     "Gear",
     "GearedMotor",

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
-from ..model import Variable
 from .descent import minimise
 from .evidence import Evidence
+from .parameters import Parameter as Parameter
+from .parameters import box
+from .parameters import declared_parameter as declared_parameter
 from .residuals import autocorrelation
 
 Array = NDArray[np.float64]
@@ -21,95 +22,8 @@ Array = NDArray[np.float64]
 _EVALUATIONS = 40
 _OPEN_END = 1e-6
 """Least information on the fitted scale."""
-_REACH = 2.0
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A number to be fitted.
-
-    Parameters
-    ----------
-    name, unit
-        Full name and SI unit.
-    start
-        Where the fit begins.
-    centre, sigma
-        Declared value and standard deviation of the prior around it, in the fitted scale; an infinite sigma
-        means that nothing is known before.
-    lower, upper
-        Bounds in SI.
-    scale
-        ``log`` for positive numbers, whose spread is a factor; ``linear`` otherwise.
-    size
-        Typical size, for the linear scale.
-    """
-
-    name: str
-    unit: str
-    start: float
-    centre: float
-    sigma: float
-    lower: float
-    upper: float
-    scale: Literal["log", "linear"]
-    size: float = 1.0
-
-    def inward(self, value: float) -> float:
-        """Return a value in the fitted scale."""
-        return math.log(value) if self.scale == "log" else value / self.size
-
-    def outward(self, fitted: float) -> float:
-        """Return the value in SI."""
-        return math.exp(fitted) if self.scale == "log" else fitted * self.size
-
-    def slope(self, value: float) -> float:
-        """Return the derivative of the value in SI with respect to the fitted one."""
-        return value if self.scale == "log" else self.size
-
-
-def declared_parameter(variable: Variable, start: float | None = None) -> Parameter:
-    """Return a parameter of the model with the prior that its declared spread stands for.
-
-    A one-sided spread s is read as the uniform range from v/(1 + s) to v·(1 + s), whose standard deviation is
-    ln(1 + s)/√3 on the logarithmic scale. The bounds are twice as wide as the range.
-
-    Parameters
-    ----------
-    variable
-        Parameter of a flat model with a positive spread.
-    start
-        Where to begin; at the declared value by default.
-    """
-    value, width = variable.start, math.log1p(variable.spread)
-    begin = value if start is None else start
-    if value > 0.0:
-        factor = math.exp(_REACH * width)
-        return Parameter(
-            variable.name,
-            variable.unit,
-            begin,
-            value,
-            width / math.sqrt(3.0),
-            max(value / factor, variable.minimum),
-            min(value * factor, variable.maximum),
-            "log",
-        )
-    size = abs(value) or 1.0
-    reach = _REACH * variable.spread * size
-    return Parameter(
-        variable.name,
-        variable.unit,
-        begin,
-        value,
-        variable.spread / math.sqrt(3.0),
-        max(value - reach, variable.minimum),
-        min(value + reach, variable.maximum),
-        "linear",
-        size,
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +124,7 @@ def fit(
         If the fit ends without a finite cost.
     """
     rows = _Rows(evidence, parameters)
-    low, high, start = _box(parameters)
+    low, high, start = box(parameters)
     found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
     if not np.isfinite(found.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
@@ -220,7 +134,7 @@ def fit(
         own = residual[place : place + len(each.floor.sigma)]
         misfit[each.driven.block.name, each.record.name] = 0.5 * float(own @ own)
         place += len(own)
-    covariance = _covariance(residual[len(parameters) :], slope, len(parameters))
+    covariance = covariance_of(residual[len(parameters) :], slope, len(parameters))
     return Fit(tuple(parameters), rows.values(found.x), covariance, found.cost, misfit, found.converged)
 
 
@@ -232,7 +146,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
     evidence, parameters
         As for :func:`fit`.
     """
-    low, high, start = _box(parameters)
+    low, high, start = box(parameters)
     residual, slope = _Rows(evidence, parameters)(start)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
@@ -273,17 +187,7 @@ class _Rows:
         return np.concatenate(rows), np.vstack(slopes)
 
 
-def _box(parameters: Sequence[Parameter]) -> tuple[Array, Array, Array]:
-    low = np.array(
-        [p.inward(p.lower) if p.scale == "linear" or p.lower > 0.0 else -np.inf for p in parameters]
-    )
-    high = np.array([p.inward(p.upper) for p in parameters])
-    start = np.array([p.inward(p.start) for p in parameters])
-    inside: Array = np.clip(start, low + 1e-9, high - 1e-9)
-    return low, high, inside
-
-
-def _covariance(residual: Array, slope: Array, priors: int) -> Array:
+def covariance_of(residual: Array, slope: Array, priors: int) -> Array:
     """Return (JᵀJ)⁻¹ with the data's share of information reduced by the colour of the residuals."""
     data = slope[priors:]
     if len(residual) > 1:

@@ -21,9 +21,14 @@ from .sensing import (
     force_sensor_drift,
     force_sensor_gain,
 )
+from .rubber import rate_independent_hysteresis, second_relaxation
+from .sensing import current_sensor_bias, force_sensor_bias, force_sensor_delay, force_sensor_gain
+from .sliding import constant_force, sliding_friction
 
 ALL: tuple[Effect, ...] = (
     coulomb_friction,
+    sliding_friction,
+    constant_force,
     stribeck_friction,
     load_dependent_friction,
     quadratic_drag,

@@ -1,0 +1,74 @@
+"""Losses: how much a residual counts."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Base of what turns residuals into a cost."""
+
+    @abstractmethod
+    def value(self, residual: Array) -> float:
+        """Return the cost of all residuals together.
+
+        Parameters
+        ----------
+        residual
+            In standard deviations, shape (n,).
+        """
+
+    @abstractmethod
+    def weight(self, residual: Array) -> Array:
+        """Return the factor of each residual and its slope that makes least squares follow the loss.
+
+        Parameters
+        ----------
+        residual
+            In standard deviations, shape (n,).
+        """
+
+
+@dataclass(frozen=True)
+class Squares(Loss):
+    """Half the sum of squares: right where errors are noise."""
+
+    def value(self, residual: Array) -> float:
+        """Return ½·Σr²."""
+        return 0.5 * float(residual @ residual)
+
+    def weight(self, residual: Array) -> Array:
+        """Return ones."""
+        return np.ones_like(residual)
+
+
+@dataclass(frozen=True)
+class Huber(Loss):
+    """Squares up to some standard deviations, lines beyond: a few wild samples do not decide.
+
+    ρ(r) = ½·r² for |r| ≤ k, k·|r| − ½·k² beyond. Source: Huber 1964.
+
+    Parameters
+    ----------
+    bend
+        k in standard deviations; 1.345 keeps 95 % of the efficiency on normal noise.
+    """
+
+    bend: float = 1.345
+
+    def value(self, residual: Array) -> float:
+        """Return Σρ(r)."""
+        size = np.abs(residual)
+        return float(np.sum(np.where(size <= self.bend, 0.5 * size**2, self.bend * (size - 0.5 * self.bend))))
+
+    def weight(self, residual: Array) -> Array:
+        """Return √(min(1, k/|r|))."""
+        result: Array = np.sqrt(np.minimum(1.0, self.bend / np.maximum(np.abs(residual), 1e-300)))
+        return result
