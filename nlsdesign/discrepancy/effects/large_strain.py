@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...components import Assembly, FlowingChains, PullOnly, Specimen, Tie
+from ...components import Assembly, FlowingChains, Hyperelastic, PullOnly, Specimen, Tie
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown
 
@@ -22,12 +22,14 @@ def large_strain_relaxation(assembly: Assembly) -> Sequence[Candidate]:
     Parameters
     ----------
     assembly
-        As declared.
+        As declared; only pieces whose equilibrium law is one of large stretch are looked at.
     """
     found = []
     for path, part in assembly.walk():
         piece = part.element if isinstance(part, Tie) else part
         if not isinstance(piece, Specimen):
+            continue
+        if not any(isinstance(law, Hyperelastic) for _, law in piece.members):
             continue
         names = [f"{path}.flowing_{n}" for n in range(1, _MOST_BRANCHES + 1)]
         left = [n for n in names if n.rpartition(".")[2] not in piece.children()]

@@ -10,6 +10,7 @@ from ...components import (
     SlidingFillers,
     SmoothStrainStiffening,
     Specimen,
+    Tie,
     ViscousMaterial,
     series,
 )
@@ -18,9 +19,8 @@ from .candidate import SOURCE, Candidate, Unknown
 
 
 def _specimens(assembly: Assembly, taken: str) -> list[str]:
-    return [
-        path for path, part in assembly.walk() if isinstance(part, Specimen) and taken not in part.children()
-    ]
+    walked = ((path, part.element if isinstance(part, Tie) else part) for path, part in assembly.walk())
+    return [path for path, piece in walked if isinstance(piece, Specimen) and taken not in piece.children()]
 
 
 def second_relaxation(assembly: Assembly) -> Sequence[Candidate]:
