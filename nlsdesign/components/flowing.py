@@ -49,5 +49,8 @@ class FlowingChains(Element):
         # No piece is pressed to nothing; the floor keeps the law finite for whatever a solver tries.
         stretch = ca.fmax(1 + motion, _SMALLEST_STRETCH)
         elastic = stretch * ca.exp(-flow)
-        scope.derive(flow, modulus * (elastic**2 - 1 / elastic) / (3 * scope.parameter("viscosity")))
+        true_stress = modulus * (elastic**2 - 1 / elastic)
+        flow_rate = true_stress / (3 * scope.parameter("viscosity"))
+        scope.derive(flow, flow_rate)
+        scope.loss(true_stress * flow_rate)
         return modulus * (elastic - elastic**-2) * ca.exp(-flow)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from nlsdesign.components import (
     ArrheniusShift,
     ExtendedTube,
+    FlowingChains,
     NeoHooke,
     Ogden,
     Part,
@@ -23,6 +24,7 @@ GUM = NeoHooke(shear_modulus=0.39e6)
 _PARTS: tuple[Part, ...] = (
     ArrheniusShift(members=(("law", SOLID),), temperature=310.0, reference=293.15, activation=6000.0),
     ExtendedTube(crosslinks=0.1867e6, entanglements=0.2169e6, release=0.2, end=0.09693),
+    FlowingChains(shear_modulus=0.1e6, viscosity=0.4e6),
     GUM,
     Ogden(moduli=(0.618e6, 1.18e3, -9.81e3), exponents=(1.3, 5.0, -2.0)),
     PermanentSet(members=(("law", SOLID),), share=0.05, width=1e-3),

@@ -14,6 +14,12 @@ ROWS: tuple[Row, ...] = (
         for law in (c.NeoHooke, c.Yeoh, c.Ogden, c.ExtendedTube)
     ),
     Row(
+        c.FlowingChains,
+        "work = stored energy + loss",
+        ("simulated law", "elastic part from a quadrature of the flow equation written in the true stress"),
+        "test_flowing_chains.py::test_work_is_stored_or_lost",
+    ),
+    Row(
         c.Springpot,
         "relaxation",
         ("simulated Prony series", "power law with the gamma function"),

@@ -21,14 +21,10 @@ from .sensing import (
     force_sensor_drift,
     force_sensor_gain,
 )
-from .rubber import rate_independent_hysteresis, second_relaxation
-from .sensing import current_sensor_bias, force_sensor_bias, force_sensor_delay, force_sensor_gain
-from .sliding import constant_force, sliding_friction
+from .sliding import constant_force
 
 ALL: tuple[Effect, ...] = (
     coulomb_friction,
-    sliding_friction,
-    constant_force,
     stribeck_friction,
     load_dependent_friction,
     quadratic_drag,
@@ -53,6 +49,7 @@ ALL: tuple[Effect, ...] = (
     self_heating,
     cable_friction,
     force_sensor_drift,
+    constant_force,
 )
 
 __all__ = [
@@ -67,6 +64,7 @@ __all__ = [
     "cable_slack",
     "cam_angle_offset",
     "cam_profile_error",
+    "constant_force",
     "coulomb_friction",
     "current_sensor_bias",
     "drive_delay",

@@ -20,6 +20,7 @@ from ...components.element import ROTATION, TRANSLATION, Element
 from ...components.networks import Through
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, numbers_of, wrapped
+from .large_strain import buckling
 
 _CONTROL_VALUES = 7
 """Of the error of a contour: four spans, a quarter of the contour each."""
@@ -93,7 +94,7 @@ def cable_compliance(assembly: Assembly) -> Sequence[Candidate]:
 
 
 def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
-    """A cable that is too long, or rubber that has set.
+    """A cable that is too long, rubber that has set, or a piece that buckles instead of pushing.
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
                 "geometry",
             )
         )
-    return found
+    return [*found, *buckling(assembly)]
 
 
 def cable_friction(assembly: Assembly) -> Sequence[Candidate]:

@@ -25,6 +25,7 @@ from ...components.bodies import Free
 from ...components.element import ROTATION
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, free_name, wrapped
+from .sliding import sliding_friction
 
 
 def _turning(assembly: Assembly) -> list[tuple[str, str]]:
@@ -52,7 +53,7 @@ def _tied(
 
 
 def coulomb_friction(assembly: Assembly) -> Sequence[Candidate]:
-    """Dry friction on a freely turning body.
+    """Dry friction on a freely turning or sliding body.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def coulomb_friction(assembly: Assembly) -> Sequence[Candidate]:
                 "Coulomb 1785; Armstrong-Hélouvry 1991",
             )
         )
-    return found
+    return [*found, *sliding_friction(assembly)]
 
 
 def stribeck_friction(assembly: Assembly) -> Sequence[Candidate]:

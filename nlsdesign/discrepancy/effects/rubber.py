@@ -16,6 +16,7 @@ from ...components import (
 )
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown
+from .large_strain import large_strain_relaxation
 
 
 def _specimens(assembly: Assembly, taken: str) -> list[str]:
@@ -51,7 +52,7 @@ def second_relaxation(assembly: Assembly) -> Sequence[Candidate]:
                 "Maxwell 1867; Prony series",
             )
         )
-    return found
+    return [*found, *large_strain_relaxation(assembly)]
 
 
 def rate_independent_hysteresis(assembly: Assembly) -> Sequence[Candidate]:

@@ -1,0 +1,101 @@
+"""Effects of machines that are no actuators: a carriage on a guide, a strip in a tensile machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.components import (
+    Assembly,
+    ConstantForce,
+    Dashpot,
+    DrivenPoint,
+    FixedPoint,
+    FlowingChains,
+    ForceSensor,
+    LinearDrive,
+    LinearElastic,
+    NeoHooke,
+    PullOnly,
+    SlidingFriction,
+    assembly,
+    specimen,
+    tie,
+)
+from nlsdesign.components.declare import deck_text, declare
+from nlsdesign.deck import read_deck
+from nlsdesign.discrepancy.effects import (
+    ALL,
+    cable_slack,
+    constant_force,
+    coulomb_friction,
+    second_relaxation,
+)
+from nlsdesign.model import flatten
+
+
+def drive() -> Assembly:
+    carriage = LinearDrive(mass=95.0, force_constant=35.0, voltage_limit=10.0)
+    return assembly("drive", carriage=carriage, guide=tie(Dashpot(damping=200.0), "carriage"))
+
+
+def strip(law: NeoHooke | LinearElastic) -> Assembly:
+    return assembly(
+        "strip",
+        grip=DrivenPoint(),
+        clamp=FixedPoint(),
+        strip=tie(specimen(area=1e-5, rest_length=0.08, law=law), "grip", "clamp"),
+        load_cell=ForceSensor(of="strip.force"),
+    )
+
+
+def test_only_friction_and_a_constant_force_can_sit_on_a_carriage() -> None:
+    assert {effect.__name__ for effect in ALL if effect(drive())} == {"coulomb_friction", "constant_force"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "kind", "body_force"),
+    [(coulomb_friction, SlidingFriction, -3.0), (constant_force, ConstantForce, -3.0)],
+)
+def test_the_force_on_a_carriage_is_the_stated_one(effect: object, kind: type, body_force: float) -> None:
+    (found,) = effect(drive())  # type: ignore[operator]
+    (number,) = found.unknowns
+    model = flatten(found.assembly.with_values({number.name: 3.0}))
+    (there,) = [p for _, p in found.assembly.parts if isinstance(getattr(p, "element", None), kind)]
+    assert there.between == ("carriage",)
+    moving = model.evaluate([0.0, 0.2])
+    bare = flatten(drive()).evaluate([0.0, 0.2])
+    change = 95.0 * (moving["carriage.acceleration"] - bare["carriage.acceleration"])
+    assert change == pytest.approx(body_force)
+    assert declare(read_deck(deck_text(found.assembly), Path("edited.toml"))) == found.assembly
+    assert [c for c in effect(found.assembly) if c.location == "carriage"] == []  # type: ignore[operator]
+
+
+def test_relaxation_at_large_stretch_is_offered_with_one_and_with_two_times() -> None:
+    assert not any(
+        isinstance(p, FlowingChains)
+        for c in second_relaxation(strip(LinearElastic(modulus=1e5)))
+        for _, p in c.assembly.walk()
+    )
+    offered = second_relaxation(strip(NeoHooke(shear_modulus=3e4)))
+    counts = [sum(isinstance(p, FlowingChains) for _, p in c.assembly.walk()) for c in offered]
+    assert sorted(counts) == [0, 1, 2]
+    for found in offered:
+        assert found.location == "strip"
+        assert set(flatten(found.assembly).values) >= {u.name for u in found.unknowns}
+        assert declare(read_deck(deck_text(found.assembly), Path("edited.toml"))) == found.assembly
+
+
+def test_a_strip_that_buckles_is_read_outside() -> None:
+    (found,) = cable_slack(strip(NeoHooke(shear_modulus=3e4)))
+    element = found.assembly.element("strip")
+    assert isinstance(element, PullOnly)
+    model = flatten(found.assembly)
+    pushed = model.evaluate([], [-0.02, 0.0])
+    pulled = model.evaluate([], [0.02, 0.0])
+    assert pushed["load_cell.reading"] == pytest.approx(0.0, abs=1e-6)
+    assert pulled["load_cell.reading"] == pytest.approx(
+        flatten(strip(NeoHooke(shear_modulus=3e4))).evaluate([], [0.02, 0.0])["load_cell.reading"], abs=1e-6
+    )
+    assert cable_slack(found.assembly) == []
