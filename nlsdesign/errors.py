@@ -109,6 +109,10 @@ class MeasurementError(NlsError):
     """A record cannot be used as it stands."""
 
 
+class MissingLibraryError(NlsError):
+    """A library that is asked for on demand is not installed."""
+
+
 class ConvergenceError(NlsError):
     """A solver stopped without a solution; no number is returned."""
 
@@ -136,4 +140,21 @@ def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError
         "no such name",
         did_you_mean=nearest(name, names),
         next_step=f"use one of: {shown}" if names else None,
+    )
+
+
+def missing_library(what: str, library: str, extra: str) -> MissingLibraryError:
+    """Return the error for a library that is not installed, with the command that installs it.
+
+    Parameters
+    ----------
+    what
+        Needs the library.
+    library
+        Name of the module.
+    extra
+        Extra of the package that brings it.
+    """
+    return MissingLibraryError(
+        what, f"needs {library}, which is not installed", next_step=f"pip install 'nlsdesign[{extra}]'"
     )

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +18,6 @@ _GAP = 1.5
 _JITTER = 0.02
 """Steps that differ by more than this share are interpolated to a uniform grid."""
 _CLIPPED_RUN = 5
-_LEAST_ROWS = 50
-_FIRST_ROW = 2
-"""Row of the first sample as a text editor counts: the heads are row 1."""
 
 
 @dataclass(frozen=True)
@@ -44,47 +39,7 @@ class Finding:
         return f"{self.place}: {self.text}"
 
 
-def read_table(file: Path) -> tuple[list[str], Array]:
-    """Return the heads and the numbers of a CSV file.
-
-    Parameters
-    ----------
-    file
-        Comma-separated, one row of heads.
-
-    Raises
-    ------
-    MeasurementError
-        If a row is too short or too long, or a cell is not a number.
-    """
-    with file.open(newline="", encoding="utf8") as stream:
-        rows = [row for row in csv.reader(stream) if row]
-    if len(rows) < 1 + _LEAST_ROWS:
-        raise MeasurementError(
-            file.name, f"has {max(len(rows) - 1, 0)} rows of numbers; at least {_LEAST_ROWS} are needed"
-        )
-    heads = [head.strip() for head in rows[0]]
-    try:
-        return heads, np.array(rows[1:], dtype=float)
-    except ValueError:
-        raise _bad_cell(file.name, heads, rows[1:]) from None
-
-
-def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> MeasurementError:
-    for number, row in enumerate(rows, start=_FIRST_ROW):
-        if len(row) != len(heads):
-            return MeasurementError(
-                f"{file}: row {number}", f"has {len(row)} cells, the heads are {len(heads)}"
-            )
-        for head, cell in zip(heads, row, strict=True):
-            try:
-                float(cell)
-            except ValueError:
-                return MeasurementError(f"{file}: column '{head}', row {number}", f"'{cell}' is not a number")
-    return MeasurementError(file, "cannot be read as a table of numbers")
-
-
-def check_columns(file: str, columns: Mapping[str, Array]) -> None:
+def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2) -> None:
     """Check that every number is finite.
 
     Parameters
@@ -93,6 +48,8 @@ def check_columns(file: str, columns: Mapping[str, Array]) -> None:
         For messages.
     columns
         Numbers as they stand in the file, by head.
+    first_row
+        Row of the first number: 2 in a text editor, where the heads are row 1.
 
     Raises
     ------
@@ -103,13 +60,13 @@ def check_columns(file: str, columns: Mapping[str, Array]) -> None:
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise MeasurementError(
-                f"{file}: column '{head}', {_rows(_first_run(bad))}",
+                f"{file}: column '{head}', {_rows(_first_run(bad), first_row)}",
                 f"is not a finite number ({len(bad)} in all)",
                 next_step="cut the record before or after these rows",
             )
 
 
-def check_time(file: str, head: str, time: Array) -> str:
+def check_time(file: str, head: str, time: Array, *, first_row: int = 2) -> str:
     """Check that time ascends without gaps.
 
     Parameters
@@ -118,6 +75,8 @@ def check_time(file: str, head: str, time: Array) -> str:
         For messages.
     time
         In s, shape (n,).
+    first_row
+        As above.
 
     Returns
     -------
@@ -134,7 +93,7 @@ def check_time(file: str, head: str, time: Array) -> str:
     if len(back):
         what = "runs backwards" if np.any(steps < 0.0) else "stands still"
         raise MeasurementError(
-            f"{file}: column '{head}', {_rows(_first_run(back + 1))}",
+            f"{file}: column '{head}', {_rows(_first_run(back + 1), first_row)}",
             f"time {what} ({time[back[0]]:g} s is followed by {time[back[0] + 1]:g} s)",
             next_step="sort the record, or cut it where the clock was set back",
         )
@@ -142,7 +101,7 @@ def check_time(file: str, head: str, time: Array) -> str:
     gaps = np.flatnonzero(steps > _GAP * usual)
     if len(gaps):
         raise MeasurementError(
-            f"{file}: column '{head}', {_rows(gaps[:1] + 1)}",
+            f"{file}: column '{head}', {_rows(gaps[:1] + 1, first_row)}",
             f"there is a gap of {steps[gaps[0]]:g} s; samples lie {usual:g} s apart ({len(gaps)} in all)",
             next_step="split the record into one file before and one after the gap",
         )
@@ -154,7 +113,7 @@ def check_time(file: str, head: str, time: Array) -> str:
     )
 
 
-def suspicions(file: str, head: str, values: Array) -> list[Finding]:
+def suspicions(file: str, head: str, values: Array, *, first_row: int = 2) -> list[Finding]:
     """Return what looks like a dead or saturated channel.
 
     Parameters
@@ -163,10 +122,14 @@ def suspicions(file: str, head: str, values: Array) -> list[Finding]:
         For messages.
     values
         As they stand in the file.
+    first_row
+        As above.
     """
     place = f"{file}: column '{head}'"
     if np.ptp(values) == 0.0:
-        return [Finding(f"{place}, {_rows(np.arange(len(values)))}", f"is constant at {values[0]:g}")]
+        return [
+            Finding(f"{place}, {_rows(np.arange(len(values)), first_row)}", f"is constant at {values[0]:g}")
+        ]
     # A channel without noise may well rest on its largest value; one with noise cannot.
     if noise_of(values) < 2.0 * quantum_of(values):
         return []
@@ -175,7 +138,8 @@ def suspicions(file: str, head: str, values: Array) -> list[Finding]:
         if len(run) >= _CLIPPED_RUN:
             return [
                 Finding(
-                    f"{place}, {_rows(run)}", f"rests on its {word} value {extreme:g}: clipped or saturated"
+                    f"{place}, {_rows(run, first_row)}",
+                    f"rests on its {word} value {extreme:g}: clipped or saturated",
                 )
             ]
     return []
@@ -192,6 +156,6 @@ def _longest_run(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     return max(runs, key=len)
 
 
-def _rows(indices: NDArray[np.intp]) -> str:
-    first, last = int(indices[0]) + _FIRST_ROW, int(indices[-1]) + _FIRST_ROW
+def _rows(indices: NDArray[np.intp], first_row: int) -> str:
+    first, last = int(indices[0]) + first_row, int(indices[-1]) + first_row
     return f"row {first}" if first == last else f"rows {first} to {last}"
