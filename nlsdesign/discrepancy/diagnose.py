@@ -109,6 +109,7 @@ def _verdict(
         course_of(base, better, comparison, worst),
         tuple(text for fit in better.fits.values() for text in fit.unidentified()),
         shapes_of(base, better, comparison, worst),
+        tuple(better.fits.values()),
     )
 
 

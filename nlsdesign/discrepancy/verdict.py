@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identification.fit import Fit
 from ..identification.residuals import Binned
 from ..model import Assembly
 
@@ -113,6 +114,8 @@ class Verdict:
     shapes
         Residual of the summed-up block before and after, over every measured signal, frequency, time and
         direction.
+    fits
+        Numbers of the better model with their covariance, one for each group of blocks that share some.
     """
 
     verdict: str
@@ -126,6 +129,7 @@ class Verdict:
     course: Course
     unidentified: tuple[str, ...] = ()
     shapes: Mapping[str, tuple[Binned, Binned]] = field(default_factory=dict)
+    fits: tuple[Fit, ...] = ()
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.

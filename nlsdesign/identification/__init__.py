@@ -1,9 +1,15 @@
 """Measured records, noise, fits and their metrics."""
 
-from .fit import Fit, Parameter, fit
-from .measurement import Column, ColumnMap, Record, RecordSet, load_records
+from .fit import Fit, fit
+from .losses import Huber, Loss, Squares
+from .measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_records
 from .metrics import Agreement, agreement, rmse
+from .multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
+from .parameters import Parameter, declared_parameter, free_parameter
+from .prediction import Prediction, predict_in_windows
 from .quality import Finding
+from .simulation_error import Shots, SimulationError
+from .wiring import Wiring, wired
 
 __all__ = [
     "Agreement",
@@ -11,11 +17,26 @@ __all__ = [
     "ColumnMap",
     "Finding",
     "Fit",
+    "Huber",
+    "Loss",
     "Parameter",
+    "Prediction",
     "Record",
     "RecordSet",
+    "Shots",
+    "SimulatedFit",
+    "SimulationError",
+    "Squares",
+    "Wiring",
     "agreement",
+    "coloured_sigma",
+    "cut_in_time",
+    "declared_parameter",
     "fit",
+    "fit_by_simulation",
+    "free_parameter",
     "load_records",
+    "predict_in_windows",
     "rmse",
+    "wired",
 ]

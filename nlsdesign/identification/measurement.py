@@ -229,6 +229,19 @@ def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
     )
 
 
+def from_sample(record: Record, first: int) -> Record:
+    """Return a record without what came before a sample.
+
+    Parameters
+    ----------
+    record
+        To be shortened.
+    first
+        Index of the sample that is to be the first.
+    """
+    return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
+
+
 def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
     cut = 2 * len(record.trace) // 3
     return (

@@ -21,7 +21,9 @@ from ..model import FlatModel
 from .fit import Fit, covariance_of
 from .losses import Loss, Squares
 from .measurement import Record
+from .metrics import rmse
 from .parameters import Parameter
+from .residuals import effective_size
 from .simulation_error import Linear, Point, Shots, SimulationError
 from .wiring import Wiring
 
@@ -92,6 +94,7 @@ def fit_by_simulation(
     wiring: Wiring | None = None,
     loss: Loss | None = None,
     sigma: Mapping[str, float] | None = None,
+    known: Sequence[Fit] = (),
 ) -> SimulatedFit:
     """Fit parameters so that the simulated model follows the records.
 
@@ -111,17 +114,21 @@ def fit_by_simulation(
         :class:`Squares` by default; :class:`Huber` where some samples are wild.
     sigma
         Standard deviation of each measured signal that counts as one; estimated from the records by default.
+    known
+        Earlier fits, for instance of a balance of forces, whose values and covariance count as prior.
 
     Raises
     ------
     ConvergenceError
         If there is no simulation at the start, or the descent stops before the windows join.
     """
-    problem = SimulationError(model, records, parameters, shots=shots, wiring=wiring, sigma=sigma)
+    problem = SimulationError(
+        model, records, parameters, shots=shots, wiring=wiring, sigma=sigma, known=known
+    )
     loss = loss or Squares()
     place, iterations, converged = _descended(problem, loss)
-    priors = len(problem.parameters)
-    covariance = covariance_of(place.residual[priors:], place.slope, priors)[:priors, :priors]
+    priors, size = problem.priors, len(problem.parameters)
+    covariance = covariance_of(place.residual[priors:], place.slope, priors)[:size, :size]
     misfit, at = {}, priors
     for each in problem.windows:
         own = place.linear.residual[at : at + each.measured.size]
@@ -161,7 +168,7 @@ def _descended(problem: SimulationError, loss: Loss) -> tuple[_Place, int, bool]
 
 
 def _place(problem: SimulationError, point: Point, loss: Loss) -> _Place:
-    linear, priors = problem.rows(point), len(problem.parameters)
+    linear, priors = problem.rows(point), problem.priors
     weight = np.ones_like(linear.residual)
     weight[priors:] = loss.weight(linear.residual[priors:])
     prior = linear.residual[:priors]
@@ -198,6 +205,36 @@ def _bounded(residual: Array, slope: Array, damping: float, room: tuple[Array, A
     low, high = room[0] * size - 1e-300, room[1] * size + 1e-300
     found: Array = lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n).x
     return found / size
+
+
+def coloured_sigma(found: SimulatedFit) -> dict[str, float]:
+    """Return the standard deviation with which each independent number of the residuals counts as one.
+
+    What a model leaves over is rarely noise: neighbouring samples say the same. With these as ``sigma`` a
+    fit weighs the records against priors by what the records are worth.
+
+    Parameters
+    ----------
+    found
+        A fit of the same model and records; with any sigma.
+    """
+    problem = found.problem
+    residual = problem.residual(found.point)[problem.priors :]
+    rows: dict[str, list[Array]] = {name: [] for name in problem.wiring.outputs}
+    place = 0
+    for each in problem.windows:
+        for name in rows:
+            rows[name].append(residual[place : place + each.measured.shape[1]])
+            place += each.measured.shape[1]
+    sigma = dict(zip(rows, problem.sigma, strict=True))
+    return {
+        name: float(sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / _worth(r)))
+        for name, r in rows.items()
+    }
+
+
+def _worth(rows: Sequence[Array]) -> float:
+    return sum(effective_size(row) for row in rows)
 
 
 def without(fit: SimulatedFit, name: str) -> tuple[Parameter, ...]:

@@ -103,6 +103,35 @@ def declared_parameter(variable: Variable, start: float | None = None) -> Parame
     )
 
 
+def free_parameter(variable: Variable, *, reach: float = 10.0) -> Parameter:
+    """Return a parameter of which nothing is known but a start.
+
+    Parameters
+    ----------
+    variable
+        Parameter of a flat model. A number above zero is fitted on a logarithmic scale.
+    reach
+        Factor from the start to the bounds; on the linear scale, so many times its size to either side.
+    """
+    value = variable.start
+    size = abs(value) or 1.0
+    if value > 0.0:
+        low, high = value / reach, value * reach
+    else:
+        low, high = value - reach * size, value + reach * size
+    return Parameter(
+        variable.name,
+        variable.unit,
+        value,
+        value,
+        math.inf,
+        max(low, variable.minimum),
+        min(high, variable.maximum),
+        "log" if value > 0.0 else "linear",
+        size,
+    )
+
+
 def box(parameters: Sequence[Parameter]) -> tuple[Array, Array, Array]:
     """Return lower bounds, upper bounds and a start inside them, in the fitted scale.
 

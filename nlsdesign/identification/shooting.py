@@ -23,6 +23,9 @@ from .wiring import Wiring
 
 Array = NDArray[np.float64]
 
+_BEYOND = 20
+"""Samples by which a record is continued before its rate is taken: the reach of the filter."""
+
 
 class Shot(NamedTuple):
     """What the windows of one record predict.
@@ -125,8 +128,15 @@ def _seen(model: FlatModel, wiring: Wiring, record: Record) -> dict[int, Array]:
             found[names.index(output)] = record.trace[signal]
             speed = f"{output.rpartition('.')[0]}.speed"
             if speed in names and speed not in wiring.outputs.values():
-                found[names.index(speed)] = derivative(record.trace[signal], record.step, order=1)
+                found[names.index(speed)] = _speed(record.trace[signal], record.step)
     return found
+
+
+def _speed(motion: Array, step: float) -> Array:
+    """Return the smoothed rate; beyond the ends the motion goes on as it came, mirrored through the end."""
+    beyond = min(_BEYOND, len(motion) - 1)
+    longer = np.pad(motion, beyond, mode="reflect", reflect_type="odd")
+    return derivative(longer, step, order=1)[beyond:-beyond]
 
 
 class Shooter:

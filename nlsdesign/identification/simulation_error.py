@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from ..errors import MeasurementError, ValueRangeError
 from ..model import FlatModel
-from .measurement import Record
+from .fit import Fit
+from .measurement import Record, from_sample
 from .parameters import Parameter, box
+from .priors import prior_rows
 from .residuals import noise_of, quantum_of
 from .shooting import Shooter, Shot, Windows
 from .wiring import Wiring, wired
@@ -34,11 +36,21 @@ class Shots:
         measured state and stands for a prediction over its length.
     substeps
         Integration steps from sample to sample.
+    phases
+        How many times windows apart are laid over a record, each time later by that share of their length;
+        together they count as one. Where windows happen to begin then matters less.
     """
 
     length: float
     joined: bool = True
     substeps: int = 1
+    phases: int = 1
+
+    def __post_init__(self) -> None:
+        if self.phases < 1 or (self.joined and self.phases > 1):
+            raise ValueRangeError(
+                f"{self.phases} phases", "only windows apart can be laid over a record more than once"
+            )
 
 
 class Point(NamedTuple):
@@ -96,6 +108,9 @@ class SimulationError:
         Windows.
     sigma
         Standard deviation of each measured signal that counts as one; estimated from the records by default.
+    known
+        Earlier fits of some of the parameters, for instance of a balance of forces, whose values and
+        covariance count as prior.
     slopes
         Whether derivatives are wanted.
 
@@ -116,21 +131,25 @@ class SimulationError:
         shots: Shots,
         wiring: Wiring | None = None,
         sigma: Mapping[str, float] | None = None,
+        known: Sequence[Fit] = (),
         slopes: bool = True,
     ) -> None:
         if not records:
             raise MeasurementError("records", "there is none to fit", next_step="give at least one")
         if model.tables or model.sample_time is not None:
             raise ValueRangeError(f"model {model.name}", "must be continuous and without tables to be fitted")
-        self.parameters, self.records, self.shots = tuple(parameters), tuple(records), shots
+        self.parameters, self.shots = tuple(parameters), shots
+        self.records = tuple(later for r in records for later in _phases(r, shots))
         self.wiring = wiring or wired(model, list(records[0].trace.signals))
         late = set(self.wiring.late_by.values())
         self._own = [i for i, p in enumerate(parameters) if p.name not in late]
         free = [parameters[i].name for i in self._own]
         self.shooter = Shooter(model, free, self.wiring, substeps=shots.substeps, slopes=slopes)
-        self.windows = [Windows(r, model, self.wiring, _samples(shots, r)) for r in records]
-        self.sigma = np.array([(sigma or {}).get(n, 0.0) or _noise(records, n) for n in self.wiring.outputs])
+        self.windows = [Windows(r, model, self.wiring, _samples(shots, r)) for r in self.records]
+        stated = [(sigma or {}).get(n, 0.0) or _noise(records, n) for n in self.wiring.outputs]
+        self.sigma = np.array(stated) * math.sqrt(shots.phases)
         self._low, self._high, self._first = box(parameters)
+        self._matrix, self._offset = prior_rows(parameters, known)
         self._size = np.ones(len(model.states))
         self._unknown = model.start(model.states)
 
@@ -263,12 +282,15 @@ class SimulationError:
             gap[i + 1] = shot.end_by_start[i] @ gap[i] + shot.end[i] - start[i + 1]
         return Carry(slope, gap)
 
+    @property
+    def priors(self) -> int:
+        """How many of the residuals are those of priors; they come first."""
+        return len(self._offset)
+
     def _prior(self, x: Array) -> tuple[Array, Array]:
-        sigma = np.array([p.sigma for p in self.parameters])
-        centre = np.array([p.inward(p.centre) if math.isfinite(p.sigma) else 0.0 for p in self.parameters])
-        slope = np.zeros((len(x), self._columns))
-        slope[:, : len(x)] = np.diag(1.0 / sigma)
-        return (x - centre) / sigma, slope
+        slope = np.zeros((self.priors, self._columns))
+        slope[:, : len(x)] = self._matrix
+        return self._matrix @ x - self._offset, slope
 
     def _late(
         self, windows: Windows, output: Array, slopes: tuple[Array, Array] | None, values: Mapping[str, float]
@@ -321,6 +343,12 @@ def _samples(shots: Shots, record: Record) -> int:
             f"hold less than two samples of record '{record.name}', which lie {record.step:g} s apart",
         )
     return count
+
+
+def _phases(record: Record, shots: Shots) -> list[Record]:
+    count = _samples(shots, record)
+    starts = [count * k // shots.phases for k in range(shots.phases)]
+    return [record, *(from_sample(record, first) for first in starts[1:])]
 
 
 def _noise(records: Sequence[Record], signal: str) -> float:

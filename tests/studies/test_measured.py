@@ -1,0 +1,54 @@
+"""The studies of real measurements keep their claims where the measurements are at hand."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.cli.studies import claims, load_study
+
+NAMES = ("emps", "vhb4910")
+BOUNDS = {
+    "emps": {
+        "better_error_over_1s_mm": 1.75,
+        "better_error_over_3s1_mm": 2.85,
+        "better_force_error_percent": 3.7,
+    },
+    "vhb4910": {"better_error_held_out_percent": 4.0},
+}
+"""What has to be reached, however it is done."""
+NAMED = {
+    "emps": {"coulomb_friction", "constant_force"},
+    "vhb4910": {"second_relaxation", "cable_slack"},
+}
+
+
+@pytest.mark.skipif(
+    "NLSDESIGN_SHARED" not in os.environ, reason="NLSDESIGN_SHARED does not name the folder of measurements"
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_the_study_keeps_its_claims(name: str, tmp_path: Path) -> None:
+    results = load_study(name).main(tmp_path, fast=True)
+    expected = claims(name)
+    assert set(results) == set(expected)
+    for key, claim in expected.items():
+        assert claim.holds(results[key]), (key, results[key], claim)
+    for key, bound in BOUNDS[name].items():
+        assert results[key] <= bound, (key, results[key])
+    verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf8"))
+    assert verdict["verdict"] == "named"
+    assert {effect["name"] for effect in verdict["effects"]} == NAMED[name]
+    assert "<svg" in (tmp_path / "report.html").read_text(encoding="utf8")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_without_the_measurements_the_study_says_why_it_has_no_result(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("NLSDESIGN_SHARED", raising=False)
+    assert load_study(name).main(tmp_path) == {}
+    assert f"skipped: The measurements '{name}'" in capsys.readouterr().out
+    assert "NLSDESIGN_SHARED" in (tmp_path / "report.html").read_text(encoding="utf8")
