@@ -83,8 +83,8 @@ def refitted(verdict: Any, records: Any) -> Any:
     free = [nls.free_parameter(model.variable(p.name)) for fit in verdict.fits for p in fit.parameters]
     shots, seen = nls.Shots(WINDOWS["1s"], joined=False, phases=PHASES), records.of("fit")
     alone = nls.fit_by_simulation(model, seen, free, shots=shots)
-    worth = nls.coloured_sigma(alone)
-    both = nls.fit_by_simulation(model, seen, free, shots=shots, sigma=worth, known=verdict.fits)
+    weights = nls.Weights(nls.coloured_sigma(alone), known=verdict.fits)
+    both = nls.fit_by_simulation(model, seen, free, shots=shots, weights=weights)
     return verdict.actuator.with_values(both.fit.values)
 
 

@@ -8,7 +8,7 @@ from .multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
 from .parameters import Parameter, declared_parameter, free_parameter
 from .prediction import Prediction, predict_in_windows
 from .quality import Finding
-from .simulation_error import Shots, SimulationError
+from .simulation_error import Shots, SimulationError, Weights
 from .wiring import Wiring, wired
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "SimulatedFit",
     "SimulationError",
     "Squares",
+    "Weights",
     "Wiring",
     "agreement",
     "coloured_sigma",

@@ -8,7 +8,7 @@ error of a prediction over the length of a window. Source: Bock 1987 (condensing
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from .measurement import Record
 from .metrics import rmse
 from .parameters import Parameter
 from .residuals import effective_size
-from .simulation_error import Linear, Point, Shots, SimulationError
+from .simulation_error import Linear, Point, Shots, SimulationError, Weights
 from .wiring import Wiring
 
 Array = NDArray[np.float64]
@@ -93,8 +93,7 @@ def fit_by_simulation(
     shots: Shots,
     wiring: Wiring | None = None,
     loss: Loss | None = None,
-    sigma: Mapping[str, float] | None = None,
-    known: Sequence[Fit] = (),
+    weights: Weights | None = None,
 ) -> SimulatedFit:
     """Fit parameters so that the simulated model follows the records.
 
@@ -112,19 +111,15 @@ def fit_by_simulation(
         Of measured signals to inputs and outputs; by name where ``None``.
     loss
         :class:`Squares` by default; :class:`Huber` where some samples are wild.
-    sigma
-        Standard deviation of each measured signal that counts as one; estimated from the records by default.
-    known
-        Earlier fits, for instance of a balance of forces, whose values and covariance count as prior.
+    weights
+        What counts how much, among it what earlier fits have found; see :class:`Weights`.
 
     Raises
     ------
     ConvergenceError
         If there is no simulation at the start, or the descent stops before the windows join.
     """
-    problem = SimulationError(
-        model, records, parameters, shots=shots, wiring=wiring, sigma=sigma, known=known
-    )
+    problem = SimulationError(model, records, parameters, shots=shots, wiring=wiring, weights=weights)
     loss = loss or Squares()
     place, iterations, converged = _descended(problem, loss)
     priors, size = problem.priors, len(problem.parameters)

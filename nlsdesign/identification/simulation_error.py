@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +51,24 @@ class Shots:
             raise ValueRangeError(
                 f"{self.phases} phases", "only windows apart can be laid over a record more than once"
             )
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What counts how much in a fit.
+
+    Parameters
+    ----------
+    sigma
+        Standard deviation of measured signals that counts as one, in SI by name; that of others is estimated
+        from the records.
+    known
+        Earlier fits of some of the parameters, for instance of a balance of forces, whose values and
+        covariance count as prior.
+    """
+
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    known: Sequence[Fit] = ()
 
 
 class Point(NamedTuple):
@@ -106,13 +124,15 @@ class SimulationError:
         Of measured signals; by name where ``None``.
     shots
         Windows.
-    sigma
-        Standard deviation of each measured signal that counts as one; estimated from the records by default.
-    known
-        Earlier fits of some of the parameters, for instance of a balance of forces, whose values and
-        covariance count as prior.
+    weights
+        What counts how much; see :class:`Weights`.
     slopes
         Whether derivatives are wanted.
+
+    Attributes
+    ----------
+    priors
+        How many of the residuals are those of priors; they come first.
 
     Raises
     ------
@@ -130,8 +150,7 @@ class SimulationError:
         *,
         shots: Shots,
         wiring: Wiring | None = None,
-        sigma: Mapping[str, float] | None = None,
-        known: Sequence[Fit] = (),
+        weights: Weights | None = None,
         slopes: bool = True,
     ) -> None:
         if not records:
@@ -146,10 +165,12 @@ class SimulationError:
         free = [parameters[i].name for i in self._own]
         self.shooter = Shooter(model, free, self.wiring, substeps=shots.substeps, slopes=slopes)
         self.windows = [Windows(r, model, self.wiring, _samples(shots, r)) for r in self.records]
-        stated = [(sigma or {}).get(n, 0.0) or _noise(records, n) for n in self.wiring.outputs]
+        weights = weights or Weights()
+        stated = [weights.sigma.get(n, 0.0) or _noise(records, n) for n in self.wiring.outputs]
         self.sigma = np.array(stated) * math.sqrt(shots.phases)
         self._low, self._high, self._first = box(parameters)
-        self._matrix, self._offset = prior_rows(parameters, known)
+        self._matrix, self._offset = prior_rows(parameters, weights.known)
+        self.priors = len(self._offset)
         self._size = np.ones(len(model.states))
         self._unknown = model.start(model.states)
 
@@ -281,11 +302,6 @@ class SimulationError:
             slope[i + 1][:, self._own] += by_parameter[i]
             gap[i + 1] = shot.end_by_start[i] @ gap[i] + shot.end[i] - start[i + 1]
         return Carry(slope, gap)
-
-    @property
-    def priors(self) -> int:
-        """How many of the residuals are those of priors; they come first."""
-        return len(self._offset)
 
     def _prior(self, x: Array) -> tuple[Array, Array]:
         slope = np.zeros((self.priors, self._columns))
