@@ -67,17 +67,17 @@ def predict_in_windows(
     ConvergenceError
         If a simulation is not finite.
     """
-    problem = SimulationError(
-        model, [record], [], shots=Shots(length, False, substeps), wiring=wiring, slopes=False
-    )
-    (windows,) = problem.windows
-    kept = (len(record.trace) // windows.count) * windows.count
-    if kept == 0:
+    if length > record.trace.time[-1] - record.trace.time[0] + 0.5 * record.step:
         raise MeasurementError(
             f"record '{record.name}'",
             f"lasts {record.trace.time[-1] - record.trace.time[0]:g} s, which is less than {length:g} s",
             next_step="take shorter windows",
         )
+    problem = SimulationError(
+        model, [record], [], shots=Shots(length, False, substeps), wiring=wiring, slopes=False
+    )
+    (windows,) = problem.windows
+    kept = (len(record.trace) // windows.count) * windows.count
     rows = problem.residual(problem.start()).reshape(len(problem.sigma), -1) * problem.sigma[:, None]
     error = {name: rows[i, :kept] for i, name in enumerate(problem.wiring.outputs)}
     return Prediction(record.trace.time[:kept], error)
