@@ -16,17 +16,19 @@ from ..components.declare import write_deck
 from ..identification.evidence import Bench
 from ..identification.measurement import RecordSet
 from ..writing import write_text
+from .advice import advice, more_excitation, where_they_differ
 from .compare import Comparison
 from .cuts import blocks_of
 from .effects import ALL, Effect
 from .hypothesis import Hypothesis
 from .locate import DECLARED, Excess, excesses
 from .outcome import course_of, gaps_of, shapes_of
+from .remainder import Remainder, remainder_of
 from .search import Outcome, Step, search
 from .suspicion import suspicions_of, typical_sizes
 from .verdict import NamedEffect, Verdict
 
-_RUNNERS_UP = 6
+_RUNNERS_UP, _MOST_ALIASES = 6, 3
 
 
 def _silent(text: str) -> None:
@@ -92,11 +94,12 @@ def _verdict(
     blocks = [n for n in before if n != DECLARED]
     worst = max(blocks, key=lambda n: sum(before[n].chi2) / max(sum(before[n].rows), 1))
     steps = outcome.steps if word == "named" else ()
-    named = {step.chosen.added[-1].effect for step in steps}
+    named = {step.effect for step in steps}
     tried = [(c.effect, share) for c, share in outcome.ranking]
     runners_up = [pair for pair in tried if pair[0] in named] + [
         pair for pair in tried if pair[0] not in named
     ]
+    unidentified = tuple(text for fit in better.fits.values() for text in fit.unidentified())
     return Verdict(
         word,
         tuple(_named(better, step, place) for place, step in enumerate(steps)),
@@ -107,10 +110,38 @@ def _verdict(
         sourced(better),
         sourced(base),
         course_of(base, better, comparison, worst),
-        tuple(text for fit in better.fits.values() for text in fit.unidentified()),
+        unidentified,
         shapes_of(base, better, comparison, worst),
         tuple(better.fits.values()),
+        _remainder(comparison, better, after) if word in ("named", "unknown") else None,
+        _next_steps(comparison, steps, unidentified),
     )
+
+
+def _remainder(comparison: Comparison, better: Hypothesis, after: dict[str, Excess]) -> Remainder | None:
+    """Return what is left in the block that is furthest from its noise floor, if any is open."""
+    left = [n for n, e in after.items() if n != DECLARED and e.open]
+    if not left:
+        return None
+    worst = max(left, key=lambda n: sum(after[n].chi2) / max(sum(after[n].rows), 1))
+    bench = comparison.bench
+    mine = [j for j in comparison.judged(better) if j.block.name == worst]
+    return remainder_of(mine, bench.records, [s for s in bench.records.signals if bench.noise.rounded[s]])
+
+
+def _next_steps(
+    comparison: Comparison, steps: Sequence[Step], unidentified: Sequence[str]
+) -> tuple[str, ...]:
+    """Return what to measure to tell apart what these records cannot."""
+    found: list[str] = []
+    for step in steps:
+        mine = comparison.judged(step.chosen) if step.equals else ()
+        differ = {
+            h.added[-1].effect: where_they_differ(mine, comparison.judged(h))
+            for h in step.equals[:_MOST_ALIASES]
+        }
+        found += advice(step.effect, differ)
+    return (*found, *more_excitation(unidentified))
 
 
 def _where(before: Excess, after: Excess) -> str:
@@ -158,7 +189,7 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         mine.effect,
         mine.location,
         numbers,
-        step.aliases,
+        tuple(h.added[-1].effect for h in step.equals),
         step.share_fit,
         step.share_held_out,
         mine.signature,

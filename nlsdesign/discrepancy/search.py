@@ -21,9 +21,11 @@ CLOSED_SHARE = 0.75
 """A block of which so much is explained counts as named, even if its form is not quite right."""
 SAME = 0.02
 """A simpler hypothesis is taken if its excess is more by less than this share of the first excess."""
+ALIAS = 0.003
+"""Hypotheses whose excess differs by less than this share of the first excess cannot be told apart."""
 _NOISE = 50.0
 _MOST_EFFECTS = 3
-_PAIRED = 5
+_PAIRED = 4
 """Where no effect helps alone, so many of the best are tried in pairs."""
 
 
@@ -37,14 +39,19 @@ class Step:
         Hypothesis with the effect in it.
     share_fit, share_held_out
         Share of the excess of the block that it explains best.
-    aliases
-        Identifiers of effects that explain as much with as few numbers.
+    equals
+        Hypotheses with another last effect that explain as much with as few numbers.
     """
 
     chosen: Hypothesis
     share_fit: float
     share_held_out: float
-    aliases: tuple[str, ...]
+    equals: tuple[Hypothesis, ...] = ()
+
+    @property
+    def effect(self) -> str:
+        """Identifier of what was added."""
+        return self.chosen.added[-1].effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +136,7 @@ class _Seeker:
         bench, place = self._comparison.bench, 0
         first = excesses(start, bench)
         while len(steps) > 1 and place < len(steps) - 1:
-            self._progress(f"trying without {steps[place].chosen.added[-1].effect}")
+            self._progress(f"trying without {steps[place].effect}")
             rest = [s for k, s in enumerate(steps) if k != place]
             fewer = self._rebuilt(start, rest)
             enough = total_excess(excesses(steps[-1].chosen, bench)) + SAME * total_excess(first) + _NOISE
@@ -187,7 +194,7 @@ class _Seeker:
             return []
         lone = next(h for h in best if h.added[-1].effect == step.chosen.added[-2].effect)
         before = known[1]
-        return [Step(lone, *_best_shares(before, excesses(lone, bench)), ()), step]
+        return [Step(lone, *_best_shares(before, excesses(lone, bench))), step]
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
         """Return the same effect at the same kind of place of another assembly."""
@@ -209,7 +216,7 @@ class _Seeker:
             if later is None:
                 return []
             before, after = excesses(present, bench), excesses(later, bench)
-            found.append(Step(later, *_best_shares(before, after), step.aliases))
+            found.append(Step(later, *_best_shares(before, after), step.equals))
             present = later
         return found
 
@@ -227,8 +234,14 @@ def _best_step(
     equal = [(h, after) for h, after in able if total_excess(after) <= least + margin]
     chosen, after = min(equal, key=lambda pair: (len(pair[0].added[-1].unknowns), total_excess(pair[1])))
     size = len(chosen.added[-1].unknowns)
-    aliases = [h.added[-1].effect for h, _ in equal if h is not chosen and len(h.added[-1].unknowns) <= size]
-    return Step(chosen, *_best_shares(before, after), tuple(dict.fromkeys(aliases)))
+    limit = total_excess(after) + ALIAS * total_excess(before) + _NOISE
+    alike = {
+        h.added[-1].effect: h
+        for h, left in reversed(equal)
+        if h is not chosen and len(h.added[-1].unknowns) <= size and total_excess(left) <= limit
+    }
+    alike.pop(chosen.added[-1].effect, None)
+    return Step(chosen, *_best_shares(before, after), tuple(alike.values()))
 
 
 def _best_shares(before: dict[str, Excess], after: dict[str, Excess]) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..identification.fit import Fit
 from ..identification.residuals import Binned
 from ..model import Assembly
+from .remainder import Remainder
 
 Array = NDArray[np.float64]
 
@@ -116,6 +117,10 @@ class Verdict:
         direction.
     fits
         Numbers of the better model with their covariance, one for each group of blocks that share some.
+    remainder
+        What is left without a name in the block that is furthest from its floor; ``None`` if nothing is.
+    next_steps
+        What to measure next to tell apart what these records cannot.
     """
 
     verdict: str
@@ -130,6 +135,8 @@ class Verdict:
     unidentified: tuple[str, ...] = ()
     shapes: Mapping[str, tuple[Binned, Binned]] = field(default_factory=dict)
     fits: tuple[Fit, ...] = ()
+    remainder: Remainder | None = None
+    next_steps: tuple[str, ...] = ()
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.
@@ -179,6 +186,8 @@ class Verdict:
             said += "of the excess over the noise on records that no fit has seen. "
             if effect.aliases:
                 said += f"As good an explanation: {', '.join(effect.aliases)}. "
+        if self.remainder is not None:
+            said += (" " if said else "") + self.remainder.words()
         return said.strip()
 
     def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
@@ -222,6 +231,8 @@ class Verdict:
             },
             "runners_up": [{"name": n, "share": s} for n, s in self.runners_up],
             "unidentified": list(self.unidentified),
+            "remainder": None if self.remainder is None else self.remainder.to_dict(),
+            "next": list(self.next_steps),
             "model": model,
         }
 
@@ -240,4 +251,4 @@ class Verdict:
         ]
 
     def __str__(self) -> str:
-        return "\n".join([f"verdict: {self.verdict}", self.words(), *self.where])
+        return "\n".join([f"verdict: {self.verdict}", self.words(), *self.where, *self.next_steps])

@@ -1,0 +1,62 @@
+"""What is said of an error without a name, on errors made here with known shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from nlsdesign.discrepancy.advice import advice, experiment
+from nlsdesign.discrepancy.sparse import sparse_formula
+
+Array = NDArray[np.float64]
+
+
+def motion(seed: int) -> tuple[Array, Array]:
+    """Angle and speed of a sum of three sines."""
+    draw = np.random.default_rng(seed)
+    time = np.arange(0.0, 10.0, 0.01)
+    rates, phases = draw.uniform(1.0, 9.0, 3), draw.uniform(0.0, 6.0, 3)
+    angle = sum(np.sin(w * time + p) / 3 for w, p in zip(rates, phases, strict=True))
+    speed = sum(w * np.cos(w * time + p) / 3 for w, p in zip(rates, phases, strict=True))
+    return np.asarray(angle), np.asarray(speed)
+
+
+def parts(law: str) -> list[tuple[Array, dict[str, Array], bool]]:
+    found = []
+    for seed in range(4):
+        angle, speed = motion(seed)
+        noise = 0.01 * np.random.default_rng(100 + seed).standard_normal(len(angle))
+        error = {
+            "cubic": 0.5 * angle**3,
+            "dry": 0.2 * np.sign(speed) * np.abs(angle),
+            "noise": np.zeros_like(angle),
+        }[law] + noise
+        found.append((error, {"q": angle, "rate of q": speed}, seed < 3))
+    return found
+
+
+def test_a_cubic_force_is_written_as_one_term() -> None:
+    found = sparse_formula(parts("cubic"), "N")
+    assert found is not None
+    assert list(found.terms) == ["[q]³"]
+    assert found.terms["[q]³"] == pytest.approx(0.5, rel=0.02)
+    assert found.share > 0.95
+
+
+def test_friction_in_proportion_to_the_angle_is_written_as_one_term() -> None:
+    found = sparse_formula(parts("dry"), "N")
+    assert found is not None
+    assert list(found.terms) == ["sign([rate of q])·|[q]|"]
+    assert found.terms["sign([rate of q])·|[q]|"] == pytest.approx(0.2, rel=0.02)
+
+
+def test_no_formula_is_written_for_noise() -> None:
+    assert sparse_formula(parts("noise"), "N") is None
+
+
+def test_each_alias_gets_a_sentence_with_an_experiment_or_a_place() -> None:
+    said = advice("cable_slack", {"permanent_set": "here", "brand_new": "they differ in 'a'"})
+    assert len(said) == 2
+    assert str(experiment("permanent_set", "cable_slack")) in said[0]
+    assert said[1] == "cable_slack or brand_new: they differ in 'a'."
