@@ -26,13 +26,14 @@ from nlsdesign.components import (
     SlidingFillers,
     Softening,
     Spring,
+    Springpot,
     ViscousMaterial,
     maxwell,
     parallel,
 )
 from nlsdesign.errors import ArrangementError, ValueRangeError
 from nlsdesign.simulation import Trace
-from tests.stretched import AREA, VOLUME, pulled, run
+from tests.stretched import AREA, LENGTH, VOLUME, pulled, run
 
 MU, R, M, WIDTH = 0.6e6, 1.8, 0.12e6, 1e-3
 
@@ -182,6 +183,17 @@ def test_work_on_a_set_is_stored_or_lost_while_it_grows() -> None:
     assert 0.0 <= work[8000] - work[4000] < 1.05 * share * modulus * (1 - share) * 0.5 * lag
 
 
+def test_laws_inside_a_set_see_the_rate_of_what_is_left() -> None:
+    """A dashpot: η·(1 − c)·ε̇ while the set grows, η·ε̇ on the way back."""
+    law = PermanentSet(members=(("oil", ViscousMaterial(viscosity=2e4)),), share=0.3)
+    trace = cycled(law, [0.5])
+    stress, rate = trace["rubber.force"] / AREA, trace["grip.speed"] / LENGTH
+    growing = (trace.time > 0.15) & (trace.time < 0.45)
+    assert stress[growing] == pytest.approx(0.7 * 2e4 * rate[growing], rel=2e-3)
+    back = (trace.time > 0.55) & (trace.time < 0.95)
+    assert stress[back] == pytest.approx(2e4 * rate[back], rel=1e-9)
+
+
 @settings(max_examples=8, deadline=None)
 @given(st.lists(st.floats(0.05, 1.0), min_size=2, max_size=4), st.floats(0.0, 0.5))
 def test_no_path_wins_energy_from_a_set_around_fading_memory(peaks: list[float], share: float) -> None:
@@ -240,6 +252,17 @@ def test_the_steady_rise_is_the_loss_of_a_cycle_over_the_cooling() -> None:
     assert power == pytest.approx(w / 2 * loss_modulus * 0.3**2, rel=1e-4)
 
 
+def test_the_heat_of_a_springpot_is_that_of_its_loss_modulus() -> None:
+    """Mean power ω/2·E''·ε² with E'' = |E*|·sin(α·π/2) of the exact law, to the error of the series."""
+    pot = Springpot(modulus=1e6, reference=4.0, order=0.15, lower=0.1, upper=100.0)
+    law = SelfHeating(members=(("pot", pot),), heat_capacity=1e6, cooling=0.0, softening=0.0, ambient=AMBIENT)
+    trace = shaken(law, 3.0)
+    power = float(np.mean(trace["rubber.law.lost_power"][-1001:-1]))
+    loss_modulus = 1e6 * math.sin(0.15 * math.pi / 2)
+    assert power == pytest.approx(math.pi * 4.0 * loss_modulus * 0.3**2, rel=0.03)
+    assert pot.largest_error / math.sin(0.15 * math.pi / 2) < 0.03, "error of the modulus over its lossy part"
+
+
 def test_a_warm_piece_pulls_less_and_beyond_half_its_modulus_the_result_says_so() -> None:
     trace = shaken(hot(0.03, cooling=0.0, capacity=2e4), 1.0)
     warming = trace["rubber.law.warming"]
@@ -254,7 +277,7 @@ def test_heat_comes_from_fillers_dashpots_and_softening_alike() -> None:
     """A closed cycle at b = 0 without cooling: C·T' is the work that did not come back."""
     inside: dict[str, Element] = {
         "fillers": SlidingFillers(modulus=1e6, yield_stress=5e4),
-        "mullins": soft(1e-4),
+        "mullins": soft(0.1),
         "set": PermanentSet(members=(("law", NeoHooke(shear_modulus=3e5)),), share=0.1),
         "branch": maxwell(modulus=BRANCH, viscosity=ETA),
         "dashpot": ViscousMaterial(viscosity=2e3),
