@@ -11,6 +11,7 @@ from pathlib import Path
 import casadi as ca
 
 from ..errors import ExportError
+from ..writing import write_bytes
 from .compile import cache_folder, compile_library
 
 
@@ -43,7 +44,8 @@ def natively(function: ca.Function) -> ca.Function:
             source.write_text(text, encoding="utf-8")
             # Without this word CasADi's code hides the names by which it is found again.
             flags = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")
-            os.replace(compile_library([source], Path(name) / library.name, flags=flags), library)
+            built = compile_library([source], Path(name) / library.name, flags=flags)
+            write_bytes(library, built.read_bytes())
     try:
         return ca.external(function.name(), str(library))
     except RuntimeError as error:
