@@ -17,6 +17,7 @@ import casadi as ca
 from ..errors import ArrangementError
 from ..symbolic import Expression, depends, solve_monotone, symbol
 from .part import RESERVED, Part, check_names
+from .split import split
 from .switches import Switches
 
 
@@ -332,6 +333,8 @@ def _shared(
     inside = scope.child(name)
     if len(members) == 1:
         return observed_effort(first, inside, motion, rate)
+    if len(members) > 2:
+        return _shared_by_many(members, scope, motion, rate)
     whole, whole_rate = symbol(f"{scope.path}.whole"), symbol(f"{scope.path}.whole_rate")
     share, share_rate = symbol(f"{inside.path}.share"), symbol(f"{inside.path}.share_rate")
     one = observed_effort(first, inside, share, share_rate)
@@ -347,6 +350,34 @@ def _shared(
     return ca.substitute(
         one, ca.vertcat(share, whole), ca.vertcat(ca.substitute(solution, whole, motion), motion)
     )
+
+
+def _shared_by_many(
+    members: list[tuple[str, Element]], scope: Scope, motion: Expression, rate: Expression
+) -> Expression:
+    """Return the effort of three or more members in series none of which needs the rate."""
+    whole, whole_rate = symbol(f"{scope.path}.whole"), symbol(f"{scope.path}.whole_rate")
+    insides = [scope.child(name) for name, _ in members]
+    shares = [symbol(f"{inside.path}.share") for inside in insides]
+    rates = [symbol(f"{inside.path}.share_rate") for inside in insides]
+    laws = zip(members, insides, shares, rates, strict=True)
+    efforts = [observed_effort(member, inside, z, v) for (_, member), inside, z, v in laws]
+    solutions = ca.vertcat(*split(efforts, shares, whole))
+    if any(depends(ca.jacobian(f, z), z) for f, z in zip(efforts, shares, strict=True)):
+        first = efforts[0]
+        for other, inside in zip(efforts[1:], insides[1:], strict=True):
+            relative = (other - first) / (1 + ca.fabs(other) + ca.fabs(first))
+            scope.check(f"{inside.path}.share", ca.substitute(relative, ca.vertcat(*shares), solutions))
+    if any(scope.rate_is_used(v) for v in rates):
+        pairs = zip(efforts, shares, rates, strict=True)
+        drifts = [scope.total_rate(f, {z: v}) for f, z, v in pairs]
+        for v, found in zip(rates, split(drifts, rates, whole_rate), strict=True):
+            scope.define(v, found)
+    for z, found in zip(shares, ca.vertsplit(solutions), strict=True):
+        scope.define(z, found)
+    scope.define(whole, motion)
+    scope.define(whole_rate, rate)
+    return ca.substitute(efforts[0], shares[0], ca.substitute(solutions[0], whole, motion))
 
 
 def parallel(**members: Element) -> Parallel:
