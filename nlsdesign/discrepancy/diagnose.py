@@ -21,6 +21,7 @@ from .compare import Comparison
 from .cuts import blocks_of
 from .effects import ALL, Effect
 from .hypothesis import Hypothesis
+from .late import late_forces
 from .locate import DECLARED, Excess, excesses
 from .outcome import course_of, gaps_of, shapes_of
 from .remainder import Remainder, remainder_of
@@ -72,10 +73,15 @@ def diagnose(
     comparison = Comparison(bench, typical_sizes(actuator, records))
     base = comparison.base(actuator)
     findings = [*records.findings, *suspicions_of(comparison, base)]
-    if findings:
+    late = late_forces(actuator, records)
+    if findings or (late.findings and not late.testable):
+        findings += late.findings
         outcome = Outcome(base, (), (), False)
         return _verdict(comparison, base, outcome, ("data_suspect", tuple(str(f) for f in findings)))
     outcome = search(comparison, base, catalogue, progress)
+    if late.findings and not any("delay" in step.chosen.added[-1].effect for step in outcome.steps):
+        told = tuple(str(f) for f in late.findings)
+        return _verdict(comparison, base, outcome, ("data_suspect", told))
     return _verdict(comparison, base, outcome, (_word(comparison, base, outcome), ()))
 
 

@@ -18,6 +18,7 @@ _GAP = 1.5
 _JITTER = 0.02
 """Steps that differ by more than this share are interpolated to a uniform grid."""
 _CLIPPED_RUN = 5
+_APPROACH, _MISSING_COUNTS = 3, 3.0
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def suspicions(file: str, head: str, values: Array, *, first_row: int = 2) -> li
         return []
     for extreme, word in ((values.max(), "largest"), (values.min(), "smallest")):
         run = _longest_run(values == extreme)
-        if len(run) >= _CLIPPED_RUN:
+        if len(run) >= _CLIPPED_RUN and _cut_off(values, run):
             return [
                 Finding(
                     f"{place}, {_rows(run, first_row)}",
@@ -143,6 +144,17 @@ def suspicions(file: str, head: str, values: Array, *, first_row: int = 2) -> li
                 )
             ]
     return []
+
+
+def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:
+    """Tell whether a signal came too fast to have turned by itself where it rests on an extreme."""
+    first, last = int(run[0]), int(run[-1])
+    sides = values[max(first - _APPROACH, 0) : first + 1], values[last : last + _APPROACH + 1]
+    slopes = [abs(part[-1] - part[0]) / (len(part) - 1) for part in sides if len(part) > 1]
+    half = 0.5 * len(run)
+    # The peak of the parabola that has this slope half of the approach before the run.
+    missing = 0.5 * half**2 * max(slopes, default=0.0) / (half + 0.5 * _APPROACH)
+    return missing > _MISSING_COUNTS * max(quantum_of(values), noise_of(values))
 
 
 def _first_run(indices: NDArray[np.intp]) -> NDArray[np.intp]:
