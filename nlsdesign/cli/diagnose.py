@@ -12,8 +12,7 @@ from ..components.declare import declare
 from ..deck import load_deck
 from ..discrepancy import diagnose as find_what_is_missing
 from ..discrepancy import predict, write_verdict
-from ..errors import unknown_name
-from ..identification import load_records
+from ..identification import load_record, load_records
 from ..model import flatten
 from ..progress import Steps
 from ..report import verdict_sections, write_report
@@ -60,13 +59,11 @@ def diagnose(
 def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
     """Drive the model with a measured record and write what it predicts of the measured signals."""
     actuator = declare(load_deck(deck_name))
-    found = load_records(record.parent, flatten(actuator), mapping=mapping)
-    names = {each.name: each for each in found.records}
-    if record.stem not in names:
-        raise unknown_name("record", record.stem, names)
-    predicted = predict(actuator, found, record.stem)
+    found = load_record(record, flatten(actuator), mapping=mapping)
+    (measured,) = found.records
+    predicted = predict(actuator, found, measured.name)
     predicted.write_csv(out)
-    rows = agreement_rows(names[record.stem].trace, predicted)
+    rows = agreement_rows(measured.trace, predicted)
     if as_json:
         rms = {name: float(value) for name, value, _ in rows}
         show_json({"file": out, "rms": rms, "warnings": [str(each) for each in predicted.warnings]})

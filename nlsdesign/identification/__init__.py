@@ -2,7 +2,7 @@
 
 from .fit import Fit, fit
 from .losses import Huber, Loss, Squares
-from .measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_records
+from .measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_record, load_records
 from .metrics import Agreement, agreement, rmse
 from .multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
 from .parameters import Parameter, declared_parameter, free_parameter
@@ -36,6 +36,7 @@ __all__ = [
     "fit",
     "fit_by_simulation",
     "free_parameter",
+    "load_record",
     "load_records",
     "predict_in_windows",
     "rmse",

@@ -157,6 +157,44 @@ def load_records(
     return RecordSet(split(records, held, chosen.selection), chosen.columns, tuple(findings))
 
 
+def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) -> RecordSet:
+    """Read one table as a record of its own, whole, whatever else stands in its folder.
+
+    Parameters
+    ----------
+    file
+        As for :func:`load_records`.
+    model
+        Whose signals are measured.
+    mapping
+        As for :func:`load_records`; by default ``records.toml`` beside the file.
+
+    Returns
+    -------
+    RecordSet
+        With this record alone; its role is ``"held_out"``.
+
+    Raises
+    ------
+    MeasurementError
+        If the file does not exist, or cannot be used as it stands.
+    """
+    file = Path(file)
+    if not file.is_file():
+        near = nearest(file.name, [f.name for f in file.parent.glob("*")] if file.parent.is_dir() else [])
+        raise MeasurementError(str(file), "there is no such file", did_you_mean=near)
+    beside = file.parent / "records.toml"
+    path = mapping or (beside if beside.exists() else None)
+    given = read_mapping(path) if path else None
+    table = read_table(file)
+    if not _is_run(table.heads, given):
+        raise MeasurementError(file.name, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+    chosen = given or default_mapping(table.heads, model, file.name)
+    check_signals(file.name, chosen.columns, model)
+    record, findings = _record(file, table, chosen)
+    return RecordSet((replace(record, role="held_out"),), chosen.columns, tuple(findings))
+
+
 def _is_run(heads: Sequence[str], mapping: ColumnMap | None) -> bool:
     """Tell whether a file is a record: tables without any of the columns may lie in the same folder."""
     if mapping is not None:

@@ -171,7 +171,9 @@ def test_the_observer_in_c_agrees_with_the_observer_in_python_to_1e_12(tmp_path)
     assert {status for pair in pairs for _, status in pair} == {0}
     size = np.abs(expected).max(axis=0)
     assert np.all(size > 0)
-    assert np.all(np.abs(found - expected).max(axis=0) <= 1e-12 * size)
+    # An innovation is the difference of two angles: it cannot be known better than these are rounded.
+    rounding = np.finfo(float).eps * np.abs(angle).max()
+    assert np.all(np.abs(found - expected).max(axis=0) <= 1e-12 * size + rounding)
 
 
 # --- the integrator itself ------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.errors import MeasurementError
-from nlsdesign.identification import RecordSet, load_records
+from nlsdesign.identification import RecordSet, load_record, load_records
 from nlsdesign.model import FlatModel, flatten
 
 STEP, COUNT = 0.002, 400
@@ -64,6 +64,15 @@ signal = "cell.reading"
 unit = "N*m"
 noise = 0.01
 """
+
+
+def test_a_record_that_is_alone_is_read_whole(tmp_path: Path, model: FlatModel) -> None:
+    file = write(tmp_path, "a", table())
+    (tmp_path / "records.toml").write_text(MAPPING, encoding="utf8")
+    (only,) = load_record(file, model).records
+    assert (only.name, len(only.trace), only.role) == ("a", COUNT, "held_out")
+    with pytest.raises(MeasurementError, match=r"did you mean 'a\.csv'"):
+        load_record(tmp_path / "b.csv", model)
 
 
 @pytest.fixture
