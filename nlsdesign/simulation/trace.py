@@ -144,7 +144,8 @@ class Trace:
             f"Trace {self.name}: {len(self.signals)} signals, {len(self)} samples "
             f"from {self.time[0]:g} s to {self.time[-1]:g} s"
         )
-        return "\n".join([head, *(f"  warning: {each}" for each in self.warnings)])
+        happened = [f"  {len(self.events)} events, the first at {self.events[0]}"] if self.events else []
+        return "\n".join([head, *happened, *(f"  warning: {each}" for each in self.warnings)])
 
     def with_signals(self, signals: Mapping[str, Array], units: Mapping[str, str]) -> Trace:
         """Return a copy with more (or other) signals.

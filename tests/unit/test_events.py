@@ -82,6 +82,7 @@ def test_events_are_told_in_words_and_in_order() -> None:
     run = simulate(gear(), np.linspace(0.0, 0.3, 31), inputs={"motor.torque": Sine(0.1, 5.0)})
     assert all(isinstance(e, Event) for e in run.events)
     assert [e.time for e in run.events] == sorted(e.time for e in run.events)
+    assert f"{len(run.events)} events, the first at {run.events[0]}" in str(run)
     assert str(run.events[0]) == f"{run.events[0].time:.9g} s: rub slips forward"
 
 
