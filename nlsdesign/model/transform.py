@@ -180,7 +180,8 @@ def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatMo
     fresh = [found[known[name].element_hash()] for name in names]
     kept = [i for i, v in enumerate(model.signals) if keep or v.name not in names]
     rest = _column([s.signal[i] for i in kept])
-    columns = _regrown([s.derivative, s.output, rest, s.residual], found)
+    followed = ca.SX(0, 1) if keep else rest
+    columns = _regrown([s.derivative, s.output, followed, s.residual], found)
     changed = s._replace(
         input=_column([s.input, *fresh]),
         derivative=columns[0], output=columns[1], signal=rest if keep else columns[2], residual=columns[3],
