@@ -8,6 +8,7 @@ from .multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
 from .parameters import Parameter, declared_parameter, free_parameter
 from .prediction import Prediction, predict_in_windows
 from .quality import Finding
+from .residuals import noise_of
 from .simulation_error import Shots, SimulationError, Weights
 from .wiring import Wiring, wired
 
@@ -38,6 +39,7 @@ __all__ = [
     "free_parameter",
     "load_record",
     "load_records",
+    "noise_of",
     "predict_in_windows",
     "rmse",
     "wired",

@@ -176,7 +176,7 @@ class Shooter:
             rows = ca.substitute(rows, fixed, ca.DM(model.start(model.parameters)[rest]))
         nx = len(model.states)
         self.size = nx
-        self._rate = ca.Function("rate", [s.state, s.input, p], [rows[:nx]])
+        self._rate = ca.Function("rate", [s.state, s.input, p], [ca.reshape(rows[:nx], nx, 1)])
         self._see = _observed(ca.Function("see", [s.state, s.input, p], [rows[nx:]]), self._columns)
         self._maps: dict[tuple[int, int, float], ca.Function] = {}
 
