@@ -125,9 +125,8 @@ def main() -> None:
     samples = sum(len(r.trace) for r in runs)
     print(f"{len(TRUE)} parameters, {len(runs)} records, {samples} samples of {len(MEASURED)} positions")
     print("                                     seconds      cost   rms error of the numbers")
-    print(
-        f"multiple shooting, {own.iterations:3d} steps      {seconds:10.2f} {own.fit.cost:10.1f}   {_rms(off)}"
-    )
+    steps = f"multiple shooting, {own.iterations:3d} steps      "
+    print(f"{steps}{seconds:10.2f} {own.fit.cost:10.1f}   {_rms(off)}")
     print(f"least_squares, {count:5d} simulations {slow:10.2f} {cost:10.1f}   {_rms(numbers / true - 1.0)}")
     print(f"ratio of the times {slow / seconds:.0f} (goal: at least 20, below 5 s, at equal or lower cost)")
 

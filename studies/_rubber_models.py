@@ -74,7 +74,7 @@ def bench(actuator: Any) -> tuple[list[Any], list[Any], int]:
 
     def at(angle: float) -> float:
         start[names.index("motor.angle")] = angle
-        return model.evaluate(list(start))["spring.cable.extension"]
+        return float(model.evaluate(list(start))["spring.cable.extension"])
 
     stretch = np.array([at(angle) for angle in GRID])
     found: dict[str, list[Any]] = {"fit": [], "held_out": []}

@@ -13,7 +13,7 @@ from .contact import InextensibleCable
 from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .drives import DelayedMotor, SaturatingMotor
-from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, Series, parallel, series
+from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, parallel
 from .encoders import EccentricEncoder
 from .flowing import FlowingChains
 from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
@@ -30,6 +30,7 @@ from .part import Part
 from .play import Backlash, InertialBacklash, LooseCable, Play, Slack, Turned
 from .sampling import SampleAndHold, SampledEncoder, Tachometer
 from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
+from .series import Series, series
 from .slide import ConstantForce, LinearDrive, SlidingFriction
 from .smooth import Sharp, smoothed
 from .springpot import Springpot

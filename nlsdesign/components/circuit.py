@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from .element import Combination, Element, Series
+from .element import Combination, Element
 from .networks import Through
+from .series import Series
 
 GLYPHS = {
     "spring": "╱╲╱╲",

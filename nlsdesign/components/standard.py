@@ -11,7 +11,8 @@ from typing import TypeAlias
 from ..errors import ValueRangeError
 from ..quantity import Quantity
 from .dampers import ViscousMaterial
-from .element import Element, Parallel, Series, parallel, series
+from .element import Element, Parallel, parallel
+from .series import Series, series
 from .springs import LinearElastic
 
 Number: TypeAlias = Quantity | float
