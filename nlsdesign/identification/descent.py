@@ -68,6 +68,8 @@ def minimise(
     x, damping = start, _FIRST_DAMPING
     residual, slope = rows(x)
     cost = 0.5 * float(residual @ residual)
+    if not x.size:
+        return Minimum(x, cost, True)  # nothing is free: what is known is all there is
     for _ in range(evaluations):
         gradient, curvature = slope.T @ residual, slope.T @ slope
         step = _step(gradient, curvature, damping, (x, low, high))
