@@ -120,10 +120,17 @@ class _Seeker:
         steps: list[Step] = []
         ranking: tuple[tuple[Candidate, float], ...] = ()
         present = start
-        while self._worthwhile(start, present) and len(steps) < _MOST_EFFECTS:
-            tried = self._tried(present, before)
+        while (lacking := self._lacking(start, present)) and len(steps) < _MOST_EFFECTS:
+            tried: list[Hypothesis] = []
+            step = None
+            for block in lacking:
+                # Effects elsewhere wait for their turn: most blocks have an effect of their own.
+                fresh = self._tried(present, block, tried)
+                tried += fresh
+                step = _best_step(self._comparison, (first, before), fresh)
+                if step is not None:
+                    break
             ranking = ranking or _ranked(self._comparison, before, tried)
-            step = _best_step(self._comparison, (first, before), tried)
             steps += [step] if step else self._pair(tried, (first, before))
             if not steps or steps[-1].chosen is present:
                 break
@@ -146,20 +153,25 @@ class _Seeker:
                 place += 1
         return steps
 
-    def _worthwhile(self, start: Hypothesis, present: Hypothesis) -> bool:
-        """Tell whether some open block still lacks enough for a further effect to count."""
+    def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
+        """Return the blocks that lack enough for a further effect to count, the largest excess first.
+
+        Strained numbers count only where no block does.
+        """
         bench, full = self._comparison.bench, self._comparison.on_all_samples
         first, now = excesses(full(start), bench), excesses(full(present), bench)
-        return any(e.open and sum(e.excess) >= LEAST_SECOND * sum(first[n].excess) for n, e in now.items())
+        lack = [n for n, e in now.items() if e.open and sum(e.excess) >= LEAST_SECOND * sum(first[n].excess)]
+        blocks = sorted((n for n in lack if n != DECLARED), key=lambda n: -sum(now[n].excess))
+        return blocks or lack
 
     def _candidates(self, present: Hypothesis) -> list[Candidate]:
         return [c for effect in self._catalogue for c in effect(present.assembly)]
 
-    def _tried(self, present: Hypothesis, before: dict[str, Excess]) -> list[Hypothesis]:
-        """Return fits of the candidates that act on an open block."""
-        wanted = {n for n, e in before.items() if e.open}
-        tasks = [(present, c) for c in self._candidates(present)]
-        return self._fits(tasks, set() if wanted == {DECLARED} else wanted)
+    def _tried(self, present: Hypothesis, block: str, done: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return fits of the candidates that act on a block and were not tried before."""
+        known = {(h.added[-1].effect, h.added[-1].location) for h in done}
+        tasks = [(present, c) for c in self._candidates(present) if (c.effect, c.location) not in known]
+        return self._fits(tasks, () if block == DECLARED else (block,))
 
     def _fits(
         self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
