@@ -127,11 +127,11 @@ class _Seeker:
                 # Effects elsewhere wait for their turn: most blocks have an effect of their own.
                 fresh = self._tried(present, block, tried)
                 tried += fresh
-                step = _best_step(self._comparison, (first, before), fresh)
+                step = _best_step(self._comparison, (first, before), fresh, block)
                 if step is not None:
                     break
             ranking = ranking or _ranked(self._comparison, before, tried)
-            steps += [step] if step else self._pair(tried, (first, before))
+            steps += [step] if step else self._pair(tried, (first, before), lacking[0])
             if not steps or steps[-1].chosen is present:
                 break
             present = steps[-1].chosen
@@ -189,7 +189,7 @@ class _Seeker:
         return found
 
     def _pair(
-        self, tried: Sequence[Hypothesis], known: tuple[dict[str, Excess], dict[str, Excess]]
+        self, tried: Sequence[Hypothesis], known: tuple[dict[str, Excess], dict[str, Excess]], block: str
     ) -> list[Step]:
         """Return two effects that help together where none helps alone."""
         bench = self._comparison.bench
@@ -201,7 +201,7 @@ class _Seeker:
             if again is not None
         ]
         pairs = self._fits(tasks)
-        step = _best_step(self._comparison, known, pairs)
+        step = _best_step(self._comparison, known, pairs, block)
         if step is None:
             return []
         lone = next(h for h in best if h.added[-1].effect == step.chosen.added[-2].effect)
@@ -234,23 +234,31 @@ class _Seeker:
 
 
 def _best_step(
-    comparison: Comparison, known: tuple[dict[str, Excess], dict[str, Excess]], tried: Sequence[Hypothesis]
+    comparison: Comparison,
+    known: tuple[dict[str, Excess], dict[str, Excess]],
+    tried: Sequence[Hypothesis],
+    block: str,
 ) -> Step | None:
+    """Return the simplest of the hypotheses that leave least in a block, without spoiling another."""
     first, before = known
     looks = [(h, excesses(h, comparison.bench)) for h in tried]
     able = [(h, after) for h, after in looks if _helps(first, before, after)]
     if not able:
         return None
-    least = min(total_excess(after) for _, after in able)
-    margin = SAME * total_excess(before) + _NOISE
-    equal = [(h, after) for h, after in able if total_excess(after) <= least + margin]
+
+    def left(after: dict[str, Excess]) -> float:
+        spoilt = sum(max(0.0, sum(e.excess) - sum(before[n].excess)) for n, e in after.items() if n != block)
+        return sum(after[block].excess) + spoilt
+
+    least, whole = min(left(after) for _, after in able), sum(before[block].excess)
+    equal = [(h, after) for h, after in able if left(after) <= least + SAME * whole + _NOISE]
     chosen, after = min(equal, key=lambda pair: (len(pair[0].added[-1].unknowns), total_excess(pair[1])))
     size = len(chosen.added[-1].unknowns)
-    limit = total_excess(after) + ALIAS * total_excess(before) + _NOISE
+    limits = left(after) + ALIAS * whole + _NOISE, total_excess(after) + ALIAS * whole + _NOISE
     alike = {
         h.added[-1].effect: h
-        for h, left in reversed(equal)
-        if h is not chosen and len(h.added[-1].unknowns) <= size and total_excess(left) <= limit
+        for h, other in reversed(equal)
+        if len(h.added[-1].unknowns) <= size and left(other) <= limits[0] and total_excess(other) <= limits[1]
     }
     alike.pop(chosen.added[-1].effect, None)
     return Step(chosen, *_best_shares(before, after), tuple(alike.values()))

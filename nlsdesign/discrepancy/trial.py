@@ -32,6 +32,14 @@ class _Task:
     seen: list[Evidence]
 
 
+def _promise(seen: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
+    """Return the cost that the linearised problem would reach; infinite where there is no response."""
+    try:
+        return predicted_cost(seen, parameters)
+    except ConvergenceError:
+        return float("inf")
+
+
 class Trials:
     """Fits groups of blocks to the records.
 
@@ -94,16 +102,21 @@ class Trials:
         if any(e.driven.stiff for e in task.seen):
             # Short steps are dear, and where a body flies freely the valley is rough at the bottom.
             limits = _DEAR, limits[1]
-        choices = [
-            (predicted_cost(task.seen, ps) if len(task.choices) > 1 else 0.0, ps) for ps in task.choices
-        ]
+        several = len(task.choices) > 1
+        choices = [(_promise(task.seen, ps) if several else 0.0, ps) for ps in task.choices]
         best: Fit | None = None
         for promised, choice in sorted(choices, key=lambda pair: pair[0])[:_FULL_STARTS]:
             # What does not even promise to reach the best so far is left alone.
-            if best is None or promised < best.cost:
+            if best is not None and promised >= best.cost:
+                continue
+            try:
                 found = fit(task.seen, choice, evaluations=limits[0], tolerance=limits[1], least=least)
-                best = found if best is None or found.cost < best.cost else best
-        assert best is not None
+            except ConvergenceError as error:
+                failed = error  # one start in a place where there is no response says nothing of others
+                continue
+            best = found if best is None or found.cost < best.cost else best
+        if best is None:
+            raise failed
         return best, task.everything
 
     def _task(self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]) -> _Task:

@@ -102,9 +102,13 @@ def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
         As declared.
     """
     found = []
-    for path in stretched(assembly):
-        if is_inside(assembly, path, Slack) or assembly[path].domain != TRANSLATION:  # type: ignore[attr-defined]
+    for inner in stretched(assembly):
+        if is_inside(assembly, inner, Slack) or assembly[inner].domain != TRANSLATION:  # type: ignore[attr-defined]
             continue
+        # True contact asks where the piece inside rests; inside a slack wrapper it would rest anywhere.
+        path, owner = inner, inner.rpartition(".")[0]
+        while owner and isinstance(assembly[owner], InextensibleCable):
+            path, owner = owner, owner.rpartition(".")[0]
         length = Quantity(1e-4, "m", SOURCE)
         edited = wrapped(assembly, path, "slack", _slack(length))
         of = f"{path}.extension"
