@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 
 _MOST = 4
+_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of Linux."""
 _work: Callable[[int], Any] | None = None
 
 
@@ -38,8 +42,10 @@ def shared_out(work: Callable[[int], T], count: int) -> Iterator[T]:
 
 
 def _quiet() -> None:
-    """Leave an interruption to the process that waits."""
+    """Leave an interruption to the process that waits, and end with it, however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGTERM)
 
 
 def _piece(number: int) -> Any:
