@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import nlsdesign as nls
 
@@ -32,3 +33,13 @@ def skipped(name: str, out: Path) -> dict[str, float]:
     print(f"skipped: {why}")
     nls.write_report(out / "report.html", nls.Chapter("Skipped", why), title=f"{name}: skipped")
     return {}
+
+
+def gap_figure(verdict: Any, out: Path) -> None:
+    """Write ``gap.svg``: the error on each record before and after, with the noise floor."""
+    gaps = [g for g in verdict.gaps if g.block == verdict.block]
+    rows = [
+        nls.figures.RecordError(g.record, g.before, g.after, g.noise_floor, g.role == "held_out")
+        for g in gaps
+    ]
+    nls.figures.write_figures(out, {"gap": nls.figures.gap_bars(rows, unit=gaps[0].unit)})

@@ -15,7 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 
 import nlsdesign as nls
 
-from ._measured import data_folder, skipped
+from ._measured import data_folder, gap_figure, skipped
 
 MAPPING = Path(__file__).with_name("emps_records.toml")
 WINDOWS = {"1s": 1.0, "3s1": 3.1}
@@ -51,6 +51,7 @@ def main(out: Path, fast: bool = False, steps: Any = None, data: Path | None = N
     with steps.step("fit by simulation, the balance of forces as prior"):
         better = refitted(verdict, records)
     nls.write_verdict(verdict, out)
+    gap_figure(verdict, out)
     nls.write_deck(better, out / "refitted.toml")
     (held,) = records.of("held_out")
     found = {

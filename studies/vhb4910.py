@@ -14,7 +14,7 @@ import numpy as np
 
 import nlsdesign as nls
 
-from ._measured import data_folder, skipped
+from ._measured import data_folder, gap_figure, skipped
 
 MAPPING = Path(__file__).with_name("vhb4910_records.toml")
 FORCE = "load_cell.reading"
@@ -41,6 +41,7 @@ def main(out: Path, fast: bool = False, steps: Any = None, data: Path | None = N
     with steps.step("diagnosis"):
         verdict = nls.diagnose(strip, records, progress=steps.note)
     nls.write_verdict(verdict, out)
+    gap_figure(verdict, out)
     better, numbers = verdict.actuator, verdict.actuator.quantities()
     found = {
         **{f"named_{e.name}": 1.0 for e in verdict.effects},

@@ -1,5 +1,6 @@
 """Measured records, noise, fits and their metrics."""
 
+from .evolution import Evolved, fit_by_cma
 from .fit import Fit, fit
 from .losses import Huber, Loss, Squares
 from .measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_record, load_records
@@ -7,6 +8,7 @@ from .metrics import Agreement, agreement, rmse
 from .multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
 from .parameters import Parameter, declared_parameter, free_parameter
 from .prediction import Prediction, predict_in_windows
+from .profile import Profile, profile_of
 from .quality import Finding
 from .residuals import noise_of
 from .simulation_error import Shots, SimulationError, Weights
@@ -16,12 +18,14 @@ __all__ = [
     "Agreement",
     "Column",
     "ColumnMap",
+    "Evolved",
     "Finding",
     "Fit",
     "Huber",
     "Loss",
     "Parameter",
     "Prediction",
+    "Profile",
     "Record",
     "RecordSet",
     "Shots",
@@ -35,12 +39,14 @@ __all__ = [
     "cut_in_time",
     "declared_parameter",
     "fit",
+    "fit_by_cma",
     "fit_by_simulation",
     "free_parameter",
     "load_record",
     "load_records",
     "noise_of",
     "predict_in_windows",
+    "profile_of",
     "rmse",
     "wired",
 ]

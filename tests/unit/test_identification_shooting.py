@@ -17,14 +17,17 @@ from nlsdesign.components import (
 )
 from nlsdesign.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
 from nlsdesign.identification import (
+    Fit,
     Huber,
     Record,
     Shots,
     SimulationError,
     Weights,
+    fit_by_cma,
     fit_by_simulation,
     free_parameter,
     predict_in_windows,
+    profile_of,
     wired,
 )
 from nlsdesign.identification.parameters import Parameter
@@ -210,3 +213,57 @@ def test_a_simulation_that_runs_away_is_no_result() -> None:
     stiff = model().with_values({"guide.damping": 1e6})
     with pytest.raises(ConvergenceError, match="not finite"):
         fit_by_simulation(stiff, [truth(1)], [], shots=Shots(7.98))
+
+
+def test_cma_ends_where_gauss_newton_does_with_many_more_simulations() -> None:
+    pytest.importorskip("cma")
+    shots = Shots(2.0, joined=False)
+    quick = fit_by_simulation(model(), [truth(1, seconds=4.0)], parameters(), shots=shots)
+    slow = fit_by_cma(model(), [truth(1, seconds=4.0)], parameters(), shots=shots, seed=3)
+    assert slow.cost == pytest.approx(quick.fit.cost, rel=1e-6)
+    for name in NAMES:
+        assert slow.values[name] == pytest.approx(quick.fit.values[name], rel=1e-3)
+    assert slow.simulations > 10 * quick.iterations
+    with pytest.raises(ConvergenceError, match="cannot join"):
+        fit_by_cma(model(), [truth(1, seconds=4.0)], parameters(), shots=Shots(2.0))
+
+
+def test_the_profile_of_a_known_number_is_its_parabola() -> None:
+    weights, shots = Weights({"body.position": NOISE}), Shots(1.0)
+    fitted = fit_by_simulation(model(), [truth(1)], parameters(), shots=shots, weights=weights).fit
+
+    def refit(name: str, value: float) -> Fit:
+        rest = [p for p in parameters() if p.name != name]
+        held = model().with_values({name: value})
+        return fit_by_simulation(held, [truth(1)], rest, shots=shots, weights=weights).fit
+
+    found = profile_of(fitted, "spring.stiffness", refit, points=7)
+    error = fitted.standard_error("spring.stiffness")
+    assert found.rise.min() == pytest.approx(0.0, abs=0.01)
+    assert found.lower < fitted.values["spring.stiffness"] < found.upper
+    assert found.upper - found.lower == pytest.approx(2 * 1.96 * error, rel=0.25)
+    assert "between" in found.words()
+
+
+def test_a_number_that_the_records_leave_open_is_said_to_be_open() -> None:
+    """Without a push only ratios show: mass, stiffness and damping may all be twice as large."""
+    time = np.arange(0.0, 4.0, STEP)
+    swing = 0.05 * np.exp(-0.75 * time) * np.cos(6.28 * time)
+    noise = NOISE * np.random.default_rng(0).standard_normal(len(time))
+    signals = {"body.force": np.zeros(len(time)), "body.position": swing + noise}
+    record = Record("free", Trace(time, signals, {"body.force": "N", "body.position": "m"}, "free"))
+    weights, shots = Weights({"body.position": NOISE}), Shots(1.0)
+    fitted = fit_by_simulation(model(), [record], parameters(), shots=shots, weights=weights).fit
+    (words,) = fitted.unidentified()
+    assert all(name in words for name in NAMES)
+    assert words.count("up") == 3 or words.count("down") == 0
+    assert words.endswith("not known at all")
+
+    def refit(name: str, value: float) -> Fit:
+        rest = [p for p in parameters() if p.name != name]
+        return fit_by_simulation(
+            model().with_values({name: value}), [record], rest, shots=shots, weights=weights
+        ).fit
+
+    found = profile_of(fitted, "body.mass", refit, points=5, reach=1e-3)
+    assert found.words().startswith("body.mass: not bounded below or above")
