@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
-from .descent import minimise
+from .descent import Minimum, minimise
 from .evidence import Evidence
 from .parameters import Parameter as Parameter
 from .parameters import box
@@ -125,7 +125,11 @@ def fit(
     """
     rows = _Rows(evidence, parameters)
     low, high, start = box(parameters)
-    found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
+    if not parameters:
+        fixed = rows(start)[0]
+        found = Minimum(start, 0.5 * float(fixed @ fixed), True)
+    else:
+        found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
     if not np.isfinite(found.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
     residual, slope = rows(found.x)
