@@ -49,12 +49,25 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
     held = [pair for pair in mine if pair[0].record.role == "held_out"] or mine
     then, now = max(held, key=lambda pair: float(np.mean(np.square(pair[0].error))))
     target, trace, output = then.block.target, then.record.trace, then.block.model.outputs[0]
+    if target is None:
+        # A balance holds a second derivative: only filtered does it show more than noise.
+        places = then.floor.places
+        return Course(
+            then.record.name,
+            output.description,
+            output.unit,
+            trace.time[places],
+            np.zeros(len(places)),
+            -then.error,
+            -now.error,
+            float(np.mean(then.floor.sigma)),
+        )
     return Course(
         then.record.name,
-        target or output.description,
+        target,
         output.unit,
         trace.time,
-        trace[target] if target else np.zeros(len(trace)),
+        trace[target],
         then.predicted,
         now.predicted,
         float(np.mean(then.floor.raw_sigma)),
