@@ -1,8 +1,7 @@
 """Score of the diagnosis on records of the rig in ``tests/rig``, with yardsticks on the same records.
 
 The rig shares no model code with the package. A method gets the files that a bench would leave and nothing
-else; labels are read after it has decided. Thresholds were tuned on seeds below 100 (0 to 79 were also used
-by tests); report seeds from 100 on.
+else; labels are read after it has decided. Set thresholds on seeds below 100 and report seeds from 100 on.
 
     python -m benchmarks.discrepancy_score --seeds 100-110 --out score.jsonl
     python -m benchmarks.discrepancy_score --sample 4 --strengths strong --seeds 100-104 --out score.jsonl
