@@ -101,7 +101,7 @@ class Trials:
         least = _SMALL * now if before.coarse and new else 0.0
         if any(e.driven.stiff for e in task.seen):
             # Short steps are dear, and where a body flies freely the valley is rough at the bottom.
-            limits = _DEAR, limits[1]
+            limits = _DEAR if before.coarse else _DEAR // 3, limits[1]
         several = len(task.choices) > 1
         choices = [(_promise(task.seen, ps) if several else 0.0, ps) for ps in task.choices]
         best: Fit | None = None

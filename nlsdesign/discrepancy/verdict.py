@@ -187,7 +187,7 @@ class Verdict:
             if effect.aliases:
                 said += f"As good an explanation: {', '.join(effect.aliases)}. "
         if self.remainder is not None:
-            said += (" " if said else "") + self.remainder.words()
+            said = f"{said.strip()} {self.remainder.words()}"
         return said.strip()
 
     def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
