@@ -1,7 +1,8 @@
-"""A short formula for what is left: sequentially thresholded least squares on a small library.
+"""A short formula for what is left: orthogonal least squares on a small library, one term after the other.
 
-Brunton, Proctor and Kutz 2016 (STLSQ); here the threshold is chosen on records that the regression has not
-seen, and a term counts by what it contributes, not by the size of its coefficient.
+Chen, Billings and Luo 1989. Terms of the library resemble each other, so dropping small ones from the full
+regression leaves many large ones that cancel; adding the one that explains most of what is left does not.
+How many are kept is decided on records that the regression has not seen.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Part = tuple[Array, Mapping[str, Array], bool]
 
-_THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4)
+_MOST_TERMS = 5
 _LEAST = 0.3
+"""Share of the remainder that a formula must explain on other records to be worth telling."""
 _PER_TERM = 0.02
-_ROUNDS = 10
+"""Share that a further term must add there."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def sparse_formula(
     rest, target = np.vstack([table[i] for i in others]), np.concatenate([parts[i][0] for i in others])
     size = np.sqrt(np.mean(a**2, axis=0))
     kept = size > 1e-12 * size.max()
-    found = [_thresholded(a[:, kept] / size[kept], b, t) for t in _THRESHOLDS]
+    found = _one_by_one(a[:, kept] / size[kept], b)
     whole = float(target @ target)
     scored = []
     for weights in found:
@@ -99,18 +101,20 @@ def _library(signals: Mapping[str, Array]) -> dict[str, Array]:
     return found
 
 
-def _thresholded(a: Array, b: Array, threshold: float) -> Array:
-    """Return weights of normalised columns; terms below a share of the largest are dropped until none is."""
-    weights = np.zeros(a.shape[1])
-    active = np.arange(a.shape[1])
-    for _ in range(_ROUNDS):
-        solved = np.linalg.lstsq(a[:, active], b, rcond=1e-6)[0]
-        size = np.abs(solved)
-        stays = size >= threshold * max(float(np.sqrt(np.mean(b**2))), 1e-300)
-        if np.all(stays):
-            break
-        active = active[stays]
-        if not len(active):
-            return weights
-    weights[active] = np.linalg.lstsq(a[:, active], b, rcond=1e-6)[0]
-    return weights
+def _one_by_one(a: Array, b: Array) -> list[Array]:
+    """Return weights with one term, two, and so on; each is the term that explains most of the rest."""
+    active: list[int] = []
+    found, free = [], a / np.linalg.norm(a, axis=0)
+    for _ in range(min(_MOST_TERMS, a.shape[1])):
+        gains = np.abs(free.T @ b)
+        gains[active] = -1.0
+        active.append(int(np.argmax(gains)))
+        weights = np.zeros(a.shape[1])
+        weights[active] = np.linalg.lstsq(a[:, active], b, rcond=1e-6)[0]
+        found.append(weights)
+        taken = free[:, active[-1]]
+        free = free - np.outer(taken, taken @ free)
+        norms = np.linalg.norm(free, axis=0)
+        # A term that the others already hold would be noise, blown up.
+        free = np.where(norms > 1e-3, free / np.maximum(norms, 1e-300), 0.0)
+    return found
