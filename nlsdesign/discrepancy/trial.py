@@ -19,6 +19,8 @@ _FULL_STARTS = 3
 """So many starts are fitted to the end, the best by a linear look ahead."""
 _EVALUATIONS, _COARSE_EVALUATIONS, _COARSE_TOLERANCE = 40, 20, 3e-4
 _POLISHED, _DEAR = 2e-5, 6
+_LONG = 30_000
+"""Steps of so many operations are dear too."""
 _SMALL = 1e-3
 """A coarse fit ends when it promises to gain less than this share of the cost without the effect."""
 
@@ -102,6 +104,8 @@ class Trials:
         if any(e.driven.stiff for e in task.seen):
             # Short steps are dear, and where a body flies freely the valley is rough at the bottom.
             limits = _DEAR if before.coarse else _DEAR // 3, limits[1]
+        elif before.added and any(e.driven.instructions > _LONG for e in task.seen):
+            limits = _DEAR, limits[1]
         several = len(task.choices) > 1
         choices = [(_promise(task.seen, ps) if several else 0.0, ps) for ps in task.choices]
         best: Fit | None = None

@@ -61,6 +61,7 @@ class _Walk(NamedTuple):
     near: list[list[int]]
     stiff: bool
     mean: bool
+    instructions: int
 
 
 class _Equations(NamedTuple):
@@ -162,6 +163,11 @@ class DrivenBlock:
         """Whether some states move faster than the samples, as contact does; known once prepared."""
         return self._walk is not None and self._walk.stiff
 
+    @property
+    def instructions(self) -> int:
+        """How many operations one step with all its derivatives takes; known once prepared."""
+        return self._walk.instructions if self._walk is not None else 0
+
     def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
         """Return the output and its derivatives.
 
@@ -217,7 +223,7 @@ class DrivenBlock:
         tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
         rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
         near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
-        return _Walk(tables, Batch(step, chained=True), near, stiff=any(stiff), mean=mean)
+        return _Walk(tables, Batch(step, chained=True), near, any(stiff), mean, step.n_instructions())
 
     def _ends(self, inputs: Array, rates: Array, at: Array, step: float) -> tuple[Array, Array]:
         """Return what is known at both ends of every step; rates are those of the line in between."""
