@@ -85,6 +85,7 @@ def test_columns_of_different_clocks_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", [".parquet", ".mat", ".h5"])
 def test_a_file_that_is_no_table_is_refused(ending: str, tmp_path: Path) -> None:
+    pytest.importorskip({".parquet": "pyarrow", ".mat": "scipy", ".h5": "h5py"}[ending])
     file = tmp_path / f"broken{ending}"
     file.write_bytes(b"this is not a table" * 40)
     with pytest.raises(MeasurementError, match=rf"broken\{ending}.*cannot be read"):
