@@ -210,7 +210,10 @@ class _Seeker:
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
         """Return the same effect at the same kind of place of another assembly."""
-        same = [c for c in self._candidates(hypothesis) if c.effect == wanted.effect]
+        size = len(wanted.unknowns)
+        same = [
+            c for c in self._candidates(hypothesis) if c.effect == wanted.effect and len(c.unknowns) == size
+        ]
         ends = [c for c in same if c.location.split(".")[-1] == wanted.location.split(".")[-1]]
         return next(iter(ends or same), None)
 
@@ -256,12 +259,13 @@ def _best_step(
     size = len(chosen.added[-1].unknowns)
     limits = left(after) + ALIAS * whole + _NOISE, total_excess(after) + ALIAS * whole + _NOISE
     alike = {
-        h.added[-1].effect: h
+        h.added[-1].effect: (h, other)
         for h, other in reversed(equal)
         if len(h.added[-1].unknowns) <= size and left(other) <= limits[0] and total_excess(other) <= limits[1]
     }
-    alike.pop(chosen.added[-1].effect, None)
-    return Step(chosen, *_best_shares(before, after), tuple(alike.values()))
+    # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
+    chosen, after = alike.pop(next(reversed(alike)))
+    return Step(chosen, *_best_shares(before, after), tuple(h for h, _ in alike.values()))
 
 
 def _best_shares(before: dict[str, Excess], after: dict[str, Excess]) -> tuple[float, float]:
