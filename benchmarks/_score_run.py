@@ -15,7 +15,7 @@ from typing import Any
 from benchmarks._score_cases import Case
 from benchmarks._score_yardsticks import YARDSTICKS, MissingError, table_of
 from models.test_rig import test_rig_deck
-from nlsdesign.components import Assembly, InextensibleCable
+from nlsdesign.components import Assembly
 from nlsdesign.discrepancy import Verdict, diagnose
 from nlsdesign.identification import RecordSet, load_records
 from nlsdesign.model import flatten
@@ -104,11 +104,9 @@ def opened(folder: Path) -> tuple[Assembly, RecordSet]:
     Parameters
     ----------
     folder
-        With ``rig.toml``, ``cam.csv`` and the records. The rubber is free while its cable is slack.
+        With ``rig.toml``, ``cam.csv`` and the records.
     """
     declared = test_rig_deck(folder / "rig.toml", folder / "cam.csv")
-    members = declared.element("spring.cable").children()
-    declared = declared.with_part("spring.cable", InextensibleCable(members=tuple(members.items())))
     return declared, load_records(folder, flatten(declared))
 
 

@@ -20,12 +20,12 @@ def rig_set(
 ) -> tuple[Assembly, RecordSet]:
     """Write a set as a bench leaves it, and read it back as a user would."""
     write_set(folder, ACTUATORS[actuator], make_records(ACTUATORS[actuator], effects, seed))
-    declared = with_true_contact(declared_rig(folder / "rig.toml", folder / "cam.csv"))
+    declared = declared_rig(folder / "rig.toml", folder / "cam.csv")
     return declared, load_records(folder, flatten(declared))
 
 
 def with_true_contact(declared: Assembly) -> Assembly:
-    """Return the rig with rubber that is free while its cable is slack, as this rig's makers say it is."""
+    """Return the rig with rubber that is on its own while its cable is slack, which is not how it buckles."""
     members = declared.element("spring.cable").children()
     return declared.with_part("spring.cable", InextensibleCable(members=tuple(members.items())))
 

@@ -19,7 +19,7 @@ from nlsdesign.identification import load_records
 from nlsdesign.identification.evidence import Bench
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig, with_true_contact
-from tests.rig import ACTUATORS, make_records, write_set
+from tests.rig import ACTUATORS, make_records, with_slack_cable, write_set
 
 CASES = {
     "drive_delay": "arm",
@@ -38,7 +38,7 @@ RECORDS = ("sine_45deg_0.5Hz", "sine_25deg_2.0Hz", "sine_15deg_5.0Hz")
 
 @pytest.mark.parametrize("effect", CASES)
 def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> None:
-    actuator = ACTUATORS[CASES[effect]]
+    actuator = with_slack_cable(ACTUATORS[CASES[effect]])
     write_set(tmp_path, actuator, make_records(actuator, {effect: 1.0}, 21, only=RECORDS))
     declared = with_true_contact(declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv"))
     records = load_records(tmp_path, flatten(declared))

@@ -8,7 +8,7 @@ the step is fixed at 20 kHz.  Only numpy and the standard library are used.
 >>> records = make_records(ACTUATORS["arm"], {"coulomb_friction": 1.0}, seed=3)
 """
 
-from .actuators import ACTUATORS, Actuator
+from .actuators import ACTUATORS, Actuator, with_slack_cable
 from .declaration import write_collection, write_declaration, write_records, write_set
 from .effects import EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS, Hidden
 from .records import make_records, truth
@@ -22,6 +22,7 @@ __all__ = [
     "Hidden",
     "make_records",
     "truth",
+    "with_slack_cable",
     "write_collection",
     "write_declaration",
     "write_records",

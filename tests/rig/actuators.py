@@ -32,6 +32,7 @@ class Rubber:
     engage: tuple[float, ...]  # m, extensions δᵢ; multiples of 0.01 mm
     k: float  # Pa
     eta: float  # Pa·s
+    buckles: bool = True  # instead of pushing, its end goes on following the cam; else its cable goes slack
 
     @property
     def shape(self) -> float:
@@ -164,6 +165,11 @@ WRIST = Actuator(
 )
 
 ACTUATORS = {actuator.name: actuator for actuator in (ARM, WRIST)}
+
+
+def with_slack_cable(actuator: Actuator) -> Actuator:
+    """The same with rubber that is on its own while its cable is slack."""
+    return replace(actuator, rubber=replace(actuator.rubber, buckles=False))
 
 
 def as_built(declared: Actuator, draw: np.random.Generator) -> Actuator:

@@ -30,6 +30,7 @@ RUBBER = Rubber(
     engage=(0.0, 2.0e-4, 1.06e-3, 2.65e-3, 9.04e-3, 9.05e-3),
     k=2.55e6 * 0.58,
     eta=21.0e3,
+    buckles=False,
 )
 
 

@@ -13,6 +13,7 @@ The cable can only pull, with F = C ⟨d − y⟩ when it is elastic.  Each step
     G(y) = R(y) − C ⟨d − y⟩.
 
 An inextensible cable is y = d as long as R(d) ≥ 0 and else, slack, R(y) = 0: the rubber relaxes on its own.
+Rubber that buckles instead of pushing is y = d, no force where R(d) < 0, and never shorter than at first.
 """
 
 from __future__ import annotations
@@ -65,6 +66,7 @@ def pull_of(rubber: Rubber, hidden: Hidden, step: float) -> Pull:
     hysteretic = hidden.slider_force > 0.0
     rigid = bool(np.isinf(hidden.cable_stiffness))
     cable, slack = 0.0 if rigid else hidden.cable_stiffness, hidden.slack
+    buckles = rubber.buckles
     x = m1 = m2 = shift = 0.0
     soft = 1.0
 
@@ -81,7 +83,7 @@ def pull_of(rubber: Rubber, hidden: Hidden, step: float) -> Pull:
 
     def pull(asked: float) -> tuple[float, float]:
         nonlocal x, m1, m2, shift, soft
-        y = asked - slack
+        y = max(asked - slack, 0.0) if buckles else asked - slack
         force = -1.0
         if rigid:  # the usual case: the rubber follows the cam, in line because function calls cost time
             place = (y - shift) * per_grid + origin
@@ -90,9 +92,12 @@ def pull_of(rubber: Rubber, hidden: Hidden, step: float) -> Pull:
             if hysteretic:
                 force += sliders.trial(y - x)[0]
         if force < 0.0:
-            d = y
-            y = _root(resistance, d, cable, x)
-            force = cable * max(d - y, 0.0)
+            if buckles and (rigid or resistance(y)[0] < 0.0):
+                force = 0.0
+            else:
+                d = y
+                y = _root(resistance, d, cable, x)
+                force = cable * max(d - y, 0.0)
         if hysteretic:
             sliders.commit()
         m1 = q1 * m1 + g1 * (y - x)

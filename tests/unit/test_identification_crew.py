@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -46,8 +47,8 @@ def test_helpers_end_with_the_process_that_waits(ending: signal.Signals) -> None
     )
     assert process.stdout is not None
     process.stdout.readline()
-    listed = subprocess.run(["ps", "--ppid", str(process.pid), "-o", "pid="], capture_output=True, text=True)
-    helpers = [int(word) for word in listed.stdout.split()]
+    helpers = [int(f.name) for f in Path("/proc").iterdir() if f.name.isdigit() and _parent(f) == process.pid]
+    assert helpers
     process.send_signal(ending)
     process.wait(timeout=30)
     waited = 0
@@ -55,6 +56,13 @@ def test_helpers_end_with_the_process_that_waits(ending: signal.Signals) -> None
         time.sleep(0.1)
         waited += 1
     assert not [pid for pid in helpers if _running(pid)]
+
+
+def _parent(process: Path) -> int:
+    try:
+        return int((process / "stat").read_text(encoding="utf8").rpartition(")")[2].split()[1])
+    except OSError:
+        return 0  # it has ended in between
 
 
 def _running(pid: int) -> bool:
