@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import ConvergenceError
 from ..identification.crew import shared_out
@@ -26,7 +26,7 @@ ALIAS = 0.003
 _NOISE = 50.0
 _MOST_EFFECTS = 3
 _PAIRED = 4
-"""Where no effect helps alone, so many of the best are tried in pairs."""
+"""Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class _Seeker:
                 # Effects elsewhere wait for their turn: most blocks have an effect of their own.
                 fresh = self._tried(present, block, tried)
                 tried += fresh
-                step = _best_step(self._comparison, (first, before), fresh, block)
+                step = self._step(start, present, fresh, block)
                 if step is not None:
                     break
             ranking = ranking or _ranked(self._comparison, before, tried)
@@ -137,6 +137,22 @@ class _Seeker:
             present = steps[-1].chosen
             before = excesses(present, bench)
         return steps, ranking
+
+    def _step(
+        self, start: Hypothesis, present: Hypothesis, fresh: Sequence[Hypothesis], block: str
+    ) -> Step | None:
+        """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
+        bench = self._comparison.bench
+        first, before = excesses(start, bench), excesses(present, bench)
+        if before[block].open:
+            return _best_step(self._comparison, (first, before), fresh, block)
+        full = self._comparison.on_all_samples
+        best = sorted(fresh, key=lambda h: sum(excesses(h, bench)[block].chi2))[:_PAIRED]
+        sharp = [full(h) for h in best]
+        seen = {id(f): h for f, h in zip(sharp, best, strict=True)}
+        known = excesses(full(start), bench), excesses(full(present), bench)
+        found = _best_step(self._comparison, known, sharp, block)
+        return replace(found, chosen=seen[id(found.chosen)]) if found else None
 
     def backward(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
         """Drop the effects that later ones have made superfluous, the first added first."""

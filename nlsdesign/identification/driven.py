@@ -13,7 +13,7 @@ from ..errors import ConvergenceError, unknown_name
 from ..symbolic import Expression, depends
 from .batch import Batch
 from .block import Block, Drive
-from .filters import derivative
+from .filters import calmed, derivative
 from .measurement import Record
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
 
@@ -135,11 +135,17 @@ class DrivenBlock:
                 continue
             signal = record.trace[drive.signal]
             late = {**self._fixed, **values}[drive.late_by] if drive.late_by else 0.0
+            if self.stiff and drive.order == 0 and self._moves(drive.signal):
+                signal = calmed(signal)
             inputs[i] = derivative(signal, record.step, order=drive.order)
             if drive.late_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], late)
         at = self._digest(inputs.shape[1], [inputs, rates])
         return Samples(at, *self._ends(inputs, rates, at, record.step), record.step)
+
+    def _moves(self, signal: str) -> bool:
+        """Tell whether a signal is a motion, whose rate drives the block too."""
+        return any(d.signal == signal and d.order == 1 for d in self.block.drives.values())
 
     @property
     def needs_new_samples(self) -> bool:

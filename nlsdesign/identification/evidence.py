@@ -262,6 +262,7 @@ class Bench:
                 seen, floor = record, self.floors[name, record.name]
                 given = driven.samples(record, values)
                 driven.prepare(given, values)
+                given = driven.samples(record, values) if driven.stiff else given  # now it is known to be
                 if coarse and driven.block.target is not None:
                     seen, floor = self._thinned(name, record, whole=driven.stiff)
                     given = given if driven.stiff else driven.samples(seen, values)

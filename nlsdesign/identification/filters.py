@@ -5,20 +5,24 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import correlate1d
+from scipy.signal import savgol_coeffs, savgol_filter
 
 Array = NDArray[np.float64]
 
-RATE_WIDTH = 4.0
-"""Standard deviation, in samples, of the filter in a measured rate."""
+RATE_SPAN = 31
+"""Samples through which a quartic is put for a measured rate."""
 _REACH = 5.0
+_SPAN = 11
 
 
 def derivative(signal: Array, step: float, *, order: int) -> Array:
     """Return a signal, its smoothed rate, or its raw second derivative.
 
-    The rate passes a Gaussian of standard deviation :data:`RATE_WIDTH`, because dry friction asks for its
-    sign. The second derivative is the central difference: whoever uses it filters it with all other terms.
+    The rate is that of quartics through :data:`RATE_SPAN` samples (Savitzky and Golay 1964), because dry
+    friction asks for its sign: as quiet as a Gaussian of four samples, but true to 3 % up to a fiftieth of
+    the sampling rate, where that Gaussian has lost an eighth, and a drag twice as much. The second derivative
+    is the central difference: whoever uses it filters it with all other terms.
 
     Parameters
     ----------
@@ -32,11 +36,29 @@ def derivative(signal: Array, step: float, *, order: int) -> Array:
     if order == 0:
         return signal
     if order == 1:
-        rate: Array = gaussian_filter1d(signal, RATE_WIDTH, order=1, mode="nearest", truncate=_REACH) / step
+        rate: Array = correlate1d(signal, _rate_kernel(), mode="nearest") / step
         return rate
     second = np.zeros_like(signal)
     second[1:-1] = (signal[2:] - 2.0 * signal[1:-1] + signal[:-2]) / step**2
     return second
+
+
+def calmed(signal: Array) -> Array:
+    """Return a motion without most of its rounding: cubics through eleven samples (Savitzky and Golay 1964).
+
+    A motion that is a cubic over eleven samples passes unchanged, so amplitudes and stops keep their place.
+    The speed of a straight line between two samples is rounded to one quantum per step; what coasts on with
+    that speed after a contact goes astray.
+
+    Parameters
+    ----------
+    signal
+        Shape (n,); returned as it is where it is shorter than that.
+    """
+    if len(signal) < _SPAN:
+        return signal
+    result: Array = savgol_filter(signal, _SPAN, 3)
+    return result
 
 
 def kernel(width: float) -> Array:
@@ -66,7 +88,7 @@ def noise_gain(width: float, order: int) -> float:
     """
     weights = kernel(width)
     if order == 1:
-        weights = np.convolve(weights, np.gradient(kernel(RATE_WIDTH)))
+        weights = np.convolve(weights, _rate_kernel())
     elif order == 2:
         weights = np.convolve(weights, [1.0, -2.0, 1.0])
     return float(np.sqrt(np.sum(weights**2)))
@@ -74,7 +96,12 @@ def noise_gain(width: float, order: int) -> float:
 
 def rate_noise_gain() -> float:
     """Return the factor from the standard deviation of white noise to that of a measured rate, per sample."""
-    return float(np.sqrt(np.sum(np.gradient(kernel(RATE_WIDTH)) ** 2)))
+    return float(np.sqrt(np.sum(_rate_kernel() ** 2)))
+
+
+def _rate_kernel() -> Array:
+    result: Array = savgol_coeffs(RATE_SPAN, 4, deriv=1, use="dot")
+    return result
 
 
 def smoothing(n: int, width: float, stride: int) -> scipy.sparse.csr_array:
