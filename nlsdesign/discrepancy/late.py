@@ -13,7 +13,6 @@ from ..identification.filters import derivative
 from ..identification.loops import Loop, loop_of
 from ..identification.measurement import Record, RecordSet
 from ..identification.quality import Finding
-from ..identification.residuals import noise_of
 from ..model import Assembly, FlatModel, flatten
 from ..symbolic import depends
 
@@ -58,7 +57,7 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
         extension = _extension(assembly, model, motion, records.signals)
         if extension is None:
             continue
-        noise = float(np.median([noise_of(r.trace[signal]) for r in records.records]))
+        noise = float(np.median([r.grain_of(signal).noise for r in records.records]))
         paths = [(r, extension(r)) for r in records.records]
         loops = [
             (r, loop)

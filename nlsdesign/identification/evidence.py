@@ -17,7 +17,6 @@ from .block import Block
 from .driven import DrivenBlock, Samples
 from .filters import derivative, noise_gain, rate_noise_gain, smoothing
 from .measurement import Record, RecordSet
-from .residuals import noise_of, quantum_of
 
 Array = NDArray[np.float64]
 
@@ -53,10 +52,12 @@ def estimate_noise(records: RecordSet) -> Noise:
     """
     level, rounded = {}, {}
     for column in records.columns:
-        white = float(np.median([noise_of(r.trace[column.signal]) for r in records.records]))
-        quantum = column.quantum or float(
-            np.median([quantum_of(r.trace[column.signal]) for r in records.records])
-        )
+        grains = [r.grain_of(column.signal) for r in records.records]
+        white = float(np.median([g.noise for g in grains]))
+        # The count of a resampled signal is that of its samples before, as it weighs on the new clock.
+        kept = any(column.signal in r.grain for r in records.records)
+        declared = 0.0 if kept else column.quantum
+        quantum = declared or float(np.median([g.quantum for g in grains]))
         rounding = quantum / np.sqrt(12.0)
         level[column.signal] = max(white, rounding)
         rounded[column.signal] = white < 2.0 * rounding

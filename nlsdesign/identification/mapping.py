@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ class Column:
     noise, quantum
         Declared standard deviation of the noise and size of one count, in SI; 0 where nothing is declared.
         Declared numbers are a claim: the noise is also estimated from the records.
+    time
+        Head of the clock of this column, in the unit of ``[time]``; empty where it is that of ``[time]``.
     """
 
     name: str
@@ -39,6 +41,28 @@ class Column:
     unit: str
     noise: float = 0.0
     quantum: float = 0.0
+    time: str = ""
+
+
+@dataclass(frozen=True)
+class Align:
+    """A lag to be estimated and removed.
+
+    Parameters
+    ----------
+    column, to
+        Heads of two columns that show the same motion; the first may be late. They need not be mapped.
+    time
+        Head of the clock of ``column`` where that is not mapped. All columns of a clock of its own move
+        together; a column on the clock of ``[time]`` moves alone.
+    longest
+        Largest lag looked for, in s; a quarter of the record where ``None``.
+    """
+
+    column: str
+    to: str
+    time: str = ""
+    longest: float | None = None
 
 
 @dataclass(frozen=True)
@@ -53,6 +77,10 @@ class ColumnMap:
         Globs on the names of records.
     held_out_after
         Time in s after which every record is held out; ``None`` where records are held out as a whole.
+    resample
+        Rate in Hz of the common clock that all columns are put on; ``None`` where they are left as sampled.
+    align
+        Lags to be removed before; these need a rate.
     """
 
     time: Column
@@ -60,6 +88,18 @@ class ColumnMap:
     held_out: tuple[str, ...] = ()
     selection: tuple[str, ...] = ()
     held_out_after: float | None = None
+    resample: float | None = None
+    align: tuple[Align, ...] = ()
+
+    def clock_of(self, column: Column) -> Column:
+        """Return the column of times of a column.
+
+        Parameters
+        ----------
+        column
+            Of the file.
+        """
+        return replace(self.time, name=column.time) if column.time else self.time
 
 
 def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
@@ -91,36 +131,97 @@ def read_mapping(path: Path) -> ColumnMap:
         tables = tomllib.loads(path.read_text(encoding="utf8"))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise MeasurementError(path.name, f"cannot be read as a mapping: {error}") from None
-    known = ("time", "columns", "held_out", "selection", "held_out_after")
-    for key in tables:
-        if key not in known:
-            raise MeasurementError(f"{path.name}: {key}", "no such field", did_you_mean=nearest(key, known))
+    known = ("time", "columns", "held_out", "selection", "held_out_after", "resample_Hz", "align")
+    _check_fields(path.name, tables, known)
     columns = tuple(_mapped(path, head, table) for head, table in tables.get("columns", {}).items())
     time = tables.get("time", {"column": "t_s"})
     if not columns:
         raise MeasurementError(
             path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."'
         )
-    return ColumnMap(
+    found = ColumnMap(
         Column(str(time.get("column", "t_s")), "time", str(time.get("unit", "s"))),
         columns,
         tuple(tables.get("held_out", ())),
         tuple(tables.get("selection", ())),
-        _seconds(path, tables.get("held_out_after")),
+        _seconds(f"{path.name}: held_out_after", tables.get("held_out_after")),
+        _rate(path.name, tables.get("resample_Hz")),
+        tuple(_align(f"{path.name}: align", table) for table in _list_of_tables(path.name, tables)),
     )
+    _check_clock(path.name, found)
+    return found
 
 
-def _seconds(path: Path, given: Any) -> float | None:
+def _check_fields(where: str, given: Mapping[str, Any], known: Sequence[str], between: str = ": ") -> None:
+    for key in given:
+        if key not in known:
+            raise MeasurementError(
+                f"{where}{between}{key}", "no such field", did_you_mean=nearest(key, known)
+            )
+
+
+def _seconds(where: str, given: Any) -> float | None:
     if given is None:
         return None
     try:
         return float(given["value"]) * parse_unit(given["unit"]).factor
     except (KeyError, TypeError, ValueError, UnitError):
+        field = where.rpartition(" ")[2].rpartition(".")[2]
         raise MeasurementError(
-            f"{path.name}: held_out_after",
-            "is not a time",
-            next_step='write held_out_after = {value = 12.5, unit = "s"}',
+            where, "is not a time", next_step=f'write {field} = {{value = 12.5, unit = "s"}}'
         ) from None
+
+
+def _rate(file: str, given: Any) -> float | None:
+    if given is None:
+        return None
+    number = isinstance(given, int | float) and not isinstance(given, bool)
+    if not number or not 0.0 < given < float("inf"):
+        raise MeasurementError(
+            f"{file}: resample_Hz",
+            f"{given!r} is not a rate",
+            next_step="write for instance resample_Hz = 500",
+        )
+    return float(given)
+
+
+def _list_of_tables(file: str, tables: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    given = tables.get("align", [])
+    if not isinstance(given, list) or not all(isinstance(each, dict) for each in given):
+        raise MeasurementError(
+            f"{file}: align",
+            "is not a list of tables",
+            next_step='write [[align]] column = "...", to = "..."',
+        )
+    return given
+
+
+def _align(where: str, table: Mapping[str, Any]) -> Align:
+    _check_fields(where, table, ("column", "to", "time", "longest"), ".")
+    for key in ("column", "to"):
+        if not isinstance(table.get(key), str):
+            raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "<head of a column>"')
+    longest = _seconds(f"{where}.longest", table.get("longest"))
+    if longest is not None and longest <= 0.0:
+        raise MeasurementError(f"{where}.longest", "must be above zero")
+    return Align(table["column"], table["to"], str(table.get("time", "")), longest)
+
+
+def _check_clock(file: str, found: ColumnMap) -> None:
+    """Check that what needs a common clock asks for one: nothing is resampled unless it is said."""
+    if found.resample is not None:
+        return
+    for column in found.columns:
+        if column.time:
+            raise _without_rate(f"{file}: columns.{column.name}.time", "is a clock of its own")
+    if found.align:
+        raise _without_rate(f"{file}: align", "moves a clock")
+
+
+def _without_rate(where: str, what: str) -> MeasurementError:
+    return MeasurementError(
+        where, f"{what}, but no common rate is given", next_step="add resample_Hz = <rate in Hz> at the top"
+    )
 
 
 def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
@@ -128,10 +229,7 @@ def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
     for key in ("signal", "unit"):
         if key not in table:
             raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "..."')
-    valid = ("signal", "unit", "noise", "quantum")
-    for key in table:
-        if key not in valid:
-            raise MeasurementError(f"{where}.{key}", "no such field", did_you_mean=nearest(key, valid))
+    _check_fields(where, table, ("signal", "unit", "noise", "quantum", "time"), ".")
     try:
         factor = parse_unit(table["unit"]).factor
     except UnitError as error:
@@ -139,7 +237,8 @@ def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
             where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean
         ) from None
     noise, quantum = float(table.get("noise", 0.0)) * factor, float(table.get("quantum", 0.0)) * factor
-    return Column(head, str(table["signal"]), str(table["unit"]), noise, quantum)
+    own = str(table.get("time", ""))
+    return Column(head, str(table["signal"]), str(table["unit"]), noise, quantum, own)
 
 
 def default_mapping(heads: Sequence[str], model: FlatModel, file: str) -> ColumnMap:

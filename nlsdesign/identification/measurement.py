@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from ..errors import MeasurementError, nearest, unknown_name
 from ..model import FlatModel
-from ..quantity import parse_unit, same_dimension
 from ..simulation import Trace
+from .clocks import Grain
+from .intake import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
 from .mapping import check_signals, default_mapping, read_mapping, times_among
-from .quality import Finding, check_columns, check_time, suspicions
+from .quality import Finding
+from .residuals import noise_of, quantum_of
 from .tables import Table, read_table, table_files
 
 Array = NDArray[np.float64]
@@ -40,17 +42,37 @@ class Record:
         judged on, at the end.
     source
         File, and what was done to the samples on the way in.
+    grain
+        Noise and count of signals that were interpolated or filtered, which no longer show it.
     """
 
     name: str
     trace: Trace
     role: Role = "fit"
     source: str = ""
+    grain: Mapping[str, Grain] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
         """Time between samples in s."""
         return float((self.trace.time[-1] - self.trace.time[0]) / (len(self.trace) - 1))
+
+    def grain_of(self, signal: str) -> Grain:
+        """Return noise and size of a count of a signal, in SI.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+
+        Returns
+        -------
+        Grain
+            Kept from before where the signal was resampled; estimated from its samples otherwise.
+        """
+        if signal in self.grain:
+            return self.grain[signal]
+        return Grain(noise_of(self.trace[signal]), quantum_of(self.trace[signal]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +141,10 @@ def load_records(
     mapping
         TOML with ``[time] column, unit``, ``[columns.<head>] signal, unit, noise, quantum``, the lists of
         globs ``held_out`` and ``selection``, and ``held_out_after``, a time with unit at which every record
-        is cut. By default ``records.toml`` in the folder; without it the heads must be names of signals, or
-        name a unit that only one sensor of the model has.
+        is cut. ``resample_Hz`` puts all columns on one clock, also those with one of their own,
+        ``[columns.<head>] time``; ``[[align]] column, to`` removes a lag first. By default ``records.toml``
+        in the folder; without it the heads must be names of signals, or name a unit that only one sensor of
+        the model has.
     hold_out
         Globs on record names. Without any, here or in the mapping, every third record in order of name is
         held out, beginning with the second; a single record is cut after two thirds.
@@ -145,7 +169,8 @@ def load_records(
     first = next(iter(runs))
     chosen = given or default_mapping(runs[first].heads, model, first.name)
     check_signals(first.name, chosen.columns, model)
-    records, findings = [], []
+    records: list[Record] = []
+    findings: list[Finding] = []
     for file, table in runs.items():
         record, found = _record(file, table, chosen)
         records.append(record)
@@ -294,34 +319,6 @@ def _part(record: Record, rows: slice, role: Role, words: str) -> Record:
     return replace(record, name=name, role=role, trace=Trace(trace.time[rows], signals, trace.units, name))
 
 
-def _record(file: Path, table: Table, mapping: ColumnMap) -> tuple[Record, list[Finding]]:
-    needed = [mapping.time, *mapping.columns]
-    for column in needed:
-        if column.name not in table.heads:
-            raise MeasurementError(
-                f"{file.name}: column '{column.name}'",
-                "is missing",
-                did_you_mean=nearest(column.name, table.heads),
-            )
-    raw = table.columns([c.name for c in needed])
-    check_columns(file.name, raw, first_row=table.first_row)
-    time = raw[mapping.time.name] * parse_unit(mapping.time.unit).factor
-    note = check_time(file.name, mapping.time.name, time, first_row=table.first_row)
-    grid = np.linspace(time[0], time[-1], len(time))
-    signals = {
-        c.signal: np.interp(grid, time, raw[c.name]) * parse_unit(c.unit).factor for c in mapping.columns
-    }
-    if not note:
-        signals = {c.signal: raw[c.name] * parse_unit(c.unit).factor for c in mapping.columns}
-    units = {c.signal: _si(c.unit) for c in mapping.columns}
-    found = [
-        f
-        for c in mapping.columns
-        for f in suspicions(file.name, c.name, raw[c.name], first_row=table.first_row)
-    ]
-    return Record(file.stem, Trace(grid, signals, units, file.stem), source=f"{file.name}{note}"), found
-
-
-def _si(unit: str) -> str:
-    known = ("rad", "rad/s", "m", "m/s", "A", "V", "N", "N*m", "Pa", "K", "1", "rad/s^2", "m/s^2")
-    return next((name for name in known if same_dimension(name, unit)), unit)
+def _record(file: Path, table: Table, mapping: ColumnMap) -> tuple[Record, tuple[Finding, ...]]:
+    run = read_run(file.stem, table, mapping)
+    return Record(file.stem, run.trace, source=run.source, grain=run.grain), run.findings

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 _GAP = 1.5
 """A step this much longer than the usual one is a gap."""
+_BRIDGED = 20.0
+"""A gap of so many steps is not to be bridged by a slower clock."""
 _JITTER = 0.02
 """Steps that differ by more than this share are interpolated to a uniform grid."""
 _CLIPPED_RUN = 5
@@ -67,7 +69,7 @@ def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2
             )
 
 
-def check_time(file: str, head: str, time: Array, *, first_row: int = 2) -> str:
+def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged: float = 0.0) -> str:
     """Check that time ascends without gaps.
 
     Parameters
@@ -78,6 +80,8 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2) -> str:
         In s, shape (n,).
     first_row
         As above.
+    bridged
+        Steps in s up to which a gap is none, because the channel is to be put on so slow a clock.
 
     Returns
     -------
@@ -99,12 +103,12 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2) -> str:
             next_step="sort the record, or cut it where the clock was set back",
         )
     usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > _GAP * usual)
+    gaps = np.flatnonzero(steps > max(_GAP * usual, (1.0 + _JITTER) * bridged))
     if len(gaps):
         raise MeasurementError(
             f"{file}: column '{head}', {_rows(gaps[:1] + 1, first_row)}",
             f"there is a gap of {steps[gaps[0]]:g} s; samples lie {usual:g} s apart ({len(gaps)} in all)",
-            next_step="split the record into one file before and one after the gap",
+            next_step="split the record into one file before and one after the gap" + _slower(steps, usual),
         )
     uneven = float(np.max(np.abs(steps - usual))) / usual
     return (
@@ -112,6 +116,16 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2) -> str:
         if uneven <= _JITTER
         else f" (interpolated to a uniform grid, steps varied by {100 * uneven:.1f} %)"
     )
+
+
+def _slower(steps: Array, usual: float) -> str:
+    """Return the clock on which the gaps are none; where they are long it would hold nothing."""
+    longest = float(np.max(steps))
+    if longest > _BRIDGED * usual:
+        return ""
+    rate = float(f"{1.0 / longest:.2g}")
+    rate = rate if rate * longest <= 1.0 else float(f"{0.95 / longest:.2g}")
+    return f", or put it on a slower clock: resample_Hz = {rate:g} in records.toml"
 
 
 def suspicions(file: str, head: str, values: Array, *, first_row: int = 2) -> list[Finding]:

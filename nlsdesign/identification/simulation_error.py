@@ -16,7 +16,6 @@ from .fit import Fit
 from .measurement import Record, from_sample
 from .parameters import Parameter, box
 from .priors import prior_rows
-from .residuals import noise_of, quantum_of
 from .shooting import Shooter, Shot, Windows
 from .wiring import Wiring, wired
 
@@ -369,6 +368,7 @@ def _phases(record: Record, shots: Shots) -> list[Record]:
 
 def _noise(records: Sequence[Record], signal: str) -> float:
     rows = [r.trace[signal] for r in records]
-    white = float(np.median([noise_of(row) for row in rows]))
-    rounding = float(np.median([quantum_of(row) for row in rows])) / math.sqrt(12.0)
+    grains = [r.grain_of(signal) for r in records]
+    white = float(np.median([g.noise for g in grains]))
+    rounding = float(np.median([g.quantum for g in grains])) / math.sqrt(12.0)
     return max(white, rounding) or float(np.std(np.concatenate(rows))) or 1.0

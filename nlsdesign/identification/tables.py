@@ -66,7 +66,8 @@ class Table:
             raise MeasurementError(
                 self.file,
                 f"its columns differ in length: {told}",
-                next_step="resample them to one clock before, or map columns of one clock",
+                next_step="ask for one clock in records.toml: resample_Hz = <rate>, and in the table of each "
+                "column of another clock time = '<head of that clock>'",
             )
         if min(lengths.values()) < LEAST_ROWS:
             raise _too_short(self.file, min(lengths.values()))
@@ -144,8 +145,24 @@ def _csv(file: Path) -> Table:
     try:
         numbers = np.array(rows[1:], dtype=float)
     except ValueError:
-        raise _bad_cell(file.name, heads, rows[1:]) from None
+        return Table(file.name, _ending_early(file.name, heads, rows[1:]), _FIRST_ROW)
     return Table(file.name, {h: numbers[:, i] for i, h in enumerate(heads)}, _FIRST_ROW)
+
+
+def _ending_early(file: str, heads: list[str], rows: list[list[str]]) -> dict[str, Array]:
+    """Return columns of which some end before others, as two clocks side by side leave them."""
+    if any(len(row) != len(heads) for row in rows):
+        raise _bad_cell(file, heads, rows)
+    found = {}
+    for place, head in enumerate(heads):
+        cells = [row[place].strip() for row in rows]
+        while cells and not cells[-1]:
+            cells.pop()
+        try:
+            found[head] = np.array(cells, dtype=float)
+        except ValueError:
+            raise _bad_cell(file, heads, rows) from None
+    return found
 
 
 def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> MeasurementError:
@@ -158,6 +175,8 @@ def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> Measurement
             try:
                 float(cell)
             except ValueError:
+                if not cell.strip() and not any(r[heads.index(head)].strip() for r in rows[number - 1 :]):
+                    continue  # the column has ended
                 return MeasurementError(f"{file}: column '{head}', row {number}", f"'{cell}' is not a number")
     return MeasurementError(file, "cannot be read as a table of numbers")
 
