@@ -13,6 +13,7 @@ from .decks import deck
 from .design import design
 from .diagnose import diagnose, simulate
 from .export import export, observer
+from .fit import fit
 from .materials import materials
 from .parts import parts
 from .studies import study
@@ -24,7 +25,7 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-for command in (parts, materials, deck, design, analyse, observer, export, simulate, diagnose, study):
+for command in (parts, materials, deck, design, analyse, observer, export, simulate, fit, diagnose, study):
     program.add_command(command)
 
 

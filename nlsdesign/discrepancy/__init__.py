@@ -1,20 +1,26 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
-from .diagnose import diagnose, write_verdict
+from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .predict import predict
+from .refit import BlockError, FittedNumber, Refit, refit
 from .verdict import Course, NamedEffect, RecordGap, Verdict
 
 __all__ = [
     "ALL",
+    "BlockError",
     "Candidate",
     "Course",
     "Effect",
+    "FittedNumber",
     "NamedEffect",
     "RecordGap",
+    "Refit",
     "Unknown",
     "Verdict",
     "diagnose",
     "predict",
+    "refit",
+    "write_refit",
     "write_verdict",
 ]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..identification.fit import Fit
 from .compare import Judged
 
 _APART = 1.0
@@ -125,16 +126,39 @@ def advice(name: str, aliases: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def more_excitation(unidentified: Sequence[str]) -> tuple[str, ...]:
-    """Return what to record where the records leave combinations of numbers open.
+_DECIDING: Mapping[str, str] = {
+    "kg*m^2": "faster reversals, so that inertia shows beside the other torques",
+    "kg": "faster reversals, so that inertia shows beside the other forces",
+    "N*m*s/rad": "the same motion at a third and at three times the speed",
+    "N*s/m": "the same motion at a third and at three times the speed",
+    "Pa*s": "the same amplitude at a third and at three times the frequency, and a hold of many seconds",
+    "Pa": "a larger amplitude, so that the rubber is stretched through all of its range, and a hold",
+    "N/m": "a larger amplitude",
+    "N*m/rad": "a larger amplitude",
+    "N*m": "slow turns both ways",
+    "N": "slow pulls both ways",
+    "N*m/A": "a known weight hung on a lever at rest",
+    "s": "steps and a fast sine beside the slow motion",
+}
+"""By the unit of a number, the motion in which it acts unlike others."""
+
+
+def more_excitation(fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Return what to record where the records leave numbers or combinations of them open.
 
     Parameters
     ----------
-    unidentified
-        From the fits, in words.
+    fits
+        Of the better model.
     """
-    return tuple(
-        f"The records do not decide {words}; a record with another amplitude, speed or holding time in which "
-        "these act differently would."
-        for words in unidentified
-    )
+    found = []
+    for fit in fits:
+        units = {p.name: p.unit for p in fit.parameters}
+        for words in fit.unidentified():
+            named = [u for n, u in units.items() if f"{n} up" in words or f"{n} down" in words]
+            known = list(dict.fromkeys(_DECIDING[u] for u in named if u in _DECIDING))
+            wanted = (
+                "; ".join(known) or "another amplitude, speed or holding time in which these act differently"
+            )
+            found.append(f"The records do not decide {words}. To decide it, record {wanted}.")
+    return tuple(found)

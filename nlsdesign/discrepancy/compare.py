@@ -14,7 +14,9 @@ from ..identification.block import Block
 from ..identification.crew import shared_out
 from ..identification.driven import DrivenBlock
 from ..identification.evidence import Bench, Evidence, Floor
+from ..identification.fit import declared_parameter, fit
 from ..identification.measurement import Record
+from ..identification.parameters import free_parameter
 from ..identification.residuals import effective_size
 from ..model import Assembly, Variable
 from .cuts import blocks_of
@@ -25,6 +27,8 @@ from .trial import Trials
 Array = NDArray[np.float64]
 
 _LONGEST_ROW = 12
+_FREE_REACH = 30.0
+"""Factor to the bounds of a number of which nothing is taken as known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +85,16 @@ class Comparison:
         blank = Hypothesis(assembly, (), {}, {}, {}, {}, {})
         return self._refitted(blank, _groups(self._driven(blank)))
 
+    def declared(self, assembly: Assembly) -> Hypothesis:
+        """Return the declared assembly as it is, nothing fitted.
+
+        Parameters
+        ----------
+        assembly
+            As declared.
+        """
+        return self.on_all_samples(Hypothesis(assembly, (), {}, {}, {}, {}, {}))
+
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis as the coarse look sees it.
 
@@ -120,6 +134,34 @@ class Comparison:
             Fitted coarsely.
         """
         return self._refitted(replace(hypothesis, coarse=False), _groups(self._driven(hypothesis)))
+
+    def freely(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis with its declared numbers fitted as if nothing were known of them.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted, without effects. A fit that does not converge leaves its numbers as they are.
+        """
+        fits, values = dict(hypothesis.fits), dict(hypothesis.values)
+        fitted = self.bench.records.of("fit")
+        for group in _groups(self._driven(hypothesis)):
+            variables = {v.name: v for b in group for v in b.block.model.parameters}
+            free = [n for n in dict.fromkeys(n for b in group for n in b.free)]
+            parameters = [
+                free_parameter(variables[n], reach=_FREE_REACH)
+                if variables[n].start > 0.0
+                else declared_parameter(variables[n])
+                for n in free
+            ]
+            start = {p.name: p.start for p in parameters}
+            try:
+                found = fit([e for b in group for e in self.bench.evidence(b, fitted, start)], parameters)
+            except ConvergenceError:
+                continue
+            fits[tuple(b.block.name for b in group)] = found
+            values |= found.values
+        return self.on_all_samples(replace(hypothesis, fits=fits, values=values))
 
     def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a coarsely fitted hypothesis, its numbers as they are, with what all samples say of it.

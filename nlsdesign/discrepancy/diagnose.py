@@ -14,9 +14,11 @@ from pathlib import Path
 from ..components import Assembly
 from ..components.declare import write_deck
 from ..identification.evidence import Bench
+from ..identification.fit import Fit
 from ..identification.measurement import RecordSet
 from ..writing import write_text
 from .advice import advice, more_excitation, where_they_differ
+from .another_rig import other_numbers, out_of_reach
 from .compare import Comparison
 from .cuts import blocks_of
 from .effects import ALL, Effect
@@ -24,6 +26,7 @@ from .hypothesis import Hypothesis
 from .late import late_forces
 from .locate import DECLARED, Excess, excesses
 from .outcome import course_of, gaps_of, shapes_of
+from .refit import Refit, refit_text, sourced
 from .remainder import Remainder, remainder_of
 from .search import Outcome, Step, search
 from .suspicion import suspicions_of, typical_sizes
@@ -72,7 +75,7 @@ def diagnose(
     bench = Bench(records, blocks_of(actuator, records.signals))
     comparison = Comparison(bench, typical_sizes(actuator, records))
     base = comparison.base(actuator)
-    findings = [*records.findings, *suspicions_of(comparison, base)]
+    findings = [*records.findings, *out_of_reach(actuator, records), *suspicions_of(comparison, base)]
     late = late_forces(actuator, records)
     if findings or (late.findings and not late.testable):
         findings += late.findings
@@ -82,7 +85,10 @@ def diagnose(
     if late.findings and not any("delay" in step.chosen.added[-1].effect for step in outcome.steps):
         told = tuple(str(f) for f in late.findings)
         return _verdict(comparison, base, outcome, ("data_suspect", told))
-    return _verdict(comparison, base, outcome, (_word(comparison, base, outcome), ()))
+    word = _word(comparison, base, outcome)
+    other = other_numbers(comparison, base, outcome.last if word == "named" else base)
+    told = (other.words,) if other.words else ()
+    return _verdict(comparison, base, outcome, ("data_suspect" if other.decides else word, told))
 
 
 def _word(comparison: Comparison, base: Hypothesis, outcome: Outcome) -> str:
@@ -120,7 +126,7 @@ def _verdict(
         shapes_of(base, better, comparison, worst),
         tuple(better.fits.values()),
         _remainder(comparison, better, after) if word in ("named", "unknown") else None,
-        _next_steps(comparison, steps, unidentified),
+        _next_steps(comparison, steps, tuple(better.fits.values())),
     )
 
 
@@ -135,9 +141,7 @@ def _remainder(comparison: Comparison, better: Hypothesis, after: dict[str, Exce
     return remainder_of(mine, bench.records, [s for s in bench.records.signals if bench.noise.rounded[s]])
 
 
-def _next_steps(
-    comparison: Comparison, steps: Sequence[Step], unidentified: Sequence[str]
-) -> tuple[str, ...]:
+def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fit]) -> tuple[str, ...]:
     """Return what to measure to tell apart what these records cannot."""
     found: list[str] = []
     for step in steps:
@@ -147,7 +151,7 @@ def _next_steps(
             for h in step.equals[:_MOST_ALIASES]
         }
         found += advice(step.effect, differ)
-    return (*found, *more_excitation(unidentified))
+    return (*found, *more_excitation(fits))
 
 
 def _where(before: Excess, after: Excess) -> str:
@@ -160,25 +164,6 @@ def _where(before: Excess, after: Excess) -> str:
     state = "open" if before.open else "closed"
     told = f"{ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
     return f"{before.block} ({state}): {told}"
-
-
-def sourced(hypothesis: Hypothesis) -> Assembly:
-    """Return the fitted assembly, its fitted numbers marked with where they come from.
-
-    Parameters
-    ----------
-    hypothesis
-        Fitted.
-    """
-    fitted = hypothesis.fitted
-    known, declared = fitted.quantities(), hypothesis.assembly.quantities()
-    rows = {name.partition("[")[0] for name in hypothesis.values}
-    return fitted.with_values(
-        {
-            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {declared[n].source}")
-            for n in rows
-        }
-    )
 
 
 def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
@@ -217,4 +202,21 @@ def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     write_deck(verdict.actuator, deck)
     write_text(file, json.dumps(verdict.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
+    return [file, deck]
+
+
+def write_refit(found: Refit, folder: Path) -> list[Path]:
+    """Write ``fit.json`` and the deck with the fitted numbers, ``model.toml``.
+
+    Parameters
+    ----------
+    found
+        As fitted.
+    folder
+        Is made where it does not exist.
+    """
+    deck, file = folder / "model.toml", folder / "fit.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    write_deck(found.actuator, deck)
+    write_text(file, refit_text(found, str(deck)))
     return [file, deck]

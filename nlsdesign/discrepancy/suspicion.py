@@ -73,4 +73,4 @@ def _hint(ratio: float) -> str:
         "degrees for radians?": 180.0 / np.pi,
     }
     close = [words for words, size in known.items() if 0.5 < ratio / size < 2.0]
-    return f"; {close[0]}" if close else ""
+    return f"; {close[0]}" if close else "; are these records of another rig?"

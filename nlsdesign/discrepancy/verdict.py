@@ -173,9 +173,14 @@ class Verdict:
         said = {
             "none": "The refitted model explains the records down to their noise; nothing is missing.",
             "unknown": "Something is missing that no effect of the catalogue explains.",
-            "data_suspect": "The records show what no passive system could do; look at the data first.",
+            "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
             "named": "",
         }[self.verdict]
+        if self.verdict == "none" and self.unidentified:
+            said += (
+                f" They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
+                "would not show all that could be missing."
+            )
         for effect in self.effects:
             numbers = ", ".join(
                 f"{name.rpartition('.')[2]} = {value:.4g} ± {error:.2g} {unit}"

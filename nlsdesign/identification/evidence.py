@@ -222,6 +222,7 @@ class Bench:
         self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
         for block in blocks:
+            self._check_alive(block)
             for record in records.records:
                 floor = noise_floor(block, record, self.noise)
                 if len(floor.sigma) >= _LEAST_ROWS:
@@ -230,8 +231,33 @@ class Bench:
                 raise MeasurementError(
                     f"block '{block.name}'",
                     "no record moves enough to say anything about it",
-                    next_step="record a motion of several noise levels",
+                    next_step=self._what_would(block),
                 )
+
+    def _check_alive(self, block: Block) -> None:
+        if block.target is None or self.noise.level[block.target] > 0.0:
+            return
+        head = self.records.column(block.target).name
+        told = [
+            f for f in self.records.findings if f.place.partition(", row")[0].endswith(f"column '{head}'")
+        ]
+        raise MeasurementError(
+            told[0].place if told else f"column '{head}'",
+            f"{told[0].text if told else 'has no noise'}, so block '{block.name}' cannot be judged",
+            next_step="check that the channel was connected, or leave its column out of records.toml",
+        )
+
+    def _what_would(self, block: Block) -> str:
+        """Return which motion would say something about a block."""
+        if block.moving is None:
+            return f"records need at least {STRIDE * _LEAST_ROWS} samples; record for longer"
+        signal = block.drives[block.moving].signal
+        step = min(r.step for r in self.records.records)
+        least = SLOW * self.noise.level[signal] * rate_noise_gain() / step
+        unit = self.records.records[0].trace.units[signal]
+        return (
+            f"record a motion in which {signal} changes faster than {least:.3g} {unit}/s, for seconds on end"
+        )
 
     def evidence(
         self,

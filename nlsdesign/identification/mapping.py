@@ -308,7 +308,8 @@ def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str)
     raise MeasurementError(
         f"{file}: column '{head}'",
         f"could be {' or '.join(fitting)}" if fitting else f"no sensor of the model reads in {unit}",
-        next_step="write a records.toml that maps each column to its signal",
+        next_step="write a records.toml that maps each column to its signal"
+        + ("" if fitting else ", or give the deck of the rig that was measured"),
     )
 
 
@@ -343,6 +344,7 @@ def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> Non
                 where,
                 f"is mapped to '{column.signal}', which the model does not have",
                 did_you_mean=nearest(column.signal, everything),
+                next_step="map it to a signal of this deck, or give the deck of the rig that was measured",
             )
         variable = everything[column.signal]
         if not same_dimension(column.unit, variable.unit):

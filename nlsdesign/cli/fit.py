@@ -1,0 +1,51 @@
+"""``nlsdesign fit``: the declared numbers refitted to bench records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..components.declare import declare
+from ..deck import load_deck
+from ..discrepancy import refit, write_refit
+from ..identification import load_records
+from ..model import flatten
+from ..progress import Steps
+from .output import deck_option, json_option, out_option, show_json, show_table
+
+_file = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command()
+@deck_option
+@click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
+@click.option("--hold-out", multiple=True, help="Glob of record names that no fit may see; repeatable.")
+@click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
+@out_option("out/fit")
+@json_option
+def fit(
+    deck_name: str, records: Path, hold_out: tuple[str, ...], mapping: Path | None, out: Path, as_json: bool
+) -> None:
+    """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
+    actuator = declare(load_deck(deck_name))
+    measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
+    steps = Steps()
+    with steps.step("fit"):
+        found = refit(actuator, measured, progress=steps.note)
+    file, deck = write_refit(found, out)
+    if as_json:
+        show_json(found.to_dict(str(deck)))
+        return
+    numbers = [
+        (n.name, f"{n.declared:.4g}", f"{n.fitted:.4g} ± {n.standard_error:.2g}", n.unit, f"{n.strain:+.2f}")
+        for n in found.numbers
+    ]
+    show_table("Numbers", ("name", "declared", "fitted", "unit", "moved, in spreads"), numbers)
+    errors = [
+        (e.block, e.role.replace("_", " "), *(f"{v:.3g}" for v in e[2:5]), e.unit) for e in found.errors()
+    ]
+    show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
+    for words in found.words():
+        click.echo(words)
+    click.echo(f"written: {file} and {deck}; next: nlsdesign diagnose --deck {deck} --records {records}")

@@ -1,0 +1,126 @@
+"""``nlsdesign fit`` on records of the independent rig, whose true numbers are known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nlsdesign.components import Assembly
+from nlsdesign.components.declare import declare, write_deck
+from nlsdesign.deck import load_deck
+from nlsdesign.discrepancy import refit
+from nlsdesign.errors import MeasurementError
+from nlsdesign.identification import load_records
+from nlsdesign.model import flatten
+from tests.diagnosed import declared_rig, with_true_contact
+from tests.rig import ACTUATORS, make_records, truth, write_declaration, write_records
+from tests.unit.test_cli import Run, run
+
+__all__ = ["run"]
+SEED, ONLY = 5, ("sine_25deg_2.0Hz", "sine_15deg_5.0Hz", "multisine")
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with records of a rig that hides nothing, and the deck as its makers declare it."""
+    folder = tmp_path_factory.mktemp("bench")
+    write_declaration(folder, ACTUATORS["arm"])
+    write_records(folder / "records", make_records(ACTUATORS["arm"], {}, SEED, only=ONLY))
+    write_deck(with_true_contact(declared_rig(folder / "rig.toml", folder / "cam.csv")), folder / "deck.toml")
+    return folder
+
+
+def assembly_of(deck: Path) -> Assembly:
+    return declare(load_deck(deck))
+
+
+def test_the_numbers_of_the_rig_come_back_with_an_honest_error(run: Run, bench: Path, tmp_path: Path) -> None:
+    called = ("fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "records"))
+    status, out, _ = run(*called, "--hold-out", "multi*", "--out", str(tmp_path / "out"), "--json")
+    assert status == 0
+    found = json.loads(out[out.index("{") :])
+    assert found == json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf8"))
+    built, _ = truth(ACTUATORS["arm"], {}, SEED)
+    expected = {
+        "motor.inertia": built.drivetrain.inertia,
+        "bearing.damping": built.drivetrain.viscosity,
+        "spring.cable.rubber.relaxing.spring.modulus": built.rubber.k,
+        "spring.cable.rubber.relaxing.dashpot.viscosity": built.rubber.eta,
+        "spring.cable.rubber.stiff.modulus[1]": built.rubber.k_star[0],
+    }
+    numbers = {each["name"]: each for each in found["numbers"]}
+    scores = [
+        (numbers[name]["fitted"] - value) / numbers[name]["standard_error"]
+        for name, value in expected.items()
+    ]
+    assert np.max(np.abs(scores)) < 4.0
+    assert np.sqrt(np.mean(np.square(scores))) > 0.1
+    for name, value in expected.items():
+        assert numbers[name]["fitted"] == pytest.approx(value, rel=0.03)
+    held = [e for e in found["errors"] if e["role"] == "held_out"]
+    assert {e["block"] for e in held} == {"spring", "motor"}
+    for each in held:
+        assert each["fitted"] < 1.2 * each["noise_floor"] < each["declared"]
+    # The multisine is held out, and 25 degrees do not engage the last segment of the rubber.
+    assert any("next to nothing of spring.cable.rubber.stiff.modulus[6]" in w for w in found["words"])
+    assert {r["record"] for r in found["records"] if r["role"] == "held_out"} == {"multisine"}
+
+
+def test_the_deck_that_is_written_is_accepted_and_says_where_its_numbers_come_from(
+    run: Run, bench: Path, tmp_path: Path
+) -> None:
+    status, out, _ = run(
+        "fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "records"), "--out", "fitted"
+    )
+    assert status == 0
+    assert "noise floor" in out
+    assert "motor.inertia" in out
+    deck = tmp_path / "fitted" / "model.toml"
+    assert run("deck", "check", str(deck))[0] == 0
+    fitted, declared = assembly_of(deck).quantities(), assembly_of(bench / "deck.toml").quantities()
+    assert fitted["motor.inertia"].source.startswith("fitted to bench records; declared: ")
+    assert fitted["motor.inertia"].spread == declared["motor.inertia"].spread
+    record = str(bench / "records" / "sine_15deg_5.0Hz.csv")
+    errors = []
+    for each in (deck, bench / "deck.toml"):
+        status, out, _ = run("simulate", "--deck", str(each), "--record", record, "--out", "y.csv", "--json")
+        assert status == 0
+        errors.append(json.loads(out)["rms"]["force_sensor.reading"])
+    # Unfiltered, so that the noise of the sensor is in both.
+    noise = ACTUATORS["arm"].sensors.force_noise
+    assert errors[0] == pytest.approx(noise, rel=0.05)
+    assert errors[1] ** 2 - noise**2 > 10.0 * abs(errors[0] ** 2 - noise**2)
+
+
+def test_a_number_at_the_end_of_its_range_is_not_passed_over(bench: Path) -> None:
+    deck = assembly_of(bench / "deck.toml")
+    inertia = deck.quantities()["motor.inertia"]
+    wrong = deck.with_values({"motor.inertia": replace(inertia, value=2.0 * inertia.number)})
+    found = refit(wrong, load_records(bench / "records", flatten(wrong)))
+    (number,) = [n for n in found.numbers if n.name == "motor.inertia"]
+    assert number.strain == pytest.approx(-2.0, abs=0.01)
+    assert any("motor.inertia stands at the end of its range, -2.0 declared" in w for w in found.words())
+
+
+def test_a_deck_that_leaves_nothing_free_is_refused(bench: Path) -> None:
+    deck = assembly_of(bench / "deck.toml")
+    numbers = deck.quantities()
+    known = deck.with_values({n: replace(q, spread=0.0) for n, q in numbers.items() if q.spread})
+    with pytest.raises(MeasurementError, match=r"declares no spread.*spread = 0\.1"):
+        refit(known, load_records(bench / "records", flatten(known)))
+
+
+def test_a_glob_that_holds_nothing_out_is_named_and_nothing_is_written(
+    run: Run, bench: Path, tmp_path: Path
+) -> None:
+    status, _, err = run(
+        "fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "records"),
+        "--hold-out", "multisin", "--out", "out",
+    )  # fmt: skip
+    assert status == 2
+    assert "'multisin': no record has such a name; did you mean 'multisine'" in err
+    assert not (tmp_path / "out").exists()
