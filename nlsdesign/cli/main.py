@@ -9,6 +9,7 @@ import click
 from ..errors import NlsError
 from ..locations import version
 from .analyse import analyse
+from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose, simulate
@@ -25,7 +26,10 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-for command in (parts, materials, deck, design, analyse, observer, export, simulate, fit, diagnose, study):
+for command in (
+    *(parts, materials, deck, design, analyse, observer, export),
+    *(cosimulation, simulate, fit, diagnose, study),
+):
     program.add_command(command)
 
 

@@ -16,7 +16,7 @@ from nlsdesign.discrepancy import refit
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import load_records
 from nlsdesign.model import flatten
-from tests.diagnosed import declared_rig, with_true_contact
+from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, truth, write_declaration, write_records
 from tests.unit.test_cli import Run, run
 
@@ -30,7 +30,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bench")
     write_declaration(folder, ACTUATORS["arm"])
     write_records(folder / "records", make_records(ACTUATORS["arm"], {}, SEED, only=ONLY))
-    write_deck(with_true_contact(declared_rig(folder / "rig.toml", folder / "cam.csv")), folder / "deck.toml")
+    write_deck(declared_rig(folder / "rig.toml", folder / "cam.csv"), folder / "deck.toml")
     return folder
 
 

@@ -18,7 +18,7 @@ from nlsdesign.discrepancy.advice import more_excitation
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Fit, Parameter, load_records
 from nlsdesign.model import flatten
-from tests.diagnosed import declared_rig, with_true_contact
+from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, write_declaration, write_records
 
 HEADS = "t_s,theta_rad,current_A,force_N"
@@ -36,7 +36,7 @@ def clean() -> np.ndarray:
 @pytest.fixture
 def rig(tmp_path: Path) -> Assembly:
     write_declaration(tmp_path, ACTUATORS["arm"])
-    return with_true_contact(declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv"))
+    return declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv")
 
 
 def nan(rows: np.ndarray) -> np.ndarray:
