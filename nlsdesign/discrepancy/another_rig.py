@@ -124,10 +124,10 @@ def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:
     for record in records.records:
         size = np.abs(record.trace[angles[0]])
         if float(size.max()) > _OUT_OF_REACH * end:
-            rows = np.flatnonzero(size > end)
+            outside = record.trace.time[size > end]
             found.append(
                 Finding(
-                    f"{record.source}: column '{column.name}', samples {rows[0] + 1} to {rows[-1] + 1}",
+                    f"{record.source}: column '{column.name}', {outside[0]:.4g} s to {outside[-1]:.4g} s",
                     f"goes to {size.max():.3g} rad, the declared cam ends at {end:.3g} rad ({name}): "
                     "is the unit right, or are these records of another rig?",
                 )

@@ -23,6 +23,7 @@ from nlsdesign.identification import (
     resampled,
 )
 from nlsdesign.identification.evidence import estimate_noise
+from nlsdesign.identification.mapping import read_mapping
 from nlsdesign.simulation import Trace
 from tests.unit.test_identification_measurement import COUNT, MAPPING, STEP, model, table, write
 
@@ -298,4 +299,32 @@ def test_a_wrong_wish_is_answered_with_the_right_form(
     savemat(tmp_path / "a.mat", two_clocks())
     (tmp_path / "records.toml").write_text((TWO + ALIGN).replace(old, new), encoding="utf8")
     with pytest.raises(MeasurementError, match=words):
+        load_records(tmp_path, model)  # type: ignore[arg-type]
+
+
+def test_the_mapping_in_the_documentation_is_one(root: Path, tmp_path: Path) -> None:
+    text = (root / "docs" / "records.md").read_text(encoding="utf8")
+    (tmp_path / "records.toml").write_text(text.split("```toml")[1].split("```")[0], encoding="utf8")
+    found = read_mapping(tmp_path / "records.toml")
+    assert found.resample == 500.0
+    assert found.clock_of(found.columns[1]).name == "t2_ms"
+    assert found.clock_of(found.columns[1]).unit == "ms"
+    assert found.align[0].longest == pytest.approx(0.2)
+
+
+def test_a_column_that_no_signal_stands_for_moves_the_clock_that_it_shares(
+    tmp_path: Path, model: object
+) -> None:
+    """The second recorder saw the angle again; the force moves with that, unseen by the correlation."""
+    columns = two_clocks()
+    again = 20.0 * np.sin(2 * np.pi * 1.5 * (columns["t2_s"] - 0.0123))
+    savemat(tmp_path / "a.mat", columns | {"again_deg": again})
+    align = ALIGN.replace('"torque_Nm"', '"again_deg"\ntime = "t2_s"')
+    (tmp_path / "records.toml").write_text(TWO + align, encoding="utf8")
+    first = load_records(tmp_path, model).records[0]  # type: ignore[arg-type]
+    assert "torque_Nm moved 12." in first.source
+    assert "by the correlation 1.000 of again_deg with theta_deg" in first.source
+    alone = align.replace('time = "t2_s"\n', "")
+    (tmp_path / "records.toml").write_text(TWO + alone, encoding="utf8")
+    with pytest.raises(MeasurementError, match=r"differ in length.*'again_deg'.*time = '<head"):
         load_records(tmp_path, model)  # type: ignore[arg-type]
