@@ -13,6 +13,7 @@ from ..identification import load_records
 from ..model import flatten
 from ..progress import Steps
 from .output import deck_option, json_option, out_option, show_json, show_table
+from .units import Number
 
 _file = click.Path(path_type=Path, dir_okay=False)
 
@@ -22,17 +23,25 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may see; repeatable.")
 @click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
+@click.option("--window", type=Number("s"), default=None,
+              help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
 @out_option("out/fit")
 @json_option
 def fit(
-    deck_name: str, records: Path, hold_out: tuple[str, ...], mapping: Path | None, out: Path, as_json: bool
+    deck_name: str,
+    records: Path,
+    hold_out: tuple[str, ...],
+    mapping: Path | None,
+    window: float | None,
+    out: Path,
+    as_json: bool,
 ) -> None:
     """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
     actuator = declare(load_deck(deck_name))
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
     with steps.step("fit"):
-        found = refit(actuator, measured, progress=steps.note)
+        found = refit(actuator, measured, window=window, progress=steps.note)
     file, deck = write_refit(found, out)
     if as_json:
         show_json(found.to_dict(str(deck)))

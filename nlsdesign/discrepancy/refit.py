@@ -1,7 +1,8 @@
 """The declared numbers refitted to records, without any effect: what they are, how well known, how good.
 
 Every measured force or torque is simulated from the measured motion; every moving body is held to the balance
-of the efforts on it, because in a servoed record the motion is what the servo wanted.
+of the efforts on it, because in a servoed record the motion is what the servo wanted. Where the motion is
+free, the whole model may be simulated over windows instead.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from ..errors import MeasurementError
@@ -27,6 +28,7 @@ from .hypothesis import Hypothesis
 from .outcome import gaps_of
 from .suspicion import suspicions_of, typical_sizes
 from .verdict import RecordGap
+from .windows import fitted_over_windows, window_gaps
 
 _FROM_SPREAD = 0.8
 _AT_END = 1.96
@@ -155,7 +157,13 @@ def _silent(text: str) -> None:
     """Say nothing."""
 
 
-def refit(actuator: Assembly, records: RecordSet, *, progress: Callable[[str], None] = _silent) -> Refit:
+def refit(
+    actuator: Assembly,
+    records: RecordSet,
+    *,
+    window: float | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> Refit:
     """Refit the numbers that are declared with a spread.
 
     Parameters
@@ -164,6 +172,9 @@ def refit(actuator: Assembly, records: RecordSet, *, progress: Callable[[str], N
         As declared; the spreads are priors, and the fit stops at twice the range they stand for.
     records
         Bench records with their roles; those held out are only judged on.
+    window
+        Length in s of windows over which the whole model is then simulated from the measured state, driven by
+        the measured inputs, and the numbers fitted to that; without it the blocks decide.
     progress
         Told what is being done.
 
@@ -178,16 +189,22 @@ def refit(actuator: Assembly, records: RecordSet, *, progress: Callable[[str], N
     bench = Bench(records, blocks_of(actuator, records.signals))
     comparison = Comparison(bench, typical_sizes(actuator, records))
     found = comparison.base(actuator)
-    numbers = tuple(_number(fit, p) for fit in found.fits.values() for p in fit.parameters)
-    if not numbers:
+    if not any(fit.parameters for fit in found.fits.values()):
         raise MeasurementError(
             f"deck of '{actuator.name}'",
             "declares no spread for any number that these records show, so none is free",
             next_step="give what is uncertain a spread, for instance spread = 0.1",
         )
     findings = (*records.findings, *out_of_reach(actuator, records), *suspicions_of(comparison, found))
-    gaps = gaps_of(comparison.declared(actuator), found, comparison)
-    return Refit(sourced(found), tuple(found.fits.values()), numbers, gaps, findings)
+    fits, gaps = tuple(found.fits.values()), tuple[RecordGap, ...]()
+    if window is not None:
+        progress(f"simulating windows of {window:g} s")
+        values, fit = fitted_over_windows(actuator, records, found.values, window)
+        found = comparison.on_all_samples(replace(found, values=values))
+        fits, gaps = (fit,), window_gaps(actuator, values, records, window)
+    numbers = tuple(_number(fit, p) for fit in fits for p in fit.parameters)
+    gaps = (*gaps_of(comparison.declared(actuator), found, comparison), *gaps)
+    return Refit(sourced(found), fits, numbers, gaps, findings)
 
 
 def _number(fit: Fit, parameter: Parameter) -> FittedNumber:

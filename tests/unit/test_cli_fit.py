@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly
+from nlsdesign.components import Assembly, Dashpot, Mass, Spring, assembly, tie
 from nlsdesign.components.declare import declare, write_deck
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import refit
 from nlsdesign.errors import MeasurementError
-from nlsdesign.identification import load_records
+from nlsdesign.identification import Column, RecordSet, load_records
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, truth, write_declaration, write_records
 from tests.unit.test_cli import Run, run
+from tests.unit.test_identification_shooting import NOISE, TRUE
+from tests.unit.test_identification_shooting import truth as slide_record
 
 __all__ = ["run"]
 SEED, ONLY = 5, ("sine_25deg_2.0Hz", "sine_15deg_5.0Hz", "multisine")
@@ -124,3 +126,31 @@ def test_a_glob_that_holds_nothing_out_is_named_and_nothing_is_written(
     assert status == 2
     assert "'multisin': no record has such a name; did you mean 'multisine'" in err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_drive_that_moves_freely_is_fitted_by_simulation_over_windows() -> None:
+    """A slide simulated by SciPy; slow sampling blurs its balance of forces, not its simulation."""
+    spread = {"body.mass": (1.7, 0.3), "spring.stiffness": (90.0, 0.3), "guide.damping": (2.4, 0.4)}
+    slide = assembly(
+        "slide",
+        body=Mass(mass=1.0),
+        spring=tie(Spring(stiffness=30.0), "body"),
+        guide=tie(Dashpot(damping=1.0), "body"),
+    )
+    numbers = slide.quantities()
+    wide = {n: replace(numbers[n].with_value(v, "assumed"), spread=s) for n, (v, s) in spread.items()}
+    declared = slide.with_values(wide)
+    columns = (Column("f_N", "body.force", "N"), Column("x_m", "body.position", "m"))
+    runs = (replace(slide_record(1), name="a"), replace(slide_record(2), name="b", role="held_out"))
+    found = refit(declared, RecordSet(runs, columns), window=2.0)
+    for number in found.numbers:
+        away = abs(number.fitted - TRUE[number.name])
+        assert away < 3.0 * number.standard_error
+        assert away < 0.25 * abs(number.declared - TRUE[number.name])
+        assert number.declared == spread[number.name][0]
+        assert abs(number.strain) <= 1.0
+    (held,) = [e for e in found.errors() if e.block == "body.position over 2 s" and e.role == "held_out"]
+    assert held.unit == "m"
+    assert held.noise_floor == pytest.approx(NOISE, rel=0.15)
+    assert held.fitted < 0.5 * held.declared
+    assert found.actuator.quantities()["body.mass"].number == pytest.approx(2.0, rel=0.03)
