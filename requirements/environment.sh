@@ -70,7 +70,7 @@ if ! works || [ "$(head -n 1 "$stamp" 2>/dev/null)" != "$(pwd -P)" ]; then
 fi
 rm -f "$stamp"
 
-say "installing the locked packages (once; 340 MB to download, 1.4 GB on disk) ..."
+say "installing the locked packages (once; 400 MB to download, 1.6 GB on disk) ..."
 "$venv/bin/python" -m pip install $quiet --require-hashes --only-binary :all: -r requirements/locked.txt || {
     say "the locked packages could not be installed; the reason stands above. Is there a network, a proxy to set?"
     say "With a Python that is newer than the lock, try an older one:  make PYTHON=python3.13 ..."

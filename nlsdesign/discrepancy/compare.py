@@ -214,15 +214,17 @@ class Comparison:
         values, fits = dict(before.values), dict(before.fits)
         chi2, rows, worth = dict(before.chi2), dict(before.rows), dict(before.worth)
         done = shared_out(lambda k: self._trials.settled(before, groups[k], new), len(groups))
-        for group, (best, told) in zip(groups, done, strict=True):
+        rough = before.rough
+        for group, (best, told, coasts) in zip(groups, done, strict=True):
             if isinstance(best, ConvergenceError):
                 raise best
             values |= best.values
+            rough |= coasts
             names = tuple(b.block.name for b in group)
             fits = {k: f for k, f in fits.items() if not set(k) & set(names)} | {names: best}
             for key, (square, count, size) in told.items():
                 chi2[key], rows[key], worth[key] = square, count, size
-        return replace(before, values=values, fits=fits, chi2=chi2, rows=rows, worth=worth)
+        return replace(before, values=values, fits=fits, chi2=chi2, rows=rows, worth=worth, rough=rough)
 
 
 def _judged(evidence: Evidence) -> tuple[Array, Array]:

@@ -32,6 +32,9 @@ class Hypothesis:
         How many independent residuals these are worth, coloured as they are.
     coarse
         Whether it was fitted to thinned records only.
+    rough
+        Whether a body coasts in it between contacts: one contact at the wrong moment, and the prediction
+        stays wrong for a while, however right the effect.
     """
 
     assembly: Assembly
@@ -42,6 +45,7 @@ class Hypothesis:
     rows: Mapping[tuple[str, str], int]
     worth: Mapping[tuple[str, str], float]
     coarse: bool = False
+    rough: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -176,7 +176,9 @@ class _Seeker:
         """
         bench, full = self._comparison.bench, self._comparison.on_all_samples
         first, now = excesses(full(start), bench), excesses(full(present), bench)
-        lack = [n for n, e in now.items() if e.open and sum(e.excess) >= LEAST_SECOND * sum(first[n].excess)]
+        # Where a body coasts, predictions are never exact: what is closed is not searched for more.
+        least = 1.0 - CLOSED_SHARE if present.rough else LEAST_SECOND
+        lack = [n for n, e in now.items() if e.open and sum(e.excess) >= least * sum(first[n].excess)]
         blocks = sorted((n for n in lack if n != DECLARED), key=lambda n: -sum(now[n].excess))
         return blocks or lack
 
@@ -192,16 +194,19 @@ class _Seeker:
     def _fits(
         self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
     ) -> list[Hypothesis]:
-        def fitted(number: int) -> Hypothesis | None:
+        def fitted(number: int) -> Hypothesis | ConvergenceError | None:
             try:
                 return self._comparison.with_effect(*tasks[number], wanted)
-            except ConvergenceError:
-                return None  # no response anywhere near its starts: it explains nothing
+            except ConvergenceError as error:
+                return error  # no response anywhere near its starts, or too dear: it explains nothing
 
         found = []
         for (_, candidate), one in zip(tasks, shared_out(fitted, len(tasks)), strict=True):
             self._progress(f"trying {candidate.effect} at {candidate.location}")
-            found += [one] if one else []
+            if isinstance(one, ConvergenceError):
+                self._progress(f"left out: {one}")
+            elif one:
+                found.append(one)
         return found
 
     def _pair(

@@ -21,6 +21,9 @@ _EVALUATIONS, _COARSE_EVALUATIONS, _COARSE_TOLERANCE = 40, 20, 3e-4
 _POLISHED, _DEAR = 2e-5, 6
 _LONG = 30_000
 """Steps of so many operations are dear too."""
+_TOO_DEAR = 100_000
+_MOST_STARTS = 8
+"""A further effect of dearer steps, or of more starts where a body coasts, is left out: it takes minutes."""
 _SMALL = 1e-3
 """A coarse fit ends when it promises to gain less than this share of the cost without the effect."""
 
@@ -58,7 +61,7 @@ class Trials:
 
     def settled(
         self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
-    ) -> tuple[Fit | ConvergenceError, dict[tuple[str, str], tuple[float, int, float]]]:
+    ) -> tuple[Fit | ConvergenceError, dict[tuple[str, str], tuple[float, int, float]], bool]:
         """Fit a group of blocks.
 
         Parameters
@@ -73,12 +76,13 @@ class Trials:
         Returns
         -------
         tuple
-            The fit, or why there is none; and sum of squares, rows and worth of each block and record.
+            The fit, or why there is none; sum of squares, rows and worth of each block and record; and
+            whether a body coasts between contacts.
         """
         try:
             best, evidence = self._best_fit(before, group, new)
         except ConvergenceError as error:
-            return error, {}
+            return error, {}, False
         told = {}
         for each in evidence:
             residual = each.residual(best.values)[0]
@@ -87,12 +91,20 @@ class Trials:
                 len(residual),
                 effective_size(residual),
             )
-        return best, told
+        return best, told, any(each.driven.stiff for each in evidence)
 
     def _best_fit(
         self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
     ) -> tuple[Fit, list[Evidence]]:
         task = self._task(before, group, new)
+        dearest = max((e.driven.instructions for e in task.seen), default=0)
+        further = len(before.added) > 1
+        if further and (dearest > _TOO_DEAR or (before.rough and len(task.choices) > _MOST_STARTS)):
+            raise ConvergenceError(
+                " with ".join(before.names),
+                f"is too dear to try: {dearest} operations per step, {len(task.choices)} starts",
+                next_step="declare one of them in the deck and diagnose what is left",
+            )
         limits = (
             (_COARSE_EVALUATIONS, _COARSE_TOLERANCE)
             if before.coarse
@@ -103,8 +115,8 @@ class Trials:
         least = _SMALL * now if before.coarse and new else 0.0
         if any(e.driven.stiff for e in task.seen):
             # Short steps are dear, and where a body flies freely the valley is rough at the bottom.
-            limits = _DEAR if before.coarse else _DEAR // 3, limits[1]
-        elif before.added and any(e.driven.instructions > _LONG for e in task.seen):
+            limits = _DEAR if before.coarse and not further else _DEAR // 3, limits[1]
+        elif before.added and dearest > _LONG:
             limits = _DEAR, limits[1]
         several = len(task.choices) > 1
         choices = [(_promise(task.seen, ps) if several else 0.0, ps) for ps in task.choices]
