@@ -5,7 +5,7 @@ else; labels are read after it has decided. Set thresholds on seeds below 100 an
 
     python -m benchmarks.discrepancy_score --seeds 100-110 --out score.jsonl
     python -m benchmarks.discrepancy_score --sample 4 --strengths strong --seeds 100-104 --out score.jsonl
-    python -m benchmarks.discrepancy_score --out score.jsonl --table docs/discrepancy_score.md
+    python -m benchmarks.discrepancy_score --out score.jsonl --table docs/discrepancy.md
 
 Each result is one line of JSON, written as soon as it is there; a run goes on where it was interrupted. A
 case that fails is a line with the reason.
