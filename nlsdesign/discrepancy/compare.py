@@ -19,6 +19,7 @@ from ..identification.measurement import Record
 from ..identification.parameters import free_parameter
 from ..identification.residuals import effective_size
 from ..model import Assembly, Variable
+from .coasting import astray, like_the_others
 from .cuts import blocks_of
 from .effects.candidate import Candidate, Unknown
 from .hypothesis import Hypothesis
@@ -176,6 +177,7 @@ class Comparison:
             key = each.block.name, each.record.name
             chi2[key], rows[key] = float(each.residual @ each.residual), len(each.residual)
             worth[key] = effective_size(each.residual)
+        chi2 = like_the_others(chi2, rows, hypothesis.astray)
         return replace(hypothesis, chi2=chi2, rows=rows, worth=worth, coarse=False)
 
     def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
@@ -214,17 +216,22 @@ class Comparison:
         values, fits = dict(before.values), dict(before.fits)
         chi2, rows, worth = dict(before.chi2), dict(before.rows), dict(before.worth)
         done = shared_out(lambda k: self._trials.settled(before, groups[k], new), len(groups))
-        rough = before.rough
-        for group, (best, told, coasts) in zip(groups, done, strict=True):
+        rough, gone = before.rough, before.astray
+        for group, (best, told, quick) in zip(groups, done, strict=True):
             if isinstance(best, ConvergenceError):
                 raise best
             values |= best.values
-            rough |= coasts
+            rough |= quick is not None
             names = tuple(b.block.name for b in group)
             fits = {k: f for k, f in fits.items() if not set(k) & set(names)} | {names: best}
             for key, (square, count, size) in told.items():
                 chi2[key], rows[key], worth[key] = square, count, size
-        return replace(before, values=values, fits=fits, chi2=chi2, rows=rows, worth=worth, rough=rough)
+            if quick is not None and before.coarse and new:
+                mine = {k: told[k][0] for k in told}, {k: told[k][1] for k in told}
+                gone = frozenset(k for k in gone if k not in told) | astray(before.chi2, *mine, quick)
+        chi2 = like_the_others(chi2, rows, gone)
+        told_of = replace(before, chi2=chi2, rows=rows, worth=worth, rough=rough, astray=gone)
+        return replace(told_of, values=values, fits=fits)
 
 
 def _judged(evidence: Evidence) -> tuple[Array, Array]:

@@ -35,6 +35,8 @@ class Hypothesis:
     rough
         Whether a body coasts in it between contacts: one contact at the wrong moment, and the prediction
         stays wrong for a while, however right the effect.
+    astray
+        Blocks and records that such a body makes unpredictable; they count as the others do.
     """
 
     assembly: Assembly
@@ -46,6 +48,7 @@ class Hypothesis:
     worth: Mapping[tuple[str, str], float]
     coarse: bool = False
     rough: bool = False
+    astray: frozenset[tuple[str, str]] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:

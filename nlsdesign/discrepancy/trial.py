@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from ..errors import ConvergenceError
 from ..identification.driven import DrivenBlock
@@ -12,6 +12,8 @@ from ..identification.evidence import Bench, Evidence
 from ..identification.fit import Fit, Parameter, declared_parameter, fit, predicted_cost
 from ..identification.residuals import effective_size
 from ..model import Variable
+from .coasting import quickest
+from .cuts import blocks_of
 from .effects.candidate import Unknown
 from .hypothesis import Hypothesis
 
@@ -45,6 +47,31 @@ def _promise(seen: Sequence[Evidence], parameters: Sequence[Parameter]) -> float
         return float("inf")
 
 
+def _best_of(
+    seen: Sequence[Evidence],
+    starts: Sequence[Sequence[Parameter]],
+    limits: tuple[int, float],
+    least: float,
+) -> Fit:
+    """Return the best of fits from several starts, the most promising first."""
+    several = len(starts) > 1
+    choices = [(_promise(seen, ps) if several else 0.0, ps) for ps in starts]
+    best: Fit | None = None
+    for promised, choice in sorted(choices, key=lambda pair: pair[0])[:_FULL_STARTS]:
+        # What does not even promise to reach the best so far is left alone.
+        if best is not None and promised >= best.cost:
+            continue
+        try:
+            found = fit(seen, choice, evaluations=limits[0], tolerance=limits[1], least=least)
+        except ConvergenceError as error:
+            failed = error  # one start in a place where there is no response says nothing of others
+            continue
+        best = found if best is None or found.cost < best.cost else best
+    if best is None:
+        raise failed
+    return best
+
+
 class Trials:
     """Fits groups of blocks to the records.
 
@@ -61,7 +88,9 @@ class Trials:
 
     def settled(
         self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
-    ) -> tuple[Fit | ConvergenceError, dict[tuple[str, str], tuple[float, int, float]], bool]:
+    ) -> tuple[
+        Fit | ConvergenceError, dict[tuple[str, str], tuple[float, int, float]], frozenset[str] | None
+    ]:
         """Fit a group of blocks.
 
         Parameters
@@ -77,12 +106,12 @@ class Trials:
         -------
         tuple
             The fit, or why there is none; sum of squares, rows and worth of each block and record; and
-            whether a body coasts between contacts.
+            the names of the quickest records where a body coasts between contacts, else None.
         """
         try:
             best, evidence = self._best_fit(before, group, new)
         except ConvergenceError as error:
-            return error, {}, False
+            return error, {}, None
         told = {}
         for each in evidence:
             residual = each.residual(best.values)[0]
@@ -91,7 +120,8 @@ class Trials:
                 len(residual),
                 effective_size(residual),
             )
-        return best, told, any(each.driven.stiff for each in evidence)
+        coasts = any(each.driven.stiff for each in evidence)
+        return best, told, quickest(evidence) if coasts else None
 
     def _best_fit(
         self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]
@@ -118,22 +148,50 @@ class Trials:
             limits = _DEAR if before.coarse and not further else _DEAR // 3, limits[1]
         elif before.added and dearest > _LONG:
             limits = _DEAR, limits[1]
-        several = len(task.choices) > 1
-        choices = [(_promise(task.seen, ps) if several else 0.0, ps) for ps in task.choices]
-        best: Fit | None = None
-        for promised, choice in sorted(choices, key=lambda pair: pair[0])[:_FULL_STARTS]:
-            # What does not even promise to reach the best so far is left alone.
-            if best is not None and promised >= best.cost:
-                continue
-            try:
-                found = fit(task.seen, choice, evaluations=limits[0], tolerance=limits[1], least=least)
-            except ConvergenceError as error:
-                failed = error  # one start in a place where there is no response says nothing of others
-                continue
-            best = found if best is None or found.cost < best.cost else best
-        if best is None:
-            raise failed
-        return best, task.everything
+        if before.coarse and new and before.added[-1].sketch is not None:
+            task = replace(
+                task, choices=self._sketched(before, group, task.choices, quickest(task.everything))
+            )
+        return self._settled_on(task, before, limits, least), task.everything
+
+    def _sketched(
+        self,
+        before: Hypothesis,
+        group: Sequence[DrivenBlock],
+        choices: list[list[Parameter]],
+        quick: Collection[str],
+    ) -> list[list[Parameter]]:
+        """Return the one start that a simpler form of the newest effect suggests on the slower records."""
+        sketch, names = before.added[-1].sketch, {b.block.name for b in group}
+        if sketch is None:
+            return choices
+        blocks = [b for b in blocks_of(sketch, self._bench.records.signals) if b.name in names]
+        free = [p.name for p in choices[0]]
+        driven = [DrivenBlock(b, [n for n in free if n in b.model.values]) for b in blocks]
+        shared = {n for d in driven for n in d.free}
+        starts = list(dict.fromkeys(tuple(p for p in c if p.name in shared) for c in choices))
+        begin = {p.name: p.start for p in starts[0]}
+        records = [r for r in self._bench.records.of("fit") if r.name not in quick]
+        seen = [e for d in driven for e in self._bench.evidence(d, records, begin, coarse=True)]
+        try:
+            found = _best_of(seen, starts, (_COARSE_EVALUATIONS, _COARSE_TOLERANCE), 0.0).values
+        except ConvergenceError:
+            return choices
+        own, whole = sketch.quantities(), before.assembly.quantities()
+        same = {n for n in own if n in whole and own[n].value == whole[n].value}
+        kept = {n: v for n, v in found.items() if n.partition("[")[0] in same}
+        return [[replace(p, start=kept.get(p.name, p.start)) for p in choices[0]]]
+
+    def _settled_on(self, task: _Task, before: Hypothesis, limits: tuple[int, float], least: float) -> Fit:
+        """Fit; where a body coasts, first to slower records, and no record decides by how wrong it is."""
+        calm = [e for e in task.seen if (e.driven.block.name, e.record.name) not in before.astray]
+        if not any(e.driven.stiff for e in task.seen) or not before.coarse:
+            return _best_of(calm, task.choices, limits, least)
+        quick = quickest(task.everything)
+        best = _best_of([e for e in calm if e.record.name not in quick], task.choices, limits, 0.0)
+        begin = [replace(p, start=best.values[p.name]) for p in best.parameters]
+        known = before.chi2
+        return fit(calm, begin, evaluations=limits[0], tolerance=limits[1], least=least, known=known)
 
     def _task(self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]) -> _Task:
         free = list(dict.fromkeys(name for b in group for name in b.free))

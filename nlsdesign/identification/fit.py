@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError
 from .descent import Minimum, minimise
 from .evidence import Evidence
+from .losses import saturated
 from .parameters import Parameter as Parameter
 from .parameters import box
 from .parameters import declared_parameter as declared_parameter
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 _EVALUATIONS = 40
 _OPEN_END = 1e-6
 """Least information on the fitted scale."""
+_WILD = 1e3
+"""Where a body coasts, a response to a number that is steeper than this, in standard deviations of the noise,
+is that of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
 
@@ -101,6 +105,7 @@ def fit(
     evaluations: int = _EVALUATIONS,
     tolerance: float = 0.0,
     least: float = 0.0,
+    known: Mapping[tuple[str, str], float] | None = None,
 ) -> Fit:
     """Fit parameters to everything that the records say.
 
@@ -117,13 +122,16 @@ def fit(
 
     least
         Ends too when the predicted gain is below this.
+    known
+        Sum of squares by block and record that another model reaches. What is worse than that counts ever
+        less, see :func:`~.losses.saturated`; without it every residual counts alike.
 
     Raises
     ------
     ConvergenceError
         If the fit ends without a finite cost.
     """
-    rows = _Rows(evidence, parameters)
+    rows = _Rows(evidence, parameters, known or {})
     low, high, start = box(parameters)
     if not parameters:
         fixed = rows(start)[0]
@@ -151,7 +159,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
         As for :func:`fit`.
     """
     low, high, start = box(parameters)
-    residual, slope = _Rows(evidence, parameters)(start)
+    residual, slope = _Rows(evidence, parameters, {})(start)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
     step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
@@ -162,8 +170,13 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
 class _Rows:
     """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered."""
 
-    def __init__(self, evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> None:
-        self._evidence, self._parameters = evidence, parameters
+    def __init__(
+        self,
+        evidence: Sequence[Evidence],
+        parameters: Sequence[Parameter],
+        known: Mapping[tuple[str, str], float],
+    ) -> None:
+        self._evidence, self._parameters, self._known = evidence, parameters, known
         self._names = [p.name for p in parameters]
         self._prior = np.diag([1.0 / p.sigma for p in parameters])
         self._centre = np.array([p.inward(p.centre) if math.isfinite(p.sigma) else 0.0 for p in parameters])
@@ -186,6 +199,10 @@ class _Rows:
             for k, name in enumerate(each.driven.free):
                 j = self._names.index(name)
                 wide[:, j] = slope[:, k] * self._parameters[j].slope(values[name])
+            if each.driven.stiff:
+                wide[np.abs(wide).max(axis=1) > _WILD] = 0.0
+            bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
+            residual, wide = saturated(residual, wide, max(bound, float(len(residual))))
             rows.append(residual)
             slopes.append(wide)
         return np.concatenate(rows), np.vstack(slopes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
 
@@ -72,3 +73,28 @@ class Huber(Loss):
         """Return √(min(1, k/|r|))."""
         result: Array = np.sqrt(np.minimum(1.0, self.bend / np.maximum(np.abs(residual), 1e-300)))
         return result
+
+
+def saturated(residual: Array, slope: Array, bound: float) -> tuple[Array, Array]:
+    """Return residuals and slopes scaled so that their sum of squares c counts as ρ(c) < 2·bound.
+
+    ρ(c) = c up to the bound, bound·(2 − bound/c) beyond: smooth, and rising ever more slowly. For a whole
+    record that a model may predict not at all, which must not decide over those that it predicts.
+
+    Parameters
+    ----------
+    residual
+        Of one record in standard deviations, shape (n,).
+    slope
+        Its derivatives, shape (n, parameters).
+    bound
+        Sum of squares up to which everything counts, above zero.
+    """
+    total = float(residual @ residual)
+    if total <= bound:
+        return residual, slope
+    share = bound / total
+    scale = math.sqrt(share * (2.0 - share))
+    # The derivative of the scale with respect to c = Σr², for the exact slope of scale·r.
+    bent = share * (share - 1.0) / (total * scale)
+    return scale * residual, scale * slope + np.outer(2.0 * bent * residual, residual @ slope)

@@ -54,6 +54,9 @@ class Candidate:
         What it leaves in records, in words.
     source
         Where the law comes from.
+    sketch
+        The same effect in a simpler form, fitted first where the assembly is hard to fit from afar: numbers
+        of the same name and declared value begin where it leaves them.
     """
 
     effect: str
@@ -62,6 +65,7 @@ class Candidate:
     unknowns: tuple[Unknown, ...]
     signature: str
     source: str
+    sketch: Assembly | None = None
 
 
 Effect: TypeAlias = Callable[[Assembly], Sequence[Candidate]]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ...components import (
     Assembly,
+    Backlash,
     CoulombFriction,
     Element,
     GearedMotor,
@@ -258,9 +259,15 @@ def backlash(assembly: Assembly) -> Sequence[Candidate]:
                 ),
                 "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
                 "Nordin and Gutman 2002",
+                # In slow motion what is behind the play has no inertia to speak of.
+                wrapped(assembly, name, "behind_play", _massless),
             )
         )
     return found
+
+
+def _massless(name: str, element: Element) -> Element:
+    return Backlash(members=((name, element),), gap=_number(0.01, "rad"))
 
 
 def _ends(assembly: Assembly, name: str) -> tuple[str, ...]:
