@@ -246,6 +246,11 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
     renamed = _renamed(hypothesis, candidate.assembly)
     old = tuple(replace(u, name=renamed.get(u.name, u.name)) for u in hypothesis.unknowns)
     values = {renamed.get(n, n): v for n, v in hypothesis.values.items()}
+    # An edit may share a number out, for instance an inertia: what was fitted is shared out alike.
+    then, now = hypothesis.assembly.quantities(), candidate.assembly.quantities()
+    for name in values.keys() & then.keys() & now.keys():
+        if then[name].value != now[name].value:
+            values[name] *= now[name].number / then[name].number
     added = (*_with_unknowns(hypothesis.added, old), candidate)
     return replace(hypothesis, assembly=candidate.assembly, added=added, values=values)
 

@@ -115,7 +115,9 @@ def _verdict(
     return Verdict(
         word,
         tuple(_named(better, step, place) for place, step in enumerate(steps)),
-        tuple(_where(before[n], after[n]) for n in before if n != DECLARED or before[n].open) + findings,
+        tuple(_where(before[n], after[n]) for n in before if n != DECLARED or before[n].open)
+        + tuple(_gone(key) for key in sorted(better.astray))
+        + findings,
         gaps_of(base, better, comparison),
         worst,
         tuple(sorted(runners_up[:_RUNNERS_UP], key=lambda pair: -pair[1])),
@@ -164,6 +166,14 @@ def _where(before: Excess, after: Excess) -> str:
     state = "open" if before.open else "closed"
     told = f"{ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
     return f"{before.block} ({state}): {told}"
+
+
+def _gone(key: tuple[str, str]) -> str:
+    block, record = key
+    return (
+        f"{block}: record '{record}', the quickest, is not predicted: there a body that coasts between "
+        "contacts may go another way. The effect is judged by the other records."
+    )
 
 
 def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:

@@ -26,6 +26,8 @@ _LONG = 30_000
 _TOO_DEAR = 100_000
 _MOST_STARTS = 8
 """A further effect of dearer steps, or of more starts where a body coasts, is left out: it takes minutes."""
+_BESIDE = (1.0 / 1.2, 1.2)
+_HELD = 1e-4
 _SMALL = 1e-3
 """A coarse fit ends when it promises to gain less than this share of the cost without the effect."""
 
@@ -70,6 +72,18 @@ def _best_of(
     if best is None:
         raise failed
     return best
+
+
+def _pinned(fitted: Fit, name: str, factor: float) -> list[Parameter]:
+    """Return the parameters of a fit where it ended, one of them held at a multiple of that."""
+    found = []
+    for each in fitted.parameters:
+        value = fitted.values[each.name]
+        if each.name == name:
+            value = min(max(factor * value, each.lower), each.upper)
+            each = replace(each, lower=value * (1.0 - _HELD), upper=value * (1.0 + _HELD))
+        found.append(replace(each, start=value))
+    return found
 
 
 class Trials:
@@ -148,23 +162,50 @@ class Trials:
             limits = _DEAR if before.coarse and not further else _DEAR // 3, limits[1]
         elif before.added and dearest > _LONG:
             limits = _DEAR, limits[1]
-        if before.coarse and new and before.added[-1].sketch is not None:
-            task = replace(
-                task, choices=self._sketched(before, group, task.choices, quickest(task.everything))
-            )
-        return self._settled_on(task, before, limits, least), task.everything
+        return self._settled_on(task, before, (group, new), limits, least), task.everything
+
+    def _settled_on(
+        self,
+        task: _Task,
+        before: Hypothesis,
+        what: tuple[Sequence[DrivenBlock], Sequence[Unknown]],
+        limits: tuple[int, float],
+        least: float,
+    ) -> Fit:
+        """Fit; where a body coasts, from what a sketch or slower records say, and no record decides alone."""
+        calm = [e for e in task.seen if (e.driven.block.name, e.record.name) not in before.astray]
+        if not any(e.driven.stiff for e in task.seen) or not before.coarse:
+            return _best_of(calm, task.choices, limits, least)
+        quick, known = quickest(task.everything), before.chi2
+        slow = [e for e in calm if e.record.name not in quick]
+        starts = [
+            [replace(p, start=values.get(p.name, p.start)) for p in task.choices[0]]
+            for values in self._sketched(before, what, task.choices, quick)
+        ]
+        if starts:
+            looks = [fit(slow, ps, evaluations=0).cost for ps in starts]
+            starts = [starts[looks.index(min(looks))]]
+        best = _best_of(slow, starts or task.choices, limits, 0.1 * least)
+        begin = [replace(p, start=best.values[p.name]) for p in best.parameters]
+        few = limits[0] // 2
+        return fit(calm, begin, evaluations=few, tolerance=limits[1], least=least, known=known)
 
     def _sketched(
         self,
         before: Hypothesis,
-        group: Sequence[DrivenBlock],
+        what: tuple[Sequence[DrivenBlock], Sequence[Unknown]],
         choices: list[list[Parameter]],
         quick: Collection[str],
-    ) -> list[list[Parameter]]:
-        """Return the one start that a simpler form of the newest effect suggests on the slower records."""
+    ) -> list[dict[str, float]]:
+        """Return what a simpler form of the newest effect says on the slower records, beside its valley too.
+
+        Slow motion leaves the numbers of the effect and of what it acts on much alike, so each new number is
+        held a little below and above as well.
+        """
+        group, new = what
         sketch, names = before.added[-1].sketch, {b.block.name for b in group}
-        if sketch is None:
-            return choices
+        if sketch is None or not new:
+            return []
         blocks = [b for b in blocks_of(sketch, self._bench.records.signals) if b.name in names]
         free = [p.name for p in choices[0]]
         driven = [DrivenBlock(b, [n for n in free if n in b.model.values]) for b in blocks]
@@ -173,25 +214,16 @@ class Trials:
         begin = {p.name: p.start for p in starts[0]}
         records = [r for r in self._bench.records.of("fit") if r.name not in quick]
         seen = [e for d in driven for e in self._bench.evidence(d, records, begin, coarse=True)]
-        try:
-            found = _best_of(seen, starts, (_COARSE_EVALUATIONS, _COARSE_TOLERANCE), 0.0).values
-        except ConvergenceError:
-            return choices
         own, whole = sketch.quantities(), before.assembly.quantities()
         same = {n for n in own if n in whole and own[n].value == whole[n].value}
-        kept = {n: v for n, v in found.items() if n.partition("[")[0] in same}
-        return [[replace(p, start=kept.get(p.name, p.start)) for p in choices[0]]]
-
-    def _settled_on(self, task: _Task, before: Hypothesis, limits: tuple[int, float], least: float) -> Fit:
-        """Fit; where a body coasts, first to slower records, and no record decides by how wrong it is."""
-        calm = [e for e in task.seen if (e.driven.block.name, e.record.name) not in before.astray]
-        if not any(e.driven.stiff for e in task.seen) or not before.coarse:
-            return _best_of(calm, task.choices, limits, least)
-        quick = quickest(task.everything)
-        best = _best_of([e for e in calm if e.record.name not in quick], task.choices, limits, 0.0)
-        begin = [replace(p, start=best.values[p.name]) for p in best.parameters]
-        known = before.chi2
-        return fit(calm, begin, evaluations=limits[0], tolerance=limits[1], least=least, known=known)
+        limits = _COARSE_EVALUATIONS, _COARSE_TOLERANCE
+        try:
+            best = _best_of(seen, starts, limits, 0.0)
+            pinned = [_pinned(best, u.name, f) for u in new if u.name in shared for f in _BESIDE]
+            found = [best, *[_best_of(seen, [ps], limits, 0.0) for ps in pinned]]
+        except ConvergenceError:
+            return []
+        return [{n: v for n, v in f.values.items() if n.partition("[")[0] in same} for f in found]
 
     def _task(self, before: Hypothesis, group: Sequence[DrivenBlock], new: Sequence[Unknown]) -> _Task:
         free = list(dict.fromkeys(name for b in group for name in b.free))
