@@ -194,20 +194,24 @@ class _Seeker:
     def _fits(
         self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
     ) -> list[Hypothesis]:
-        def fitted(number: int) -> Hypothesis | ConvergenceError | None:
+        # What takes longest begins first, so that no core waits for it at the end.
+        order = sorted(range(len(tasks)), key=lambda number: tasks[number][1].sketch is None)
+
+        def fitted(place: int) -> Hypothesis | ConvergenceError | None:
             try:
-                return self._comparison.with_effect(*tasks[number], wanted)
+                return self._comparison.with_effect(*tasks[order[place]], wanted)
             except ConvergenceError as error:
                 return error  # no response anywhere near its starts, or too dear: it explains nothing
 
-        found = []
-        for (_, candidate), one in zip(tasks, shared_out(fitted, len(tasks)), strict=True):
+        found = {}
+        for number, one in zip(order, shared_out(fitted, len(tasks)), strict=True):
+            candidate = tasks[number][1]
             self._progress(f"trying {candidate.effect} at {candidate.location}")
             if isinstance(one, ConvergenceError):
                 self._progress(f"left out: {one}")
             elif one:
-                found.append(one)
-        return found
+                found[number] = one
+        return [found[number] for number in sorted(found)]
 
     def _pair(
         self, tried: Sequence[Hypothesis], known: tuple[dict[str, Excess], dict[str, Excess]], block: str

@@ -26,8 +26,9 @@ _LONG = 30_000
 _TOO_DEAR = 100_000
 _MOST_STARTS = 8
 """A further effect of dearer steps, or of more starts where a body coasts, is left out: it takes minutes."""
-_BESIDE = (1.0 / 1.2, 1.2)
+_BESIDE = (1.2,)
 _HELD = 1e-4
+_BEGUN = 0.3
 _SMALL = 1e-3
 """A coarse fit ends when it promises to gain less than this share of the cost without the effect."""
 
@@ -54,6 +55,7 @@ def _best_of(
     starts: Sequence[Sequence[Parameter]],
     limits: tuple[int, float],
     least: float,
+    known: Mapping[tuple[str, str], float] | None = None,
 ) -> Fit:
     """Return the best of fits from several starts, the most promising first."""
     several = len(starts) > 1
@@ -64,7 +66,7 @@ def _best_of(
         if best is not None and promised >= best.cost:
             continue
         try:
-            found = fit(seen, choice, evaluations=limits[0], tolerance=limits[1], least=least)
+            found = fit(seen, choice, evaluations=limits[0], tolerance=limits[1], least=least, known=known)
         except ConvergenceError as error:
             failed = error  # one start in a place where there is no response says nothing of others
             continue
@@ -84,6 +86,13 @@ def _pinned(fitted: Fit, name: str, factor: float) -> list[Parameter]:
             each = replace(each, lower=value * (1.0 - _HELD), upper=value * (1.0 + _HELD))
         found.append(replace(each, start=value))
     return found
+
+
+def _worth_a_fit(before: Hypothesis, slow: Sequence[Evidence], cost: float) -> bool:
+    """Tell whether what a sketch has begun takes enough off the excess over the noise to be fitted."""
+    keys = [(e.driven.block.name, e.record.name) for e in slow]
+    now = 0.5 * sum(before.chi2[k] for k in keys)
+    return now - cost >= _BEGUN * (now - 0.5 * sum(before.rows[k] for k in keys))
 
 
 class Trials:
@@ -174,20 +183,24 @@ class Trials:
     ) -> Fit:
         """Fit; where a body coasts, from what a sketch or slower records say, and no record decides alone."""
         calm = [e for e in task.seen if (e.driven.block.name, e.record.name) not in before.astray]
-        if not any(e.driven.stiff for e in task.seen) or not before.coarse:
+        if not any(e.driven.stiff for e in task.seen):
             return _best_of(calm, task.choices, limits, least)
+        if not before.coarse:
+            return _best_of(calm, task.choices, limits, least, {})
         quick, known = quickest(task.everything), before.chi2
         slow = [e for e in calm if e.record.name not in quick]
         starts = [
             [replace(p, start=values.get(p.name, p.start)) for p in task.choices[0]]
             for values in self._sketched(before, what, task.choices, quick)
         ]
+        evaluations = limits[0]
         if starts:
-            looks = [fit(slow, ps, evaluations=0).cost for ps in starts]
+            looks = [fit(slow, ps, evaluations=0, known={}).cost for ps in starts]
             starts = [starts[looks.index(min(looks))]]
-        best = _best_of(slow, starts or task.choices, limits, 0.1 * least)
+            evaluations = evaluations if _worth_a_fit(before, slow, min(looks)) else 0
+        best = _best_of(slow, starts or task.choices, (evaluations, limits[1]), 0.1 * least, {})
         begin = [replace(p, start=best.values[p.name]) for p in best.parameters]
-        few = limits[0] // 2
+        few = evaluations // 2
         return fit(calm, begin, evaluations=few, tolerance=limits[1], least=least, known=known)
 
     def _sketched(
@@ -199,8 +212,8 @@ class Trials:
     ) -> list[dict[str, float]]:
         """Return what a simpler form of the newest effect says on the slower records, beside its valley too.
 
-        Slow motion leaves the numbers of the effect and of what it acts on much alike, so each new number is
-        held a little below and above as well.
+        Slow motion can hardly tell more of the effect from more of what it acts on, so each new number is
+        held a little above as well: without inertia behind it, play looks smaller than it is.
         """
         group, new = what
         sketch, names = before.added[-1].sketch, {b.block.name for b in group}

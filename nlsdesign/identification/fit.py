@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError
 from .descent import Minimum, minimise
 from .evidence import Evidence
-from .losses import saturated
+from .losses import bent, saturated
 from .parameters import Parameter as Parameter
 from .parameters import box
 from .parameters import declared_parameter as declared_parameter
@@ -26,6 +26,7 @@ _OPEN_END = 1e-6
 _WILD = 1e3
 """Where a body coasts, a response to a number that is steeper than this, in standard deviations of the noise,
 is that of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
+_BEND = 3.0
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
 
@@ -119,19 +120,19 @@ def fit(
         Bound on the number of evaluations.
     tolerance
         Ends too when the predicted gain is below this share of the cost: enough to tell a bad hypothesis.
-
     least
         Ends too when the predicted gain is below this.
     known
-        Sum of squares by block and record that another model reaches. What is worse than that counts ever
-        less, see :func:`~.losses.saturated`; without it every residual counts alike.
+        Sum of squares by block and record that another model reaches. If this is given, then where a body
+        coasts far residuals count as Huber says, and a record that is worse than what is known counts ever
+        less, see :func:`~.losses.saturated`. Without it every residual counts alike.
 
     Raises
     ------
     ConvergenceError
         If the fit ends without a finite cost.
     """
-    rows = _Rows(evidence, parameters, known or {})
+    rows = _Rows(evidence, parameters, known)
     low, high, start = box(parameters)
     if not parameters:
         fixed = rows(start)[0]
@@ -159,7 +160,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
         As for :func:`fit`.
     """
     low, high, start = box(parameters)
-    residual, slope = _Rows(evidence, parameters, {})(start)
+    residual, slope = _Rows(evidence, parameters, None)(start)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
     step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
@@ -174,7 +175,7 @@ class _Rows:
         self,
         evidence: Sequence[Evidence],
         parameters: Sequence[Parameter],
-        known: Mapping[tuple[str, str], float],
+        known: Mapping[tuple[str, str], float] | None,
     ) -> None:
         self._evidence, self._parameters, self._known = evidence, parameters, known
         self._names = [p.name for p in parameters]
@@ -201,8 +202,10 @@ class _Rows:
                 wide[:, j] = slope[:, k] * self._parameters[j].slope(values[name])
             if each.driven.stiff:
                 wide[np.abs(wide).max(axis=1) > _WILD] = 0.0
-            bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
-            residual, wide = saturated(residual, wide, max(bound, float(len(residual))))
+            if each.driven.stiff and self._known is not None:
+                residual, wide = bent(residual, wide, _BEND)
+                bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
+                residual, wide = saturated(residual, wide, max(bound, float(len(residual))))
             rows.append(residual)
             slopes.append(wide)
         return np.concatenate(rows), np.vstack(slopes)

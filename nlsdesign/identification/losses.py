@@ -75,6 +75,25 @@ class Huber(Loss):
         return result
 
 
+def bent(residual: Array, slope: Array, bend: float) -> tuple[Array, Array]:
+    """Return residuals and slopes scaled so that half the sum of squares is Huber's loss.
+
+    Parameters
+    ----------
+    residual
+        In standard deviations, shape (n,).
+    slope
+        Its derivatives, shape (n, parameters).
+    bend
+        Beyond so many standard deviations the loss is a line.
+    """
+    size = np.abs(residual)
+    far = size > bend
+    scaled = np.where(far, np.sqrt(np.maximum(2.0 * bend * size - bend**2, 0.0)), size)
+    steepness = np.where(far, bend / np.maximum(scaled, 1e-300), 1.0)
+    return np.sign(residual) * scaled, steepness[:, None] * slope
+
+
 def saturated(residual: Array, slope: Array, bound: float) -> tuple[Array, Array]:
     """Return residuals and slopes scaled so that their sum of squares c counts as ρ(c) < 2·bound.
 

@@ -1,9 +1,9 @@
-"""Losses: how much a whole record may count."""
+"""Losses: how much a sample, and how much a whole record, may count."""
 
 import numpy as np
 import pytest
 
-from nlsdesign.identification.losses import saturated
+from nlsdesign.identification.losses import Huber, bent, saturated
 
 X = np.array([0.3, -0.8])
 
@@ -40,3 +40,16 @@ def test_the_slope_is_that_of_the_scaled_residuals(share: float) -> None:
         aside = step * np.eye(2)[k]
         ends = [saturated(*rows(X + sign * aside), bound)[0] for sign in (1.0, -1.0)]
         assert slope[:, k] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("bend", [0.5, 1.05, 10.0])
+def test_bent_residuals_have_the_loss_of_huber_and_its_slope(bend: float) -> None:
+    residual, slope = rows(X)
+    scaled, scaled_slope = bent(residual, slope, bend)
+    assert 0.5 * scaled @ scaled == pytest.approx(Huber(bend).value(residual), rel=1e-12)
+    assert np.array_equal(np.sign(scaled), np.sign(residual))
+    step = 1e-6
+    for k in range(2):
+        aside = step * np.eye(2)[k]
+        ends = [bent(*rows(X + sign * aside), bend)[0] for sign in (1.0, -1.0)]
+        assert scaled_slope[:, k] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-6, abs=1e-9)
