@@ -24,7 +24,8 @@ SAME = 0.02
 ALIAS = 0.003
 """Hypotheses whose excess differs by less than this share of the first excess cannot be told apart."""
 _NOISE = 50.0
-_MOST_EFFECTS = 3
+_MOST_EFFECTS, _MOST_ROUGH = 3, 2
+"""Where a body coasts a third effect takes minutes to look for, and would rest on what is not quite right."""
 _PAIRED = 4
 """Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice."""
 
@@ -120,7 +121,7 @@ class _Seeker:
         steps: list[Step] = []
         ranking: tuple[tuple[Candidate, float], ...] = ()
         present = start
-        while (lacking := self._lacking(start, present)) and len(steps) < _MOST_EFFECTS:
+        while (lacking := self._lacking(start, present)) and len(steps) < _most(present):
             tried: list[Hypothesis] = []
             step = None
             for block in lacking:
@@ -291,6 +292,10 @@ def _best_step(
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     chosen, after = alike.pop(next(reversed(alike)))
     return Step(chosen, *_best_shares(before, after), tuple(h for h, _ in alike.values()))
+
+
+def _most(present: Hypothesis) -> int:
+    return _MOST_ROUGH if present.rough else _MOST_EFFECTS
 
 
 def _best_shares(before: dict[str, Excess], after: dict[str, Excess]) -> tuple[float, float]:
