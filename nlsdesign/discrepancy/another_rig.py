@@ -24,6 +24,9 @@ _FAR = 4.0
 """Declared ranges from the declared value beyond which a number is none of this rig; a refit stops at two."""
 _SHARE = 0.98
 """Free numbers may take up most of an effect that the catalogue does not know, but not all of it."""
+_CLOSED = 0.05
+"""An effect that leaves no more than this of the excess is the simpler explanation, even if its form is not
+quite right and many numbers let go come closer."""
 _OUT_OF_REACH = 1.2
 
 
@@ -62,7 +65,8 @@ def other_numbers(comparison: Comparison, base: Hypothesis, better: Hypothesis) 
     far = _far_numbers(free, base)
     let_go = excesses(free, comparison.bench)
     explains = 1.0 - _left(let_go) / _left(before)
-    if far and explains >= _SHARE and _left(let_go) < 0.5 * _left(after):
+    little = better is not base and _left(after) <= _CLOSED * _left(before)
+    if far and explains >= _SHARE and _left(let_go) < 0.5 * _left(after) and not little:
         told = (
             f"the records may be of another rig: with its numbers free the declared model explains "
             f"{100.0 * explains:.3g} % of the excess without any effect, but then {'; '.join(far)}"

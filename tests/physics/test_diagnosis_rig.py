@@ -55,6 +55,13 @@ def test_play_is_named_although_one_record_goes_another_way(tmp_path: Path) -> N
     assert gap == pytest.approx(hidden.gap, rel=0.15)
 
 
+def test_stiffening_rubber_is_not_taken_for_another_rig(tmp_path: Path) -> None:
+    """All moduli let go would explain more of it, but one effect within declared numbers explains enough."""
+    found = verdict_of(tmp_path, "arm", {"strain_stiffening": 1.0}, 109)
+    assert found.verdict == "named"
+    assert names(found) == ["strain_stiffening"]
+
+
 def test_nothing_is_invented_on_a_clean_set(tmp_path: Path) -> None:
     found = verdict_of(tmp_path, "wrist", {}, 78)
     assert found.verdict == "none"
