@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import casadi as ca
@@ -36,9 +37,9 @@ class Shifting(Combination):
         """True if any element inside needs the rate."""
         return any(member.needs_rate for _, member in self.members)
 
+    @abstractmethod
     def shifted(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
         """Return the inner motion and its derivative with respect to the outer one."""
-        raise NotImplementedError
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return m'(x)·Σ(efforts at m(x))."""

@@ -27,8 +27,11 @@ _TOO_DEAR = 100_000
 _MOST_STARTS = 8
 """A further effect of dearer steps, or of more starts where a body coasts, is left out: it takes minutes."""
 _BESIDE = (1.2,)
+"""Multiples of what a sketch says of a new number that are tried as well."""
 _HELD = 1e-4
+"""Share by which a number that is held may move."""
 _BEGUN = 0.3
+"""Share of the excess over the noise that a sketch must explain for the whole to be fitted."""
 _SMALL = 1e-3
 """A coarse fit ends when it promises to gain less than this share of the cost without the effect."""
 
@@ -183,12 +186,13 @@ class Trials:
     ) -> Fit:
         """Fit; where a body coasts, from what a sketch or slower records say, and no record decides alone."""
         calm = [e for e in task.seen if (e.driven.block.name, e.record.name) not in before.astray]
+        calm = calm or task.seen
         if not any(e.driven.stiff for e in task.seen):
             return _best_of(calm, task.choices, limits, least)
         if not before.coarse:
             return _best_of(calm, task.choices, limits, least, {})
         quick, known = quickest(task.everything), before.chi2
-        slow = [e for e in calm if e.record.name not in quick]
+        slow = [e for e in calm if e.record.name not in quick] or calm
         starts = [
             [replace(p, start=values.get(p.name, p.start)) for p in task.choices[0]]
             for values in self._sketched(before, what, task.choices, quick)
@@ -216,8 +220,9 @@ class Trials:
         held a little above as well: without inertia behind it, play looks smaller than it is.
         """
         group, new = what
-        sketch, names = before.added[-1].sketch, {b.block.name for b in group}
-        if sketch is None or not new:
+        # A deck may declare play itself: then nothing is new, and there is no sketch.
+        sketch, names = before.added[-1].sketch if new else None, {b.block.name for b in group}
+        if sketch is None:
             return []
         blocks = [b for b in blocks_of(sketch, self._bench.records.signals) if b.name in names]
         free = [p.name for p in choices[0]]
@@ -225,7 +230,8 @@ class Trials:
         shared = {n for d in driven for n in d.free}
         starts = list(dict.fromkeys(tuple(p for p in c if p.name in shared) for c in choices))
         begin = {p.name: p.start for p in starts[0]}
-        records = [r for r in self._bench.records.of("fit") if r.name not in quick]
+        fitted = self._bench.records.of("fit")
+        records = [r for r in fitted if r.name not in quick] or fitted
         seen = [e for d in driven for e in self._bench.evidence(d, records, begin, coarse=True)]
         own, whole = sketch.quantities(), before.assembly.quantities()
         same = {n for n in own if n in whole and own[n].value == whole[n].value}

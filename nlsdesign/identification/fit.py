@@ -27,6 +27,7 @@ _WILD = 1e3
 """Where a body coasts, a response to a number that is steeper than this, in standard deviations of the noise,
 is that of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
 _BEND = 3.0
+"""Standard deviations beyond which, where a body coasts, a residual counts as Huber says."""
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
 

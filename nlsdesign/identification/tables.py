@@ -197,6 +197,7 @@ def _mat(file: Path) -> Table:
     found: dict[str, Any] = {}
     try:
         _gather(_library("scipy.io", file).loadmat(file, squeeze_me=True), "", found)
+    # SciPy says the second of versions of the format that it does not read.
     except (ValueError, NotImplementedError) as error:
         raise MeasurementError(file.name, f"cannot be read: {error}") from None
     return Table(file.name, _numeric(found))

@@ -13,6 +13,7 @@ import pytest
 from nlsdesign.discrepancy.compare import Comparison
 from nlsdesign.discrepancy.cuts import blocks_of
 from nlsdesign.discrepancy.effects import ALL
+from nlsdesign.discrepancy.effects.friction import backlash
 from nlsdesign.discrepancy.locate import excesses, total_excess
 from nlsdesign.discrepancy.suspicion import typical_sizes
 from nlsdesign.identification import load_records
@@ -51,3 +52,18 @@ def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> 
     with_it = [comparison.with_effect(base, candidate) for candidate in tried(declared)]
     left = min(total_excess(excesses(h, bench)) for h in with_it)
     assert left < 0.5 * total_excess(before)
+
+
+def test_a_deck_that_declares_play_is_looked_at_coarsely(tmp_path: Path) -> None:
+    """As when a deck that a diagnosis has written is diagnosed again: a body coasts, and nothing is new."""
+    actuator = ACTUATORS["wrist"]
+    write_set(tmp_path, actuator, make_records(actuator, {"backlash": 1.0}, 21, only=RECORDS))
+    plain = declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv")
+    (candidate,) = backlash(plain)
+    left = []
+    for declared in (plain, candidate.assembly.with_values({"spring.gap": 0.05})):
+        records = load_records(tmp_path, flatten(declared))
+        bench = Bench(records, blocks_of(declared, records.signals))
+        comparison = Comparison(bench, typical_sizes(declared, records))
+        left.append(total_excess(excesses(comparison.coarsely(comparison.base(declared)), bench)))
+    assert left[1] < 0.5 * left[0]

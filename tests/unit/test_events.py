@@ -68,6 +68,7 @@ def test_a_compiled_step_gives_the_same_numbers() -> None:
     try:
         compiler()
     except ExportError as missing:
+        # The compiler is an extra: the package works without, and what is skipped needs one by its nature.
         pytest.skip(str(missing))
     model, times = gear(), np.linspace(0.0, 0.3, 31)
     drive = {"motor.torque": Sine(0.1, 5.0)}
