@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from nlsdesign.components import Assembly
-from nlsdesign.discrepancy.compare import Comparison
-from nlsdesign.discrepancy.cuts import blocks_of
-from nlsdesign.discrepancy.suspicion import typical_sizes
+from nlsdesign.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.identification import RecordSet
-from nlsdesign.identification.driven import DrivenBlock
-from nlsdesign.identification.evidence import Bench
-from nlsdesign.identification.filters import derivative
-from nlsdesign.identification.measurement import Record
+from nlsdesign.identification.equation_error.block_response import DrivenBlock
+from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.identification.records.measurement import Record
+from nlsdesign.identification.statistics.filters import derivative
 
 Array = NDArray[np.float64]
 

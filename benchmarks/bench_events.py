@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from nlsdesign.components import DryFriction, Inertia, Play, TorsionDashpot, TorsionSpring, tie
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
 from nlsdesign.model import FlatModel, flatten

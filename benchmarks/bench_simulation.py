@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from nlsdesign.components import Dashpot, Mass, SlidingFriction, Spring, assembly, tie
+from nlsdesign.components import Dashpot, Mass, SlidingFriction, Spring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace

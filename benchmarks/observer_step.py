@@ -19,8 +19,8 @@ import casadi as ca
 import numpy as np
 
 from nlsdesign.export import export_c
-from nlsdesign.export.c_code import CSource
-from nlsdesign.export.compile import compiler
+from nlsdesign.export.c.controller_code import CSource
+from nlsdesign.export.compilation.cross_compiler import compiler
 from nlsdesign.model.flat import FlatModel, Variable
 from tests.hand_built import observer
 

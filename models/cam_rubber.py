@@ -15,13 +15,13 @@ from nlsdesign.components import (
     TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     through,
     tie,
 )
-from nlsdesign.components.declare import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import Deck
 
 

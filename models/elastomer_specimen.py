@@ -12,12 +12,12 @@ from nlsdesign.components import (
     Series,
     Specimen,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     tie,
 )
-from nlsdesign.components.declare import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import Deck
 
 _RUBBER = "strip.rubber"

@@ -10,10 +10,10 @@ from nlsdesign.components import (
     GearedMotor,
     TorsionDashpot,
     TorsionSpring,
-    assembly,
     tie,
 )
-from nlsdesign.components.declare import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import Deck
 
 

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import (
-    Assembly,
-    ConstantForce,
-    Dashpot,
-    LinearDrive,
-    SlidingFriction,
-    assembly,
-    tie,
-)
-from nlsdesign.components.declare import numbers_of, require_same_numbers
+from nlsdesign.components import Assembly, ConstantForce, Dashpot, LinearDrive, SlidingFriction, tie
+from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import Deck
 
 

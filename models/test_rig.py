@@ -24,7 +24,6 @@ from nlsdesign.components import (
     TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     control_values,
     pull_only,
     series,
@@ -32,6 +31,7 @@ from nlsdesign.components import (
     through,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import DeckError, nearest
 from nlsdesign.quantity import Quantity, quantity
 

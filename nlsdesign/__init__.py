@@ -22,7 +22,7 @@ ROOMS = (
     "quantity",
     "deck",
     "components",
-    "components.declare",
+    "components.assembly.deck_writer",
     "model",
     "model.equations",
     "model.linear",

@@ -14,15 +14,15 @@ from nlsdesign.components import (
     SmoothStrainStiffening,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     through,
     tie,
 )
-from nlsdesign.components.element import MATERIAL, Scope
-from nlsdesign.components.part import parameter
-from nlsdesign.components.springs import Elastic
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.core.element import MATERIAL, Scope
+from nlsdesign.components.core.part import parameter
+from nlsdesign.components.core.springs import Elastic
 from nlsdesign.design import ExponentialTorque, MaximumCamRadius, MaximumStrain, MinimumRadiusOfCurvature
 from nlsdesign.quantity import Quantity, degrees, quantity
 from nlsdesign.symbolic import Expression

@@ -21,13 +21,13 @@ from nlsdesign.components import (
     TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     control_values,
     series,
     specimen,
     through,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.transform import replace_state, with_signal
 from nlsdesign.simulation import Trace, simulate

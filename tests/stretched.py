@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nlsdesign.components import DrivenPoint, Element, assembly, specimen, tie
+from nlsdesign.components import DrivenPoint, Element, specimen, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
 

@@ -13,7 +13,7 @@ import pytest
 from tests.import_graph import Import, cycles, imports, modules
 
 # Open to every room.
-BASE = {"errors", "quantity", "symbolic", "locations", "progress", "writing"}
+BASE = {"errors", "quantity", "symbolic", "locations", "parallel", "progress", "writing"}
 # What the floors above the waist stand on: they see the flat model and never the components it came from.
 WAIST = {"deck", "model"}
 SIMULATED = WAIST | {"simulation"}
@@ -42,11 +42,22 @@ MAY_IMPORT: dict[str, set[str]] = {
 
 # The drawing of a cam needs its geometry; adding a missing effect means declaring the assembly again.
 EXCEPTIONS = {
-    "design.limits": "components.cam",
-    "design.contour": "components.cam",
+    "design.limits": "components.transmission.cam",
+    "design.contour": "components.transmission.cam",
     "discrepancy.effects": "components",
     "discrepancy.diagnose": "components",
 }
+
+# The inner rooms of a room, floor by floor from the ground; a module may import its own inner room and those
+# on lower floors, never a neighbour on its own floor.
+FLOORS: dict[str, tuple[set[str], ...]] = {
+    "components": ({"core"}, {"materials", "mechanics", "transmission", "sensing"}, {"assembly"}),
+    "identification": (
+        {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
+    ),
+    "discrepancy": ({"blocks", "effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"}),
+    "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
+}  # fmt: skip
 
 # library: the only places that may know it
 HOMES: dict[str, tuple[str, ...]] = {
@@ -76,6 +87,8 @@ def forbidden(package: Path) -> Iterator[str]:
     for module in known:
         if room_of(package.name, module) not in MAY_IMPORT:
             yield f"{module} is in no room of the house"
+        elif floor_of(package.name, module) is None:
+            yield f"{module} is in no inner room of its room"
     for found in imports(package):
         reason = objection(package.name, found, known)
         if reason:
@@ -96,11 +109,36 @@ def objection(package: str, found: Import, known: dict[str, Path]) -> str | None
     if found.target not in known:
         return "there is no such module"
     here, there = room_of(package, found.source), room_of(package, found.target)
-    if here == there or there in BASE | MAY_IMPORT.get(here, set()):
+    if here == there:
+        return indoors(package, found)
+    if there in BASE | MAY_IMPORT.get(here, set()):
         return None
     if any(inside(source, left) and inside(target, right) for left, right in EXCEPTIONS.items()):
         return None
     return f"{here} may not know {there}"
+
+
+def floor_of(package: str, module: str) -> int | None:
+    """Floor of a module within its room; -1 where the room has no inner rooms, None if it is in none."""
+    _, room, *rest = *module.split("."), ""
+    if room not in FLOORS or rest == [""]:
+        return -1
+    return next((k for k, inner in enumerate(FLOORS[room]) if rest[0] in inner), None)
+
+
+def indoors(package: str, found: Import) -> str | None:
+    """Why an import within one room is not allowed, or None."""
+    inner = [name.split(".")[2:3] for name in (found.source, found.target)]
+    if inner[0] == inner[1] or not inner[0]:  # the room's own front gathers its inner rooms
+        return None
+    floors = floor_of(package, found.source), floor_of(package, found.target)
+    if floors == (-1, -1) or None in floors:
+        return None
+    if not inner[1]:
+        return "an inner room may not import the front of its room"
+    return (
+        None if floors[1] < floors[0] else f"{inner[0][0]} may not know {inner[1][0]}, which is not below it"
+    )  # type: ignore[operator]
 
 
 def internal_cycles(package: Path) -> list[str]:
@@ -171,15 +209,16 @@ def build(folder: Path, files: dict[str, str]) -> Path:
 
 ALLOWED = {
     "errors": "",
-    "components/cam": "from ..errors import X\nfrom . import spring",
-    "components/spring": "import casadi",
-    "model/linear": "import control\nfrom ..components.cam import Cam",
+    "components/transmission/cam": "from ...errors import X\nfrom ..core import spring\nfrom . import cable",
+    "components/transmission/cable": "",
+    "components/core/spring": "import casadi",
+    "model/linear": "import control\nfrom ..components.transmission.cam import Cam",
     "analysis/sweep": "from control import StateSpace\nfrom ..model import linear",
     "observer/gains": "from ..analysis.sweep import over",
     "control/torque_loop": "import control.matlab\nfrom ..observer import gains",
-    "design/contour": "from ..components.cam import Cam",
-    "discrepancy/effects/friction": "from ...components import spring",
-    "export/fmu": "def check():\n    import fmpy.validation",
+    "design/contour": "from ..components.transmission.cam import Cam",
+    "discrepancy/effects/friction": "from ...components.core import spring",
+    "export/fmi/fmu": "def check():\n    import fmpy.validation",
     "figures/cam": "import matplotlib.pyplot as plt\nfrom ..design import contour",
     "cli": "from . import errors\nfrom .figures import cam",
     "__main__": "from .cli import main",
@@ -196,26 +235,55 @@ def test_what_is_allowed_passes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "text", "complaint"),
     [
-        ("components/cam", "from ..model import flat", "components may not know model"),
-        ("components/cam", "def f():\n from ..model.flat import x", "line 2, imports nlsdesign.model.flat"),
-        ("components/cam", "if TYPE_CHECKING:\n from ..model import flat", "components may not know model"),
-        ("components/cam", "f = import_module('nlsdesign.model.flat')", "components may not know model"),
-        ("components/cam", "f = importlib.import_module('..model')", "components may not know model"),
-        ("deck", "from .components import cam", "deck may not know components"),
+        ("components/transmission/cam", "from ...model import flat", "components may not know model"),
+        (
+            "components/transmission/cam",
+            "def f():\n from ...model.flat import x",
+            "line 2, imports nlsdesign.model.flat",
+        ),
+        (
+            "components/transmission/cam",
+            "if TYPE_CHECKING:\n from ...model import flat",
+            "components may not know model",
+        ),
+        (
+            "components/transmission/cam",
+            "f = import_module('nlsdesign.model.flat')",
+            "components may not know model",
+        ),
+        (
+            "components/transmission/cam",
+            "f = importlib.import_module('...model')",
+            "components may not know model",
+        ),
+        ("deck", "from .components.transmission import cam", "deck may not know components"),
         ("symbolic", "from .model import flat", "symbolic may not know model"),
-        ("simulation/run", "from ..components.cam import Cam", "simulation may not know components"),
-        ("design/solve", "from ..components.cam import Cam", "design may not know components"),
+        (
+            "simulation/run",
+            "from ..components.transmission.cam import Cam",
+            "simulation may not know components",
+        ),
+        ("design/solve", "from ..components.transmission.cam import Cam", "design may not know components"),
         ("design/limits", "from ..components import Cam", "design may not know components"),
         ("design/limits", "from ..analysis import sweep", "design may not know analysis"),
         ("analysis/sweep", "from ..observer import gains", "analysis may not know observer"),
-        ("identification/fit", "from ..discrepancy import effects", "may not know discrepancy"),
-        ("discrepancy/locate", "from ..components import cam", "discrepancy may not know components"),
+        ("identification/estimation/fit", "from ...discrepancy import effects", "may not know discrepancy"),
+        (
+            "discrepancy/selection/excess",
+            "from ...components.transmission import cam",
+            "discrepancy may not know components",
+        ),
         ("figures/cam", "from ..report import html", "figures may not know report"),
         ("report/html", "from ..cli import main", "report may not know cli"),
         ("model/flat", "import nlsdesign", "no room may import it"),
         ("model/flat", "from .. import __version__", "no room may import it"),
         ("model/flat", "import nlsdesign.model", "no room may import it"),
         ("model/flat", "from ..erors import X", "there is no such module"),
+        ("components/core/part", "from ..transmission import cam", "core may not know transmission"),
+        ("components/sensing/encoder", "from ..transmission import cam", "sensing may not know transmission"),
+        ("components/core/part", "from ... import components", "front of its room"),
+        ("discrepancy/blocks/cut", "from ..effects import x", "blocks may not know effects"),
+        ("components/spring", "", "components.spring is in no inner room"),
         ("helpers", "", "nlsdesign.helpers is in no room of the house"),
         ("report/html", "import matplotlib.pyplot as plt", "only in figures"),
         ("analysis/sweep", "def f():\n    import matplotlib", "only in figures"),
@@ -225,7 +293,13 @@ def test_what_is_allowed_passes(tmp_path: Path) -> None:
     ],
 )
 def test_a_forbidden_import_is_caught(tmp_path: Path, module: str, text: str, complaint: str) -> None:
-    rooms = ["model/flat", "components/cam", "analysis/sweep", "observer/gains", "discrepancy/effects"]
+    rooms = [
+        "model/flat",
+        "components/transmission/cam",
+        "analysis/sweep",
+        "observer/gains",
+        "discrepancy/effects",
+    ]
     empty = dict.fromkeys([*rooms, "cli", "report/html"], "")
     assert list(forbidden(build(tmp_path / "before", empty))) == []
     found = list(forbidden(build(tmp_path / "after", {**empty, module: text})))
@@ -237,8 +311,8 @@ def test_a_forbidden_import_is_caught(tmp_path: Path, module: str, text: str, co
     ("files", "cycle"),
     [
         (
-            {"components/a": "from . import b", "components/b": "from . import a"},
-            {"components.a", "components.b"},
+            {"components/core/a": "from . import b", "components/core/b": "from . import a"},
+            {"components.core.a", "components.core.b"},
         ),
         (
             {

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from ..analysis import Observability, Stability, over_angle
-from ..components.declare import declare
+from ..components.assembly.deck_writer import declare
 from ..deck import load_deck
 from ..model import flatten
 from .output import deck_option, json_option, out_option, show_json, show_table

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..components.declare import deck_problems, declare, write_deck
+from ..components.assembly.deck_writer import deck_problems, declare, write_deck
 from ..deck import deck_names, load_deck
 from ..locations import bundled
 from ..quantity import Quantity, sources

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..components.declare import declare, write_deck
+from ..components.assembly.deck_writer import declare, write_deck
 from ..deck import load_deck
 from ..design import (
     ExponentialTorque,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 import numpy as np
 
-from ..components.declare import declare
+from ..components.assembly.deck_writer import declare
 from ..deck import load_deck
 from ..discrepancy import diagnose as find_what_is_missing
 from ..discrepancy import predict, write_verdict

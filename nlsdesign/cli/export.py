@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from ..components.assembly import Assembly
-from ..components.declare import declare
+from ..components.assembly.deck_writer import declare
+from ..components.assembly.named_parts import Assembly
 from ..deck import load_deck
 from ..errors import ArrangementError
 from ..export import export_c, export_fmu

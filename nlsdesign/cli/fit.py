@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..components.declare import declare
+from ..components.assembly.deck_writer import declare
 from ..deck import load_deck
 from ..discrepancy import refit, write_refit
 from ..identification import load_records

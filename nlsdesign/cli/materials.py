@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..components import library
+from ..components.materials import library
 from .output import json_option, show_json, show_table
 
 

@@ -8,8 +8,8 @@ import math
 import click
 
 from ..components import Body, Cam, Element, Gear, Part, Sensor
-from ..components.part import ParameterInfo
-from ..components.reading import component_classes
+from ..components.assembly.deck_reader import component_classes
+from ..components.core.part import ParameterInfo
 from ..errors import unknown_name
 from .output import json_option, show_json, show_table
 

@@ -1,45 +1,51 @@
 """Parts that can be declared; they never learn what they are used for."""
 
-from .ageing import StressSoftening, TensionSet, ViscousHeating, WorkHeating
-from .arruda_boyce import ArrudaBoyce
-from .assembly import Assembly, assembly
-from .bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
-from .bristles import LuGreFriction
-from .cable import StretchyCable
-from .cam import Cam, Pulley, TwoSidedCam, control_values
-from .cam_shapes import AnchoredCam, OneSidedCam
-from .capstan import CapstanFriction
-from .contact import InextensibleCable
-from .dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
-from .delay import DelayedForceSensor, DriftingForceSensor, TransportDelay
-from .drives import DelayedMotor, SaturatingMotor
-from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, parallel
-from .encoders import EccentricEncoder
-from .flowing import FlowingChains
-from .friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
-from .gear import Gear, LossyGear
-from .guide import CableGuide
-from .history import PermanentSet, Softening
-from .hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
-from .hysteresis import SlidingFillers
-from .library import Material, Property, material, materials
-from .misshapen import MisshapenCam
-from .motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
-from .networks import PullOnly, Specimen, Through, pull_only, specimen, through
-from .part import Part
-from .play import Backlash, InertialBacklash, LooseCable, Play, Slack, Turned
-from .sampling import SampleAndHold, SampledEncoder, Tachometer
-from .sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
-from .series import Series, series
-from .slide import ConstantForce, LinearDrive, SlidingFriction
-from .smooth import Sharp, smoothed
-from .springpot import Springpot
-from .springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
-from .standard import burgers, generalised_maxwell, kelvin_voigt, maxwell, standard_linear_solid
-from .sticking import DryFriction, DryLoadFriction, DryStribeckFriction
-from .stops import EndStop, RigidStop, RoundedEndStop
-from .thermal import ArrheniusShift, SelfHeating, WlfShift
-from .tie import Tie, tie
+from .assembly.named_parts import Assembly, assembly
+from .assembly.smooth_form import Sharp, smoothed
+from .core.dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
+from .core.element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, parallel
+from .core.part import Part
+from .core.series import Series, series
+from .core.springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
+from .core.tie import Tie, tie
+from .materials.arruda_boyce import ArrudaBoyce
+from .materials.finite_viscoelasticity import FlowingChains
+from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
+from .materials.library import Material, Property, material, materials
+from .materials.material_memory import StressSoftening, TensionSet, ViscousHeating, WorkHeating
+from .materials.named_networks import (
+    burgers,
+    generalised_maxwell,
+    kelvin_voigt,
+    maxwell,
+    standard_linear_solid,
+)
+from .materials.rate_independent import SlidingFillers
+from .materials.springpot import Springpot
+from .materials.stress_softening import PermanentSet, Softening
+from .materials.thermal import ArrheniusShift, SelfHeating, WlfShift
+from .mechanics.backlash import Backlash, InertialBacklash, LooseCable, Play, Slack, Turned
+from .mechanics.bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
+from .mechanics.carriage import ConstantForce, LinearDrive, SlidingFriction
+from .mechanics.dry_friction import DryFriction, DryLoadFriction, DryStribeckFriction
+from .mechanics.friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
+from .mechanics.gear import Gear, LossyGear
+from .mechanics.imperfect_motor import DelayedMotor, SaturatingMotor
+from .mechanics.lugre import LuGreFriction
+from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
+from .mechanics.stops import EndStop, RigidStop, RoundedEndStop
+from .sensing.delayed_sensors import DelayedForceSensor, DriftingForceSensor, TransportDelay
+from .sensing.eccentric_encoder import EccentricEncoder
+from .sensing.sampled_sensors import SampleAndHold, SampledEncoder, Tachometer
+from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
+from .transmission.cable_guide import CableGuide
+from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
+from .transmission.cam_drive import PullOnly, Specimen, Through, pull_only, specimen, through
+from .transmission.cam_error import MisshapenCam
+from .transmission.cam_shapes import AnchoredCam, OneSidedCam
+from .transmission.capstan import CapstanFriction
+from .transmission.stretchy_cable import StretchyCable
+from .transmission.unilateral_cable import InextensibleCable
 
 __all__ = [
     "MATERIAL",

@@ -1,7 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
+from .cam_drawing import fingerprint, write_drawings
 from .contour import CamFit, cam_from_profile, contour_of_cam
-from .drawing import fingerprint, write_drawings
 from .energy import Profile, energy_profile
 from .equilibrium import ElasticLaw, elastic_law, equilibrium_torque
 from .geometry import Contour, contour_from_curvature, contour_from_lever_arm

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from ..components.cam import TwoSidedCam
+from ..components.transmission.cam import TwoSidedCam
 from ..errors import ArrangementError, ValueRangeError
 from .geometry import Contour, contour_from_lever_arm
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..symbolic import Expression
-from .candidate import Candidate
+from .design_point import Candidate
 
 _LENGTH = 0.01
 """Typical radius of curvature in m; it only scales the roughness."""

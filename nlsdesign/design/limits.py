@@ -11,7 +11,7 @@ import casadi as ca
 from ..errors import ValueRangeError
 from ..quantity import Quantity, parse_unit
 from ..symbolic import Expression
-from .candidate import Candidate
+from .design_point import Candidate
 from .numbers import in_si, plain
 
 

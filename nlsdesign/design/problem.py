@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from ..errors import InfeasibleError, ValueRangeError, unknown_name
 from ..model import FlatModel, Variable
 from ..symbolic import Expression
-from .candidate import Candidate
 from .contour import contour_of_cam, two_sided
+from .design_point import Candidate
 from .energy import closed_form
 from .equilibrium import ElasticLaw, cam_function, elastic_law
 from .program import Rows

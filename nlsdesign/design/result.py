@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..model import Assembly
 from ..quantity import Quantity, parse_unit
-from .drawing import fingerprint
+from .cam_drawing import fingerprint
 from .geometry import Contour
 from .target import Target
 

@@ -1,10 +1,10 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
+from .blocks.prediction_of_blocks import predict
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
-from .predict import predict
-from .refit import BlockError, FittedNumber, Refit, refit
-from .verdict import Course, NamedEffect, RecordGap, Verdict
+from .reporting.refit import BlockError, FittedNumber, Refit, refit
+from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 
 __all__ = [
     "ALL",

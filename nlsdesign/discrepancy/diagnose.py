@@ -12,25 +12,25 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ..components import Assembly
-from ..components.declare import write_deck
-from ..identification.evidence import Bench
-from ..identification.fit import Fit
-from ..identification.measurement import RecordSet
+from ..components.assembly.deck_writer import write_deck
+from ..identification.equation_error.evidence import Bench
+from ..identification.estimation.least_squares import Fit
+from ..identification.records.measurement import RecordSet
 from ..writing import write_text
-from .advice import advice, more_excitation, where_they_differ
-from .another_rig import other_numbers, out_of_reach
-from .compare import Comparison
-from .cuts import blocks_of
+from .blocks.tearing import blocks_of
 from .effects import ALL, Effect
-from .hypothesis import Hypothesis
-from .late import late_forces
-from .locate import DECLARED, Excess, excesses
-from .outcome import course_of, gaps_of, shapes_of
-from .refit import Refit, refit_text, sourced
-from .remainder import Remainder, remainder_of
-from .search import Outcome, Step, search
-from .suspicion import suspicions_of, typical_sizes
-from .verdict import NamedEffect, Verdict
+from .reporting.advice import advice, more_excitation, where_they_differ
+from .reporting.gap import course_of, gaps_of, shapes_of
+from .reporting.refit import Refit, refit_text, sourced
+from .reporting.remainder import Remainder, remainder_of
+from .reporting.verdict import NamedEffect, Verdict
+from .screening.causality import late_forces
+from .screening.other_rig import other_numbers, out_of_reach
+from .screening.scale_check import suspicions_of, typical_sizes
+from .selection.comparison import Comparison
+from .selection.excess import DECLARED, Excess, excesses
+from .selection.hypothesis import Hypothesis
+from .selection.search import Outcome, Step, search
 
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 

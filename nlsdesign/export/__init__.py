@@ -1,12 +1,12 @@
 """C code for the controller, FMUs for everybody else, and co-simulation of FMUs."""
 
-from .c_code import CSource, export_c
-from .compile import ALL_PLATFORMS, PLATFORMS, host_platform
-from .cosimulation import CoSimulation, cosimulate
-from .cosimulation_system import Late
-from .fmu import export_fmu
-from .native import natively
-from .running import CompiledStep
+from .c.controller_code import CSource, export_c
+from .compilation.compiled_step import natively
+from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
+from .compilation.running_c import CompiledStep
+from .cosimulation.cosimulate import CoSimulation, cosimulate
+from .cosimulation.master import Late
+from .fmi.fmu import export_fmu
 
 __all__ = [
     "ALL_PLATFORMS",

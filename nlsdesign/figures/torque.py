@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..design import Target
 from ..errors import ValueRangeError
-from ..identification.metrics import Agreement
+from ..identification.statistics.metrics import Agreement
 from .lines import thinned
 from .numbers import root_mean_square, significant
 from .style import BLUE, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled

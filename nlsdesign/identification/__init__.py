@@ -1,21 +1,21 @@
 """Measured records, noise, fits and their metrics."""
 
-from .alignment import aligned, joined, resampled
-from .clocks import Channel, Resampled, on_one_clock
-from .evolution import Evolved, fit_by_cma
-from .fit import Fit, fit
-from .lag import Lag, lag_between
-from .losses import Huber, Loss, Squares
-from .measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_record, load_records
-from .metrics import Agreement, agreement, rmse
-from .multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
-from .parameters import Parameter, declared_parameter, free_parameter
-from .prediction import Prediction, predict_in_windows
-from .profile import Profile, profile_of
-from .quality import Finding
-from .residuals import noise_of
-from .simulation_error import Shots, SimulationError, Weights
-from .wiring import Wiring, wired
+from .estimation.least_squares import Fit, fit
+from .estimation.parameters import Parameter, declared_parameter, free_parameter
+from .estimation.profile import Profile, profile_of
+from .output_error.cma_es import Evolved, fit_by_cma
+from .output_error.multiple_shooting import SimulatedFit, coloured_sigma, fit_by_simulation
+from .output_error.prediction import Prediction, predict_in_windows
+from .output_error.simulation_error import Shots, SimulationError, Weights
+from .output_error.wiring import Wiring, wired
+from .records.alignment import aligned, joined, resampled
+from .records.clocks import Channel, Resampled, on_one_clock
+from .records.lag import Lag, lag_between
+from .records.measurement import Column, ColumnMap, Record, RecordSet, cut_in_time, load_record, load_records
+from .records.quality import Finding
+from .statistics.losses import Huber, Loss, Squares
+from .statistics.metrics import Agreement, agreement, rmse
+from .statistics.residuals import noise_of
 
 __all__ = [
     "Agreement",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
-from .notebook import model_html
+from .notebook_view import model_html
 from .switching import Switching
 
 if TYPE_CHECKING:

@@ -11,17 +11,17 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import casadi as ca
 
-from ..components.assembly import Assembly
-from ..components.bodies import Body, Motion
-from ..components.element import observed_effort
-from ..components.sensors import Sensor
-from ..components.tie import Tie
+from ..components.assembly.named_parts import Assembly
+from ..components.core.element import observed_effort
+from ..components.core.tie import Tie
+from ..components.mechanics.bodies import Body, Motion
+from ..components.sensing.sensors import Sensor
 from ..errors import ArrangementError, UnitError, nearest, unknown_name
 from ..symbolic import Expression, depends
+from .equation_builder import Ledger, PartScope
 from .flat import FlatModel, Variable
-from .holding import Laws, natural_modes, switch_laws, switching
-from .ledger import Ledger, PartScope
-from .train import balance_train, train_motions, trains
+from .gear_train import balance_train, train_motions, trains
+from .stiction import Laws, natural_modes, switch_laws, switching
 
 
 def flatten(

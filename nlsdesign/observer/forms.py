@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..analysis.rest import evaluate_rows, rate_state, rest_states, typical_sizes
 from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel
-from ..model.published import GEOMETRIC, PublishedNames, published_form
+from ..model.paper_form import GEOMETRIC, PublishedNames, published_form
 from ..model.transform import with_outputs, without_idle_states
 from .angle_form import AngleForm, Layout
 from .plant import AngleScheduledPlant

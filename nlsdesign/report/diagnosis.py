@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..discrepancy.verdict import Verdict
+from ..discrepancy.reporting.verdict import Verdict
 from ..figures import CandidateShare, HeldOut, RecordError, candidate_shares, gap_bars, held_out_series
 from ..figures.curves import curves
 from .sections import Chapter, FigureSection, Section, TableSection

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from .buffered import Translate, as_it_is
-from .drives import Drive, Drives, drives_of
 from .events import Event
+from .input_signals import Drive, Drives, drives_of
 from .runge_kutta import TooStiffError, integrate_explicitly
 from .stiff import integrate_implicitly
 from .trace import Trace, range_warnings

@@ -18,8 +18,8 @@ from scipy.integrate import DOP853
 from ..errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Buffered, Translate, as_it_is
-from .drives import Drives
 from .events import LOCATED, Event, Modes, branch_of, located
+from .input_signals import Drives
 
 Array = NDArray[np.float64]
 

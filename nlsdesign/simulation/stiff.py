@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
 from ..model import FlatModel
-from .drives import Drives
+from .input_signals import Drives
 
 Array = NDArray[np.float64]
 

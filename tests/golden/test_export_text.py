@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.export.c_code import header_text, source_text
-from nlsdesign.export.c_text import real_type
-from nlsdesign.export.fmu import fmu_texts
+from nlsdesign.export.c.c_text import real_type
+from nlsdesign.export.c.controller_code import header_text, source_text
+from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.model.flat import FlatModel, Table, Variable
 from tests.hand_built import plant
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import Domain
-from nlsdesign.components.element import MATERIAL, Scope
-from nlsdesign.components.springs import Elastic
+from nlsdesign.components.core.element import MATERIAL, Scope
+from nlsdesign.components.core.springs import Elastic
 from nlsdesign.design import design_cam, energy_profile
 from nlsdesign.symbolic import Expression
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, NeoHooke, actuator

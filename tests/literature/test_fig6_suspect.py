@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from models import cam_rubber_actuator
-from nlsdesign.components import Assembly, DrivenPoint, assembly, tie
+from nlsdesign.components import Assembly, DrivenPoint, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import diagnose
-from nlsdesign.discrepancy.late import late_forces
+from nlsdesign.discrepancy.screening.causality import late_forces
 from nlsdesign.identification import RecordSet, load_records
-from nlsdesign.identification.loops import loop_of
+from nlsdesign.identification.statistics.loop_work import loop_of
 from nlsdesign.model import flatten
 
 FIGURES = Path(__file__).parents[2] / "studies" / "austin2015_figures"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.analysis import Observability, over_angle
-from nlsdesign.model.published import published_form
+from nlsdesign.model.paper_form import published_form
 from tests import observed as ob
 
 NOMINAL = {ob.FORCE: 302.0, ob.EXTENSION: 12e-3, "motor.angle": np.pi / 4.0, "motor.speed": 20.0}

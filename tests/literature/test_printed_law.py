@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly, Driven, DrivenPoint, Specimen, assembly, tie
-from nlsdesign.components.declare import declare
+from nlsdesign.components import Assembly, Driven, DrivenPoint, Specimen, tie
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import rest_state

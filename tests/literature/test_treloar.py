@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import ExtendedTube, NeoHooke, Ogden
-from nlsdesign.components.hyperelastic import Hyperelastic
+from nlsdesign.components.materials.hyperelastic import Hyperelastic
 from tests.stretched import pulled, stress_at
 
 from .published import (

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.components import Driven, Encoder, assembly
-from nlsdesign.components.declare import declare
+from nlsdesign.components import Driven, Encoder
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.control import ClosedLoop, TorqueGains, torque_controller, zero_torque
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, Variable, flatten

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from nlsdesign.components.element import TRANSLATION, Domain, Element, Scope
-from nlsdesign.components.part import parameter
+from nlsdesign.components.core.element import TRANSLATION, Domain, Element, Scope
+from nlsdesign.components.core.part import parameter
 from nlsdesign.quantity import Quantity
 from nlsdesign.symbolic import Expression
 

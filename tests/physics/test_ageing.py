@@ -17,11 +17,11 @@ from nlsdesign.components import (
     TensionSet,
     ViscousHeating,
     WorkHeating,
-    assembly,
     specimen,
     tie,
 )
-from nlsdesign.components.springs import LinearElastic
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.core.springs import LinearElastic
 from nlsdesign.errors import ArrangementError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from nlsdesign.components import Assembly, Element, LinearElastic, StrainStiffening
-from nlsdesign.components.element import Scope
+from nlsdesign.components.core.element import Scope
 from nlsdesign.design import (
     PowerTorque,
     Profile,

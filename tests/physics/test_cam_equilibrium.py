@@ -16,13 +16,13 @@ from nlsdesign.components import (
     Spring,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     parallel,
     series,
     specimen,
     through,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.design import elastic_law, equilibrium_torque
 from nlsdesign.errors import ArrangementError, UnknownNameError
 from nlsdesign.model import flatten

@@ -28,12 +28,12 @@ from nlsdesign.components import (
     StretchyCable,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     through,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.design import contour_from_lever_arm
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate

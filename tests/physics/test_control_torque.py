@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from nlsdesign.components import Driven, TorsionSpring, assembly, tie
-from nlsdesign.components.declare import declare
+from nlsdesign.components import Driven, TorsionSpring, tie
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.control import ClosedLoop, TorqueGains, sine_response, torque_controller, zero_torque
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten

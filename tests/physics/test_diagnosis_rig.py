@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import diagnose, predict, write_verdict
 from nlsdesign.identification import load_records

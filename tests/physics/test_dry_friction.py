@@ -24,11 +24,11 @@ from nlsdesign.components import (
     Inertia,
     TorsionDashpot,
     TorsionSpring,
-    assembly,
     parallel,
     series,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ConvergenceError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate

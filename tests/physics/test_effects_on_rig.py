@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.discrepancy.compare import Comparison
-from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects import ALL
 from nlsdesign.discrepancy.effects.friction import backlash
-from nlsdesign.discrepancy.locate import excesses, total_excess
-from nlsdesign.discrepancy.suspicion import typical_sizes
+from nlsdesign.discrepancy.screening.scale_check import typical_sizes
+from nlsdesign.discrepancy.selection.comparison import Comparison
+from nlsdesign.discrepancy.selection.excess import excesses, total_excess
 from nlsdesign.identification import load_records
-from nlsdesign.identification.evidence import Bench
+from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig, with_true_contact
 from tests.rig import ACTUATORS, make_records, with_slack_cable, write_set

@@ -18,11 +18,11 @@ from nlsdesign.components import (
     MisshapenCam,
     SaturatingMotor,
     Spring,
-    assembly,
     through,
     tie,
 )
-from nlsdesign.components.sensors import Sensor
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.sensing.sensors import Sensor
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.model.transform import with_outputs

@@ -13,11 +13,11 @@ from nlsdesign.components import (
     FlowingChains,
     LinearElastic,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
 

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 from models import cam_rubber_actuator
 from nlsdesign.deck import load_deck
 from nlsdesign.export import CompiledStep, export_c, export_fmu
-from nlsdesign.export.compile import compile_library
-from nlsdesign.export.fmu import fmu_texts
-from nlsdesign.export.guarded import GuardedModel
+from nlsdesign.export.c.guarded_step import GuardedModel
+from nlsdesign.export.compilation.cross_compiler import compile_library
+from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel, Variable
 from nlsdesign.observer import design_observer

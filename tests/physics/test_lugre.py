@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
-from nlsdesign.components import Driven, Inertia, LuGreFriction, assembly, tie
+from nlsdesign.components import Driven, Inertia, LuGreFriction, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import simulate

@@ -17,7 +17,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 
 from models import elastomer_specimen, positioning_drive
 from nlsdesign.components import Assembly
-from nlsdesign.components.declare import deck_text, declare
+from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.export import CompiledStep, export_c, export_fmu
 from nlsdesign.model import flatten

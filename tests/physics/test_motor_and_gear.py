@@ -26,10 +26,10 @@ from nlsdesign.components import (
     TorsionDashpot,
     TorsionSpring,
     VoltageDrivenMotor,
-    assembly,
     parallel,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import simulate

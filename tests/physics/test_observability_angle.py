@@ -10,7 +10,7 @@ from nlsdesign.analysis import EstimateDeviation, Observability, over_angle
 from nlsdesign.analysis.rest import rest_states
 from nlsdesign.model import FlatModel
 from nlsdesign.model.linear import linearise
-from nlsdesign.model.published import published_form
+from nlsdesign.model.paper_form import published_form
 from tests import observed as ob
 
 ANGLES = np.radians([-45.0, -1.0, 0.0, 0.2, 1.0, 5.0, 45.0])

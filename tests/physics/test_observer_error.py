@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from nlsdesign.analysis import Stability, over_angle
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.published import PublishedNames
+from nlsdesign.model.paper_form import PublishedNames
 from nlsdesign.model.transform import replace_state
 from nlsdesign.observer import (
     AsPublished,

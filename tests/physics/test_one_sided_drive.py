@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from models import one_sided_cable_drive
 from nlsdesign.analysis import Observability, Stability, over_angle
 from nlsdesign.components import VoltageDrivenMotor
-from nlsdesign.components.declare import deck_text, declare
+from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.export import CompiledStep, export_c, export_fmu
 from nlsdesign.model import flatten

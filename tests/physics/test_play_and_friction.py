@@ -36,12 +36,12 @@ from nlsdesign.components import (
     TorsionSpring,
     Turned,
     ViscousMaterial,
-    assembly,
     parallel,
     series,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 

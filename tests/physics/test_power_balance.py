@@ -27,7 +27,6 @@ from nlsdesign.components import (
     Pulley,
     Spring,
     ViscousMaterial,
-    assembly,
     parallel,
     pull_only,
     series,
@@ -35,7 +34,8 @@ from nlsdesign.components import (
     through,
     tie,
 )
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate

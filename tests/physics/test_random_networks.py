@@ -11,7 +11,8 @@ import random
 import numpy as np
 import pytest
 
-from nlsdesign.components import Dashpot, DrivenPoint, Element, Spring, assembly, parallel, series, tie
+from nlsdesign.components import Dashpot, DrivenPoint, Element, Spring, parallel, series, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import LinearModel, linearise
 

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from nlsdesign.components import Dashpot, DrivenPoint, Element, Spring, assembly, parallel, series, tie
+from nlsdesign.components import Dashpot, DrivenPoint, Element, Spring, parallel, series, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import LinearModel, linearise, rest_state

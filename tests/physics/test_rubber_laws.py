@@ -30,13 +30,13 @@ from nlsdesign.components import (
     TorsionDashpot,
     TorsionSpring,
     ViscousMaterial,
-    assembly,
     parallel,
     pull_only,
     series,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import linearise, rest_state
 from nlsdesign.simulation import simulate

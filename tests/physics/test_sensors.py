@@ -30,9 +30,9 @@ from nlsdesign.components import (
     TorqueSensor,
     TorsionSpring,
     TransportDelay,
-    assembly,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, measure, simulate
 

@@ -17,11 +17,11 @@ from nlsdesign.components import (
     LooseCable,
     Spring,
     StrainStiffening,
-    assembly,
     series,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import jacobian_function
 from nlsdesign.simulation import simulate

@@ -23,12 +23,12 @@ from nlsdesign.components import (
     Spring,
     StrainStiffening,
     ViscousMaterial,
-    assembly,
     parallel,
     series,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 

@@ -29,11 +29,11 @@ from nlsdesign.components import (
     StrainStiffening,
     TorsionDashpot,
     TorsionSpring,
-    assembly,
     smoothed,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import (
     ArrangementError,
     ConvergenceError,
@@ -41,8 +41,8 @@ from nlsdesign.errors import (
     UnknownNameError,
     ValueRangeError,
 )
-from nlsdesign.export.c_code import check_discrete
-from nlsdesign.export.fmu import fmu_texts
+from nlsdesign.export.c.controller_code import check_discrete
+from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.components import DelayedForceSensor, Driven, assembly
+from nlsdesign.components import DelayedForceSensor, Driven
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, UnknownNameError
 from nlsdesign.model import FlatModel, Variable, flatten
-from nlsdesign.model.published import published_form
+from nlsdesign.model.paper_form import published_form
 from nlsdesign.model.transform import (
     cut,
     named,

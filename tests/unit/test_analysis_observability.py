@@ -9,7 +9,8 @@ from scipy.linalg import expm
 
 from nlsdesign.analysis import EstimateDeviation, Observability, Point, over_angle
 from nlsdesign.analysis.kalman import discrete_noise, steady_state_kalman
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, assembly, tie
+from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.linear import linearise

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from nlsdesign.analysis import Stability, over_angle
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, assembly, parallel, series, tie
+from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, parallel, series, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from tests import observed as ob
 

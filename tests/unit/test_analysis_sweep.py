@@ -10,10 +10,11 @@ import pytest
 
 from nlsdesign.analysis import Chart, Point, Stability, View, over_angle
 from nlsdesign.analysis.rest import rate_state, rest_states, typical_sizes
-from nlsdesign.components import Dashpot, Mass, Spring, assembly, parallel, series, tie
+from nlsdesign.components import Dashpot, Mass, Spring, parallel, series, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, Variable, flatten
-from nlsdesign.model.published import published_form
+from nlsdesign.model.paper_form import published_form
 from tests import observed as ob
 
 ANGLES = np.radians([-45.0, -5.0, 0.0, 5.0, 45.0])

@@ -23,7 +23,6 @@ from nlsdesign.components import (
     TorsionSpring,
     ViscousMaterial,
     Yeoh,
-    assembly,
     burgers,
     generalised_maxwell,
     kelvin_voigt,
@@ -34,7 +33,8 @@ from nlsdesign.components import (
     standard_linear_solid,
     tie,
 )
-from nlsdesign.components.declare import deck_problems, declare
+from nlsdesign.components.assembly.deck_writer import deck_problems, declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import read_deck
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, ValueRangeError
 from nlsdesign.model import flatten

@@ -6,14 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from nlsdesign.components import (
-    AnchoredCam,
-    CapstanFriction,
-    OneSidedCam,
-    Part,
-    Spring,
-    TorsionSpring,
-)
+from nlsdesign.components import AnchoredCam, CapstanFriction, OneSidedCam, Part, Spring, TorsionSpring
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, ValueRangeError
 from nlsdesign.quantity import quantity
 from tests.parts.cable import ROW

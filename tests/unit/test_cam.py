@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.interpolate import BSpline
 
-from nlsdesign.components import Driven, Pulley, Spring, TwoSidedCam, assembly, control_values, through, tie
-from nlsdesign.components.declare import declare
+from nlsdesign.components import Driven, Pulley, Spring, TwoSidedCam, control_values, through, tie
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ValueRangeError
 from nlsdesign.model import FlatModel, flatten

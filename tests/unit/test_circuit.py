@@ -15,13 +15,13 @@ from nlsdesign.components import (
     FixedPoint,
     Mass,
     Spring,
-    assembly,
     parallel,
     series,
     tie,
 )
-from nlsdesign.components.circuit import Circuit, Leaf, Row, circuit_lines, circuit_of
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.circuit import Circuit, Leaf, Row, circuit_lines, circuit_of
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import deck_names, load_deck
 from nlsdesign.model import flatten
 from nlsdesign.model.equations import equations

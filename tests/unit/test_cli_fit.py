@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly, Dashpot, Mass, Spring, assembly, tie
-from nlsdesign.components.declare import declare, write_deck
+from nlsdesign.components import Assembly, Dashpot, Mass, Spring, tie
+from nlsdesign.components.assembly.deck_writer import declare, write_deck
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import refit
 from nlsdesign.errors import MeasurementError

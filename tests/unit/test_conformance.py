@@ -33,18 +33,18 @@ from nlsdesign.components import (
     Spring,
     Tie,
     TorsionSpring,
-    assembly,
     smoothed,
     specimen,
     through,
     tie,
 )
-from nlsdesign.components.declare import declare, write_deck
-from nlsdesign.components.part import walk
+from nlsdesign.components.assembly.deck_writer import declare, write_deck
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.core.part import walk
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ExportError
-from nlsdesign.export.compile import compiler, run_compiler
-from nlsdesign.export.fmu import fmi_headers, fmu_texts
+from nlsdesign.export.compilation.cross_compiler import compiler, run_compiler
+from nlsdesign.export.fmi.fmu import fmi_headers, fmu_texts
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.quantity import parse_unit
 from tests.parts import examples

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+from nlsdesign.components import Inertia, TorsionSpring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.control import TorqueGains, torque_controller
 from nlsdesign.errors import UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.components.declare import deck_problems, declare
+from nlsdesign.components.assembly.deck_writer import deck_problems, declare
 from nlsdesign.deck import Deck, deck_names, load_deck, read_deck
 from nlsdesign.errors import DeckError, NlsError, UnitError, UnknownNameError, ValueRangeError
 

@@ -29,7 +29,6 @@ from nlsdesign.components import (
     StrainStiffening,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     parallel,
     pull_only,
     series,
@@ -37,7 +36,14 @@ from nlsdesign.components import (
     through,
     tie,
 )
-from nlsdesign.components.declare import deck_text, declare, numbers_of, require_same_numbers, write_deck
+from nlsdesign.components.assembly.deck_writer import (
+    deck_text,
+    declare,
+    numbers_of,
+    require_same_numbers,
+    write_deck,
+)
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import deck_names, load_deck, read_deck
 from nlsdesign.errors import DeckError, ExportError, NlsError
 from nlsdesign.quantity import Quantity, parse_unit, quantity

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from nlsdesign.components import Spring, assembly, tie
-from nlsdesign.components.networks import through
+from nlsdesign.components import Spring, tie
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.transmission.cam_drive import through
 from nlsdesign.design import (
     AnchorDistance,
     AreaRange,

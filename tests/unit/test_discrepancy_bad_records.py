@@ -12,9 +12,9 @@ import pytest
 
 from nlsdesign.cli import main
 from nlsdesign.components import Assembly
-from nlsdesign.components.declare import write_deck
+from nlsdesign.components.assembly.deck_writer import write_deck
 from nlsdesign.discrepancy import ALL, diagnose, write_verdict
-from nlsdesign.discrepancy.advice import more_excitation
+from nlsdesign.discrepancy.reporting.advice import more_excitation
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Fit, Parameter, load_records
 from nlsdesign.model import flatten

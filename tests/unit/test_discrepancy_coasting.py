@@ -1,6 +1,6 @@
 """A record that a coasting body makes unpredictable counts as the others do, and only the quickest may."""
 
-from nlsdesign.discrepancy.coasting import astray, like_the_others
+from nlsdesign.discrepancy.selection.unpredictable import astray, like_the_others
 
 ROWS = {("spring", r): 100 for r in ("slow", "middle", "quick")} | {("motor", "quick"): 50}
 BEFORE = {("spring", r): 500.0 for r in ("slow", "middle", "quick")} | {("motor", "quick"): 900.0}

@@ -15,17 +15,17 @@ from nlsdesign.components import (
     SampleAndHold,
     TorsionSpring,
     TransportDelay,
-    assembly,
     tie,
 )
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects import current_sensor_bias, force_sensor_delay, force_sensor_gain
 from nlsdesign.errors import MeasurementError
-from nlsdesign.identification.driven import DrivenBlock
-from nlsdesign.identification.filters import smoothing
-from nlsdesign.identification.measurement import Record
+from nlsdesign.identification.equation_error.block_response import DrivenBlock
+from nlsdesign.identification.records.measurement import Record
+from nlsdesign.identification.statistics.filters import smoothing
 from nlsdesign.model import flatten
 from nlsdesign.simulation import simulate
 

@@ -17,14 +17,13 @@ from nlsdesign.components import (
     Spring,
     TorqueSensor,
     TorsionSpring,
-    assembly,
     parallel,
     tie,
 )
-from nlsdesign.components.declare import deck_text, declare
+from nlsdesign.components.assembly.deck_writer import deck_text, declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck, read_deck
-from nlsdesign.discrepancy.compare import Hypothesis, _renamed
-from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects import (
     ALL,
     Candidate,
@@ -39,6 +38,7 @@ from nlsdesign.discrepancy.effects import (
     wrapped,
 )
 from nlsdesign.discrepancy.effects.cable import stretched
+from nlsdesign.discrepancy.selection.comparison import Hypothesis, _renamed
 from nlsdesign.model import flatten
 
 CATALOGUE = [

@@ -19,11 +19,11 @@ from nlsdesign.components import (
     NeoHooke,
     PullOnly,
     SlidingFriction,
-    assembly,
     specimen,
     tie,
 )
-from nlsdesign.components.declare import deck_text, declare
+from nlsdesign.components.assembly.deck_writer import deck_text, declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import read_deck
 from nlsdesign.discrepancy.effects import (
     ALL,

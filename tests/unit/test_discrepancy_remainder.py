@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nlsdesign.discrepancy.advice import advice, experiment
-from nlsdesign.discrepancy.sparse import sparse_formula
+from nlsdesign.discrepancy.reporting.advice import advice, experiment
+from nlsdesign.discrepancy.reporting.sparse_formula import sparse_formula
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,6 @@ from nlsdesign.components import (
     TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
-    assembly,
     parallel,
     pull_only,
     series,
@@ -33,7 +32,8 @@ from nlsdesign.components import (
     through,
     tie,
 )
-from nlsdesign.components.declare import declare
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ExportError
 from nlsdesign.model import FlatModel, Variable, flatten

@@ -8,15 +8,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from nlsdesign.components import DryFriction, Inertia, Play, TorsionSpring, assembly, tie
+from nlsdesign.components import DryFriction, Inertia, Play, TorsionSpring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ExportError
 from nlsdesign.export import natively
-from nlsdesign.export.compile import compiler
+from nlsdesign.export.compilation.cross_compiler import compiler
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.transform import replace_state, with_outputs
 from nlsdesign.simulation import Event, Sine, simulate
-from nlsdesign.simulation.drives import drives_of
 from nlsdesign.simulation.events import located
+from nlsdesign.simulation.input_signals import drives_of
 
 LAWS: list[tuple[Callable[[float], float], float]] = [
     (lambda h: math.cos(1.2 * h) - 0.3, math.acos(0.3) / 1.2),

@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 
 from nlsdesign.errors import ExportError
 from nlsdesign.export import CompiledStep, export_c
-from nlsdesign.export.compile import STRICT, compile_program, run_compiler
-from nlsdesign.export.guarded import (
+from nlsdesign.export.c.guarded_step import (
     INPUT_HELD,
     INPUT_SATURATED,
     OUTPUT_HELD,
@@ -28,6 +27,7 @@ from nlsdesign.export.guarded import (
     GuardedModel,
     index_bit,
 )
+from nlsdesign.export.compilation.cross_compiler import STRICT, compile_program, run_compiler
 from nlsdesign.model.flat import FlatModel, Table, Variable
 from tests.hand_built import controller, observer, plant
 

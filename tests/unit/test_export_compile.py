@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.errors import ExportError, UnknownNameError
-from nlsdesign.export import compile as compiling
-from nlsdesign.export.compile import (
+from nlsdesign.export.compilation import cross_compiler as compiling
+from nlsdesign.export.compilation.cross_compiler import (
     ALL_PLATFORMS,
     PLATFORMS,
     cache_folder,

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from nlsdesign.errors import ConvergenceError, ExportError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.export import cosimulate, export_fmu
-from nlsdesign.export.guarded import GuardedModel
+from nlsdesign.export.c.guarded_step import GuardedModel
 from nlsdesign.model.flat import FlatModel, Variable
 from tests.hand_built import SAMPLE_TIME, controller, observer, plant
 

@@ -18,9 +18,9 @@ from lxml import etree
 
 from nlsdesign.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.export import ALL_PLATFORMS, export_fmu
-from nlsdesign.export.compile import STRICT, run_compiler
-from nlsdesign.export.fmu import fmi_headers, universal_binary
-from nlsdesign.export.guarded import INPUT_HELD, INPUT_SATURATED, GuardedModel, index_bit
+from nlsdesign.export.c.guarded_step import INPUT_HELD, INPUT_SATURATED, GuardedModel, index_bit
+from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
+from nlsdesign.export.fmi.fmu import fmi_headers, universal_binary
 from nlsdesign.model.flat import FlatModel, Variable
 from nlsdesign.quantity import parse_unit
 from tests.fmu_unit import Refused, Unit, opened, unpacked

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from nlsdesign.errors import ExportError
-from nlsdesign.export.c_text import DOUBLE, FLOAT, Real, comment, identifier, real_type, string
-from nlsdesign.export.compile import STRICT, compile_library
-from nlsdesign.export.instructions import print_statements
+from nlsdesign.export.c.c_text import DOUBLE, FLOAT, Real, comment, identifier, real_type, string
+from nlsdesign.export.c.instructions import print_statements
+from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library
 from nlsdesign.symbolic import positive_part, solve_monotone, uniform_spline
 
 X = ca.SX.sym("x", 3)

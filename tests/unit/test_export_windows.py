@@ -10,9 +10,9 @@ import fmpy
 import numpy as np
 import pytest
 
-from nlsdesign.export.compile import compile_library, host_platform
-from nlsdesign.export.fmu import export_fmu
-from nlsdesign.export.fmu_variables import layout
+from nlsdesign.export.compilation.cross_compiler import compile_library, host_platform
+from nlsdesign.export.fmi.fmu import export_fmu
+from nlsdesign.export.fmi.fmu_variables import layout
 from tests.hand_built import observer, plant
 
 LOADER = Path(__file__).with_name("windows_loader.c")

@@ -31,15 +31,15 @@ from nlsdesign.components import (
     TorsionDashpot,
     TorsionSpring,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     through,
     tie,
 )
-from nlsdesign.components.declare import declare
-from nlsdesign.components.element import TRANSLATION, Element, Scope
-from nlsdesign.components.part import parameter
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.core.element import TRANSLATION, Element, Scope
+from nlsdesign.components.core.part import parameter
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, Table, Variable, flatten

@@ -18,9 +18,9 @@ from nlsdesign.components import (
     Mass,
     Part,
     VoltageDrivenMotor,
-    assembly,
 )
-from nlsdesign.components.declare import deck_problems, deck_text, declare
+from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import read_deck
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten

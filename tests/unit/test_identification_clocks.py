@@ -22,8 +22,8 @@ from nlsdesign.identification import (
     on_one_clock,
     resampled,
 )
-from nlsdesign.identification.evidence import estimate_noise
-from nlsdesign.identification.mapping import read_mapping
+from nlsdesign.identification.equation_error.evidence import estimate_noise
+from nlsdesign.identification.records.mapping import read_mapping
 from nlsdesign.simulation import Trace
 from tests.unit.test_identification_measurement import COUNT, MAPPING, STEP, model, table, write
 

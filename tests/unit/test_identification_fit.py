@@ -20,21 +20,26 @@ from nlsdesign.components import (
     StrainStiffening,
     StretchyCable,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     through,
     tie,
 )
-from nlsdesign.discrepancy.cuts import blocks_of
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.errors import ConvergenceError, UnknownNameError
-from nlsdesign.identification.block import Block
-from nlsdesign.identification.descent import minimise
-from nlsdesign.identification.driven import DrivenBlock
-from nlsdesign.identification.evidence import Bench
-from nlsdesign.identification.fit import Parameter, declared_parameter, fit, predicted_cost
-from nlsdesign.identification.measurement import Column, Record, RecordSet
-from nlsdesign.identification.stepping import exact_step, rosenbrock_step, stages_of
+from nlsdesign.identification.equation_error.block import Block
+from nlsdesign.identification.equation_error.block_response import DrivenBlock
+from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.identification.equation_error.stepping import exact_step, rosenbrock_step, stages_of
+from nlsdesign.identification.estimation.least_squares import (
+    Parameter,
+    declared_parameter,
+    fit,
+    predicted_cost,
+)
+from nlsdesign.identification.estimation.levenberg_marquardt import minimise
+from nlsdesign.identification.records.measurement import Column, Record, RecordSet
 from nlsdesign.quantity import quantity
 from nlsdesign.simulation import Trace
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nlsdesign.identification.losses import Huber, bent, saturated
+from nlsdesign.identification.statistics.losses import Huber, bent, saturated
 
 X = np.array([0.3, -0.8])
 

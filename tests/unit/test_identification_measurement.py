@@ -8,15 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components import (
-    Assembly,
-    Encoder,
-    Inertia,
-    TorqueSensor,
-    TorsionSpring,
-    assembly,
-    tie,
-)
+from nlsdesign.components import Assembly, Encoder, Inertia, TorqueSensor, TorsionSpring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import RecordSet, load_record, load_records
 from nlsdesign.model import FlatModel, flatten

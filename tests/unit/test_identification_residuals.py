@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from nlsdesign.identification.filters import derivative, kernel, noise_gain, rate_noise_gain, smoothing
-from nlsdesign.identification.metrics import agreement
-from nlsdesign.identification.residuals import (
+from nlsdesign.identification.statistics.filters import (
+    derivative,
+    kernel,
+    noise_gain,
+    rate_noise_gain,
+    smoothing,
+)
+from nlsdesign.identification.statistics.metrics import agreement
+from nlsdesign.identification.statistics.residuals import (
     autocorrelation,
     binned,
     effective_size,

@@ -8,13 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from nlsdesign.components import (
-    Dashpot,
-    Mass,
-    Spring,
-    assembly,
-    tie,
-)
+from nlsdesign.components import Dashpot, Mass, Spring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
 from nlsdesign.identification import (
     Fit,
@@ -30,8 +25,8 @@ from nlsdesign.identification import (
     profile_of,
     wired,
 )
-from nlsdesign.identification.parameters import Parameter
-from nlsdesign.identification.simulation_error import Point
+from nlsdesign.identification.estimation.parameters import Parameter
+from nlsdesign.identification.output_error.simulation_error import Point
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace
 

@@ -11,7 +11,7 @@ from scipy.io import savemat
 
 from nlsdesign.errors import MeasurementError, MissingLibraryError
 from nlsdesign.identification import load_records
-from nlsdesign.identification.tables import read_table
+from nlsdesign.identification.records.table_files import read_table
 from tests.unit.test_identification_measurement import MAPPING, model, table
 
 __all__ = ["model"]

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from nlsdesign.cli.main import program
 from nlsdesign.components import NeoHooke, Ogden, material, materials
-from nlsdesign.components.library import EVIDENCE
+from nlsdesign.components.materials.library import EVIDENCE
 from nlsdesign.errors import DeckError, UnitError, UnknownNameError
 from tests.stretched import pulled, stress_at
 

@@ -13,12 +13,12 @@ from nlsdesign.components import (
     StrainStiffening,
     TorsionSpring,
     ViscousMaterial,
-    assembly,
     series,
     specimen,
     through,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import (

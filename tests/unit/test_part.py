@@ -28,7 +28,6 @@ from nlsdesign.components import (
     Spring,
     StrainStiffening,
     TorsionSpring,
-    assembly,
     parallel,
     pull_only,
     series,
@@ -36,7 +35,8 @@ from nlsdesign.components import (
     through,
     tie,
 )
-from nlsdesign.components.part import find, quantities, replaced, with_values
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.core.part import find, quantities, replaced, with_values
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.quantity import Quantity, quantity
 

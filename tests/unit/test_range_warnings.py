@@ -18,11 +18,11 @@ from nlsdesign.components import (
     NeoHooke,
     Spring,
     StrainStiffening,
-    assembly,
     series,
     specimen,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import Variable, flatten
 from nlsdesign.report import range_table, report_text
 from nlsdesign.simulation import Trace, range_warnings, simulate

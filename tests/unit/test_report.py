@@ -18,7 +18,8 @@ import pytest
 import sympy
 
 from nlsdesign import report
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, assembly, tie
+from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.model.equations import equations

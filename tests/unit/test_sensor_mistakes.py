@@ -19,10 +19,10 @@ from nlsdesign.components import (
     Tachometer,
     TorqueSensor,
     TorsionSpring,
-    assembly,
     tie,
 )
-from nlsdesign.components.declare import deck_text, declare
+from nlsdesign.components.assembly.deck_writer import deck_text, declare
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import read_deck
 from nlsdesign.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten

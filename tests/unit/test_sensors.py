@@ -25,10 +25,10 @@ from nlsdesign.components import (
     GearedMotor,
     Inertia,
     Spring,
-    assembly,
     tie,
 )
-from nlsdesign.components.sensors import Sensor
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.sensing.sensors import Sensor
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import simulate

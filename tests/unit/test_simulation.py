@@ -28,16 +28,16 @@ from nlsdesign.components import (
     Spring,
     TorsionDashpot,
     TorsionSpring,
-    assembly,
     parallel,
     series,
     tie,
 )
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, MeasurementError, NlsError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, Table, Variable, flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.simulation import Trace, simulate
-from nlsdesign.simulation.drives import drives_of
+from nlsdesign.simulation.input_signals import drives_of
 from nlsdesign.simulation.runge_kutta import TooStiffError, integrate_explicitly
 from nlsdesign.simulation.stiff import integrate_implicitly
 

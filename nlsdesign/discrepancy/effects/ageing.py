@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ...components import Assembly, Specimen, StressSoftening, TensionSet, ViscousHeating, WorkHeating
-from ...components.element import TRANSLATION, Element
+from ...components.core.element import TRANSLATION, Element
 from ...quantity import Quantity
 from .cable import is_inside, stretched
 from .candidate import SOURCE, Candidate, Unknown, wrapped

@@ -16,8 +16,8 @@ from ...components import (
     Turned,
     TwoSidedCam,
 )
-from ...components.element import ROTATION, TRANSLATION, Element
-from ...components.networks import Through
+from ...components.core.element import ROTATION, TRANSLATION, Element
+from ...components.transmission.cam_drive import Through
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, numbers_of, wrapped
 from .large_strain import buckling

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
 from ...components import Assembly, Element, Part
-from ...components.sensors import Sensor
+from ...components.sensing.sensors import Sensor
 
 SOURCE = "fitted to bench records"
 

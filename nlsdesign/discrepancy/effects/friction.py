@@ -22,8 +22,8 @@ from ...components import (
     TorsionSpring,
     tie,
 )
-from ...components.bodies import Free
-from ...components.element import ROTATION
+from ...components.core.element import ROTATION
+from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, free_name, wrapped
 from .sliding import sliding_friction

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...components import Assembly, ConstantForce, Element, SlidingFriction, Tie, tie
-from ...components.bodies import Free
-from ...components.element import TRANSLATION
+from ...components.core.element import TRANSLATION
+from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, free_name
 

@@ -1,0 +1,196 @@
+"""Decks to assemblies and back. A deck declares everything: parts, ties, numbers."""
+
+from __future__ import annotations
+
+import json
+from decimal import Context
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from ...deck import Deck, Written
+from ...errors import DeckError, NlsError, nearest
+from ...quantity import Quantity, parse_unit
+from ...writing import write_text
+from ..core.element import Element
+from ..core.part import Part
+from ..core.tie import Tie
+from ..mechanics.gear import Gear
+from ..sensing.sensors import Sensor
+from .deck_reader import Builder
+from .named_parts import Assembly, arrangement_problems
+
+
+def deck_problems(deck: Deck) -> list[NlsError]:
+    """Return everything that is wrong with a deck, each with file, line and column.
+
+    Parameters
+    ----------
+    deck
+        As read.
+    """
+    return _declared(deck)[1]
+
+
+def declare(deck: Deck) -> Assembly:
+    """Return the assembly that a deck declares.
+
+    Parameters
+    ----------
+    deck
+        As read by ``load_deck``.
+
+    Raises
+    ------
+    NlsError
+        The first problem; ``deck_problems`` gives all.
+    """
+    found, problems = _declared(deck)
+    if found is None:
+        raise problems[0]
+    return found
+
+
+def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
+    builder = Builder(deck)
+    builder.head()
+    parts: dict[str, Part | None] = {}
+    for name, table in deck.tables.items():
+        if not isinstance(table, dict):
+            step = "put it into a table such as [motor]"
+            builder.problems.append(DeckError(deck.place(name), "stands outside of any part", next_step=step))
+            continue
+        part = builder.part(name, table)
+        is_tied = issubclass(builder.class_of(name) or Part, Element)
+        parts[name] = builder.tied(name, part, table) if is_tied else part
+    sound = tuple((name, part) for name, part in parts.items() if part is not None)
+    unsure = [name for name, part in parts.items() if part is None]
+    for name, error in arrangement_problems(sound, unsure):
+        field = f"{name}.between" if f"{name}.between" in deck.places else name
+        builder.problems.append(error.at(deck.place(field)))
+    if builder.problems:
+        return None, builder.problems
+    try:
+        return Assembly(deck.name, sound, deck.description), []
+    except NlsError as error:
+        return None, [error.at(deck.place("deck"))]
+
+
+def deck_text(assembly: Assembly) -> str:
+    """Return an assembly as the text of a deck.
+
+    Parameters
+    ----------
+    assembly
+        Parts, made in Python or read from another deck.
+    """
+    lines = ["[deck]", f"name = {_string(assembly.name)}", f"description = {_string(assembly.description)}"]
+    for name, part in assembly.parts:
+        if isinstance(part, Tie | Gear):
+            ends = ", ".join(_string(end) for end in part.between)
+            inner = part.element if isinstance(part, Tie) else part
+            lines += _table(name, inner, [f"between = [{ends}]"])
+        else:
+            lines += _table(name, part, [f"of = {_string(part.of)}"] if isinstance(part, Sensor) else [])
+    return "\n".join(lines) + "\n"
+
+
+def write_deck(assembly: Assembly, path: Path) -> None:
+    """Write an assembly as a deck; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    assembly
+        Parts.
+    path
+        File to write.
+    """
+    write_text(path, deck_text(assembly))
+
+
+def _table(path: str, part: Part, structure: list[str]) -> list[str]:
+    lines = ["", f"[{path}]", f"component = {_string(type(part).__name__)}", *structure]
+    lines += [f"{name} = {_number(q)}" for name, q in part.parameters().items()]
+    for name, child in part.children().items():
+        lines += _table(f"{path}.{name}", child, [])
+    return lines
+
+
+def _number(given: Quantity) -> str:
+    factor = parse_unit(given.unit).factor
+    items = [_shortest(v, factor) for v in given.values]
+    value = "[" + ", ".join(items) + "]" if isinstance(given.value, tuple) else items[0]
+    text = f"{{value = {value}, unit = {_string(given.unit)}, source = {_string(given.source)}"
+    return text + (f", spread = {given.spread!r}}}" if given.spread else "}")
+
+
+def _shortest(value: float, factor: float) -> str:
+    """Return the shortest decimal that reads back as the same number in SI."""
+    exact = Fraction(value) / Fraction(factor)
+    short = (repr(float(f"{float(exact):.{digits}g}")) for digits in (6, 12, 15))
+    # Where no float times the factor is the value, the text has more digits than a float.
+    long = (str(Context(prec=n).divide(exact.numerator, exact.denominator)) for n in range(17, 40))
+    return next(text for text in chain(short, long) if Written(text).times(factor) == value)
+
+
+def _string(text: str) -> str:
+    """Return a text as TOML writes it, which is as JSON does but for the delete character."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
+    """Return the numbers that stand directly in one table of a deck, by field name.
+
+    Parameters
+    ----------
+    deck
+        As read.
+    path
+        Full name of the table, for instance ``"spring.rubber"``.
+    kind
+        The component that the numbers are for.
+
+    Raises
+    ------
+    NlsError
+        If the table is missing or is another component, or a number is missing, too much or not sound.
+    """
+    table: Any = deck.tables
+    for step in path.split("."):
+        table = table.get(step) if isinstance(table, dict) else None
+    if not isinstance(table, dict) or table.get("component") != kind.__name__:
+        rule = f"this model has a {kind.__name__} here"
+        raise DeckError(
+            deck.place(path), rule, next_step="use declare(deck), which takes any deck as it stands"
+        )
+    builder = Builder(deck)
+    found = builder.numbers(path, table, kind)
+    if builder.problems:
+        raise builder.problems[0]
+    return found
+
+
+def require_same_numbers(assembly: Assembly, deck: Deck) -> Assembly:
+    """Return the assembly if it has used every number of the deck.
+
+    Parameters
+    ----------
+    assembly
+        Made from the deck by a function.
+    deck
+        Where the numbers came from.
+
+    Raises
+    ------
+    DeckError
+        If the deck declares a number that the assembly does not have.
+    """
+    for name in deck.numbers():
+        if name not in assembly.quantities():
+            raise DeckError(
+                deck.place(name), f"the model {assembly.name} does not have this number",
+                did_you_mean=nearest(name, assembly.quantities()),
+                next_step="use declare(deck), which takes any deck as it stands",
+            )  # fmt: skip
+    return assembly

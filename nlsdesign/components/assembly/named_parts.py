@@ -1,0 +1,233 @@
+"""An assembly: bodies, elements tied and gears set between them, and sensors, all by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from typing import Any
+
+from ...errors import ArrangementError, NlsError, unknown_name
+from ...quantity import Quantity
+from ..core.element import Element
+from ..core.part import Part, check_names, find, quantities, replaced, resolved, walk, with_values
+from ..core.tie import Tie
+from ..mechanics.bodies import Body, Fixed
+from ..mechanics.gear import Gear, gear_problems
+from ..sensing.sensors import Sensor
+from .circuit_picture import assembly_svg
+from .circuit_text import draw
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Named parts that make one system.
+
+    Parameters
+    ----------
+    name
+        Short name; also that of generated code.
+    parts
+        Pairs of name and body, gear, tie or sensor, in written order.
+    description
+        One sentence.
+    """
+
+    name: str
+    parts: tuple[tuple[str, Part], ...]
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        # In a deck the table [deck] holds name and description.
+        check_names(f"assembly '{self.name}'", [name for name, _ in self.parts], taken=("deck",))
+        for _, error in arrangement_problems(self.parts):
+            raise error
+        if not any(isinstance(part, Body) for _, part in self.parts):
+            raise ArrangementError(
+                f"assembly '{self.name}'", "has no body", next_step="add for instance load=Fixed()"
+            )
+
+    def __getitem__(self, path: str) -> Part:
+        """Return the part at a path.
+
+        Parameters
+        ----------
+        path
+            For instance ``"spring.rubber"``.
+        """
+        for where, part in self.walk():
+            if where == path:
+                return part
+        raise unknown_name("part", path, (where for where, _ in self.walk()))
+
+    def walk(self) -> list[tuple[str, Part]]:
+        """Return every part with its path, in written order."""
+        return [pair for name, part in self.parts for pair in walk(part, name)]
+
+    def sensors(self) -> dict[str, Sensor]:
+        """Return the sensors by name."""
+        return {name: part for name, part in self.parts if isinstance(part, Sensor)}
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return every number by full name."""
+        return {k: q for name, part in self.parts for k, q in quantities(part, name).items()}
+
+    def with_values(self, values: Mapping[str, Quantity | float | tuple[float, ...]]) -> Assembly:
+        """Return a copy with other numbers.
+
+        Parameters
+        ----------
+        values
+            Quantities, or numbers in SI, by full name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest name that exists.
+        """
+        inside: dict[str, dict[str, Quantity | float | tuple[float, ...]]] = {}
+        for name, value in resolved(self.quantities(), values).items():
+            head, _, tail = name.partition(".")
+            inside.setdefault(head, {})[tail] = value
+        parts = dict(self.parts)
+        for head, numbers in inside.items():
+            part = parts[head]
+            changed = with_values(part.element if isinstance(part, Tie) else part, numbers)
+            parts[head] = part.around(changed) if isinstance(part, Tie) else changed
+        return replace(self, parts=tuple(parts.items()))
+
+    def with_part(self, path: str, new: Part) -> Assembly:
+        """Return a copy in which a part is added, or another one stands in its place.
+
+        Parameters
+        ----------
+        path
+            Existing path, or a new name at the top or inside a combination.
+        new
+            The part; a bare element in place of a tie keeps the bodies.
+        """
+        head, _, tail = path.partition(".")
+        parts = dict(self.parts)
+        old = parts.get(head)
+        if tail:
+            if old is None:
+                raise unknown_name("part", path, (where for where, _ in self.walk()))
+            inner = old.element if isinstance(old, Tie) else old
+            inside = _with_inner(inner, tail, new)
+            parts[head] = old.around(inside) if isinstance(old, Tie) else inside
+        elif isinstance(old, Tie) and isinstance(new, Element):
+            parts[head] = old.around(new)
+        else:
+            parts[head] = new
+        return replace(self, parts=tuple(parts.items()))
+
+    def element(self, path: str) -> Element:
+        """Return the element at a path; for a tie, the element that it ties.
+
+        Parameters
+        ----------
+        path
+            For instance ``"spring"`` or ``"spring.rubber"``.
+        """
+        part = self[path]
+        found = part.element if isinstance(part, Tie) else part
+        if not isinstance(found, Element):
+            raise ArrangementError(f"part '{path}'", f"is a {type(found).__name__}, not an element")
+        return found
+
+    def without_part(self, name: str) -> Assembly:
+        """Return a copy without a part at the top.
+
+        Parameters
+        ----------
+        name
+            Name of the part.
+        """
+        if name not in dict(self.parts):
+            raise unknown_name("part", name, dict(self.parts))
+        return replace(self, parts=tuple((n, p) for n, p in self.parts if n != name))
+
+    def __str__(self) -> str:
+        return draw(f"{self.name}: {self.description}".rstrip(": "), self.parts)
+
+    def _repr_html_(self) -> str:
+        """Return the circuits as a picture and the parts with their numbers, for notebooks."""
+        told = f"<details><summary>parts and numbers</summary><pre>{escape(str(self))}</pre></details>"
+        title = f"<p><b>{escape(self.name)}</b> {escape(self.description)}</p>"
+        return f"<div>{title}{assembly_svg(self.name, self.parts)}{told}</div>"
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """Return text and picture; a notebook takes the richest that it can show."""
+        return {"text/plain": str(self), "text/html": self._repr_html_()}
+
+
+def _with_inner(root: Part, path: str, new: Part) -> Part:
+    owner, _, name = path.rpartition(".")
+    holder = find(root, owner)
+    return replaced(root, owner, holder.with_children({**holder.children(), name: new}))
+
+
+def arrangement_problems(
+    parts: Sequence[tuple[str, Part]], unsure: Sequence[str] = ()
+) -> Iterator[tuple[str, NlsError]]:
+    """Yield what is wrong with the way in which parts are put together, with the name of the part.
+
+    Parameters
+    ----------
+    parts
+        Pairs of name and part.
+    unsure
+        Names of parts that are there but could not be read; nothing is said of what is tied to them.
+    """
+    bodies = {name: part for name, part in parts if isinstance(part, Body)}
+    for name, part in parts:
+        if isinstance(part, Tie):
+            if not set(unsure) & set(part.between):
+                yield from ((name, error) for error in _tie_problems(name, part, bodies))
+        elif not isinstance(part, Body | Sensor | Gear):
+            yield (
+                name,
+                ArrangementError(
+                    f"part '{name}'",
+                    f"is a {type(part).__name__}; an assembly holds bodies, gears, ties and sensors",
+                    next_step="tie an element to bodies with tie(element, 'motor', 'load')",
+                ),
+            )
+    yield from gear_problems(parts, unsure)
+
+
+def _tie_problems(name: str, part: Tie, bodies: Mapping[str, Body]) -> Iterator[NlsError]:
+    missing = [end for end in part.between if end not in bodies]
+    if missing:
+        yield from (unknown_name(f"'{name}': body", end, bodies) for end in missing)
+        return
+    ends = [bodies[end] for end in part.between]
+    for end, body in zip(part.between, ends, strict=True):
+        if body.domain != part.element.domain:
+            yield ArrangementError(
+                f"part '{name}'",
+                f"relates {part.element.domain.motion} and {part.element.domain.effort}, "
+                f"but '{end}' has a {body.domain.motion}",
+                next_step="put a cam or pulley (through) in between",
+            )
+    if all(isinstance(body, Fixed) for body in ends) or len(set(part.between)) < len(part.between):
+        yield ArrangementError(
+            f"part '{name}'",
+            "both ends rest on the same or on fixed bodies, so it can never move",
+            next_step="tie one end to a body that moves",
+        )
+
+
+def assembly(name: str, *, description: str = "", **parts: Any) -> Assembly:
+    """Make an assembly of named parts.
+
+    Parameters
+    ----------
+    name
+        Short name of the system.
+    description
+        One sentence.
+    **parts
+        Bodies, gears, ties and sensors by name.
+    """
+    return Assembly(name, tuple(parts.items()), description)

@@ -1,0 +1,66 @@
+"""The smooth form of an assembly, for optimisation, C and FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
+
+from ...errors import unknown_name
+from ..core.element import Element
+from ..core.part import Part
+from ..core.tie import Tie
+from .named_parts import Assembly
+
+
+@runtime_checkable
+class Sharp(Protocol):
+    """A law that is not smooth and knows one that is."""
+
+    def smooth(self, width: float = ...) -> Element:
+        """Return the smooth form; how smooth it is and by how much it differs stands in its description."""
+        ...
+
+
+def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> Assembly:
+    """Return an assembly in which every law that is not smooth has its smooth form.
+
+    Dry friction creeps with a hyperbolic tangent instead of sticking, stops, play, slack and knots are
+    rounded; each law says by how much it then differs.
+
+    Parameters
+    ----------
+    assembly
+        Parts.
+    widths
+        By the full name of the element: speed, angle, extension, strain or force over which it is rounded.
+        Others take the width that their law proposes.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such element, or it is smooth already.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import DryFriction, Inertia, assembly, tie
+    >>> rub = tie(DryFriction(sliding_torque=0.05), "wheel")
+    >>> rubbing = assembly("a", wheel=Inertia(inertia=1e-3), rub=rub)
+    >>> smoothed(rubbing, {"rub": 0.01}).element("rub").title()
+    'CoulombFriction(sliding_torque = 0.05 N*m, creep_speed = 0.01 rad/s)'
+    """
+    asked = dict(widths or {})
+    sharp = {path: part for path, part in assembly.walk() if isinstance(_law(part), Sharp)}
+    for name in asked:
+        if name not in sharp:
+            raise unknown_name("element that is not smooth", name, sharp)
+    # What lies deeper first: the smooth form of a wrapper takes along what is inside.
+    for path in sorted(sharp, key=lambda p: -p.count(".")):
+        law = _law(assembly[path])
+        if isinstance(law, Sharp):
+            smooth = law.smooth(asked[path]) if path in asked else law.smooth()
+            assembly = assembly.with_part(path, smooth)
+    return assembly
+
+
+def _law(part: Part) -> Part:
+    return part.element if isinstance(part, Tie) else part

@@ -1,0 +1,252 @@
+"""The algebra of one-port elements: what every element is, in parallel and in series.
+
+An element relates a motion (strain, extension, angle) to an effort (stress, force, torque). One predicate
+decides the causality: ``needs_rate`` says whether the effort depends directly on the rate of the motion.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Protocol, Self, TypeAlias
+
+from ...errors import ArrangementError
+from ...symbolic import Expression
+from .part import RESERVED, Part, check_names
+from .switches import Switches
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Names and units of the pair of quantities that an element relates.
+
+    Parameters
+    ----------
+    motion, motion_unit
+        Strain in 1, extension in m, or angle in rad.
+    rate, rate_unit
+        Its derivative.
+    effort, effort_unit
+        Stress in Pa, force in N, or torque in N·m.
+    """
+
+    motion: str
+    motion_unit: str
+    rate: str
+    rate_unit: str
+    effort: str
+    effort_unit: str
+
+
+MATERIAL = Domain("strain", "1", "strain_rate", "1/s", "stress", "Pa")
+TRANSLATION = Domain("extension", "m", "rate", "m/s", "force", "N")
+ROTATION = Domain("angle", "rad", "speed", "rad/s", "torque", "N*m")
+
+Range: TypeAlias = tuple[float, float]
+UNBOUNDED: Range = (-math.inf, math.inf)
+
+
+class OwnNames(Protocol):
+    """What an element may name in the model that is being written: its numbers, inputs, states, signals."""
+
+    path: str
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of one of the part's own numbers."""
+        ...
+
+    def row(self, name: str) -> list[Expression]:
+        """Return the symbols of one of the part's own rows of numbers."""
+        ...
+
+    def input(self, name: str, unit: str, description: str) -> Expression:
+        """Declare an input."""
+        ...
+
+    def state(self, name: str, unit: str, description: str) -> Expression:
+        """Declare a state; its derivative is given by :meth:`derive`."""
+        ...
+
+    def signal(
+        self, name: str, value: Expression, unit: str, description: str, *, valid: Range = UNBOUNDED
+    ) -> None:
+        """Give a name to an expression, and the range in which the law behind it is stated to hold."""
+        ...
+
+
+class Scope(OwnNames, Switches, Protocol):
+    """What an element sees of the model that is being written: its own names, nothing else."""
+
+    def child(self, name: str) -> Scope:
+        """Return the scope of a part inside."""
+        ...
+
+    def derive(self, state: Expression, derivative: Expression) -> None:
+        """Give the derivative of a state."""
+        ...
+
+    def loss(self, power: Expression) -> None:
+        """Note power that turns into heat inside the part, in effort times rate."""
+        ...
+
+    def losses(self) -> Expression:
+        """Return the sum of what the part and all parts inside it have noted as lost."""
+        ...
+
+    def define(self, unknown: Expression, solution: Expression) -> None:
+        """Give the solution of an unknown that stands in expressions given before."""
+        ...
+
+    def check(self, name: str, residual: Expression) -> None:
+        """Record a residual that must vanish."""
+        ...
+
+    def total_rate(self, value: Expression, moving: Mapping[Expression, Expression]) -> Expression:
+        """Return the time derivative of an expression of states and the given moving symbols."""
+        ...
+
+    def rate_is_used(self, rate: Expression) -> bool:
+        """Tell whether anything given so far contains this symbol."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Element(Part):
+    """A one-port element; final classes say their law in :meth:`effort`."""
+
+    picture: ClassVar[str] = "box"
+    """How it is drawn, by a name of ``GLYPHS`` in :mod:`.circuit`; ``"none"`` for its members alone."""
+
+    @property
+    @abstractmethod
+    def domain(self) -> Domain:
+        """The pair of quantities that the element relates."""
+
+    @property
+    @abstractmethod
+    def needs_rate(self) -> bool:
+        """Whether the effort depends directly on the rate of the motion."""
+
+    @property
+    def dissipates(self) -> bool:
+        """Whether all power that goes into the element is lost in it; other laws say :meth:`Scope.loss`."""
+        return False
+
+    @property
+    def valid(self) -> Range:
+        """Least and greatest motion for which the law is stated to hold; results name it when it is left."""
+        return UNBOUNDED
+
+    @abstractmethod
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the effort at a motion and its rate.
+
+        Parameters
+        ----------
+        scope
+            Gives parameters, takes states, signals and unknowns.
+        motion, rate
+            Scalars in the units of the domain.
+        """
+
+
+def observed_effort(element: Element, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+    """Return the effort of an element and give names to its motion and effort.
+
+    Parameters
+    ----------
+    element, scope, motion, rate
+        As for :meth:`Element.effort`.
+    """
+    effort = element.effort(scope, motion, rate)
+    domain = element.domain
+    if element.dissipates:
+        scope.loss(effort * rate)
+    meaning = f"{domain.motion} of {scope.path}"
+    scope.signal(domain.motion, motion, domain.motion_unit, meaning, valid=element.valid)
+    scope.signal(domain.effort, effort, domain.effort_unit, f"{domain.effort} of {scope.path}")
+    return effort
+
+
+@dataclass(frozen=True, kw_only=True)
+class Combination(Element):
+    """Several elements of one domain by name.
+
+    Parameters
+    ----------
+    members
+        Pairs of name and element.
+    """
+
+    picture: ClassVar[str] = "around"
+
+    members: tuple[tuple[str, Element], ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        kind = type(self).__name__
+        if not self.members:
+            raise ArrangementError(
+                kind, "needs at least one element", next_step="name elements, for instance spring=..."
+            )
+        check_names(kind, [name for name, _ in self.members], taken=RESERVED | set(self.parameter_infos()))
+        for name, member in self.members:
+            if not isinstance(member, Element):
+                raise ArrangementError(
+                    f"{kind} member '{name}'", f"is a {type(member).__name__}, not an element"
+                )
+            if member.domain != self._inner:
+                raise ArrangementError(
+                    f"{kind} member '{name}'",
+                    f"relates {member.domain.motion} and {member.domain.effort}, the others "
+                    f"{self._inner.motion} and {self._inner.effort}",
+                    next_step="put a cam or pulley (through) or a specimen between the two",
+                )
+
+    @property
+    def _inner(self) -> Domain:
+        return self.members[0][1].domain
+
+    @property
+    def domain(self) -> Domain:
+        """The domain of the members."""
+        return self._inner
+
+    def children(self) -> Mapping[str, Part]:
+        """Return the members by name."""
+        return dict(self.members)
+
+    def with_children(self, children: Mapping[str, Part]) -> Self:
+        """Return a copy with other members."""
+        # The kind of each member is checked where the copy is made.
+        return replace(self, members=tuple(children.items()))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parallel(Combination):
+    """Elements that share the motion; their efforts add."""
+
+    picture: ClassVar[str] = "none"
+
+    @property
+    def needs_rate(self) -> bool:
+        """True if any member needs the rate."""
+        return any(member.needs_rate for _, member in self.members)
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the sum of the efforts."""
+        efforts = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
+        return sum(efforts[1:], start=efforts[0])
+
+
+def parallel(**members: Element) -> Parallel:
+    """Put elements in parallel: same motion, efforts add.
+
+    Parameters
+    ----------
+    **members
+        Elements by name.
+    """
+    return Parallel(members=tuple(members.items()))

@@ -1,0 +1,146 @@
+"""What a law says of the places where it is not smooth, so that simulation can find them.
+
+Three kinds. A *corner* keeps the effort continuous; only its derivative jumps. At a *side* the effort itself
+jumps, so the law is written with a symbol that is 1 on one side and −1 on the other. A *hold* keeps a rate at
+zero by an effort that is found from the motion of everything else: dry friction that sticks, a body at rest
+against a stop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import casadi as ca
+
+from ...symbolic import Expression, symbol
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A place at which an effort has a corner.
+
+    Parameters
+    ----------
+    name
+        Full name, for messages and events.
+    value
+        Vanishes at the corner.
+    above, below
+        What has happened when the value has become positive, or negative.
+    """
+
+    name: str
+    value: Expression
+    above: str
+    below: str
+
+
+@dataclass(frozen=True)
+class Side(Corner):
+    """A place at which an effort jumps.
+
+    Parameters
+    ----------
+    mode
+        Symbol that is 1 where the value is positive and −1 where it is negative.
+    """
+
+    mode: Expression
+
+
+@dataclass(frozen=True)
+class Hold:
+    """An effort that keeps a rate at zero, and what acts while it does not.
+
+    Parameters
+    ----------
+    name
+        Full name, for messages and events.
+    effort
+        Symbol of the effort against the rate.
+    mode
+        Symbol that is 0 while the rate is held, otherwise 1 or −1.
+    rate
+        What is held at zero.
+    moving
+        Effort while the rate is not held.
+    stays
+        Not negative as long as the effort can hold.
+    lands
+        Not negative as long as the rate stays free.
+    leads
+        Mode that follows when the effort cannot hold any longer.
+    rebound
+        Rate after landing; zero where it is held from then on.
+    first
+        Mode before anything is known of the effort: 0 where it might hold.
+    words
+        What has happened when a mode begins: pairs of mode and text; the text of a rebound is at 2.
+    level
+        Largest effort of dry friction while it holds; several on one rate share the load in this ratio.
+    """
+
+    name: str
+    effort: Expression
+    mode: Expression
+    rate: Expression
+    moving: Expression
+    stays: Expression
+    lands: Expression
+    leads: Expression
+    rebound: Expression
+    first: Expression
+    words: tuple[tuple[int, str], ...]
+    level: Expression | None = None
+
+
+class Switches(Protocol):
+    """Takes what laws say of the places where they are not smooth."""
+
+    path: str
+
+    def corner(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
+        """Say that the effort has a corner where a value vanishes."""
+        ...
+
+    def side(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
+        """Return a symbol that is 1 where a value is positive and −1 where it is negative."""
+        ...
+
+    def hold(self, hold: Hold) -> Expression:
+        """Take an effort that holds a rate at zero, and return it."""
+        ...
+
+
+def dry(
+    scope: Switches, rate: Expression, slipping: Callable[[Expression], Expression], sticking: Expression
+) -> Expression:
+    """Return the effort of dry friction with true sticking.
+
+    Parameters
+    ----------
+    scope
+        Of the element.
+    rate
+        Relative rate of the two sides.
+    slipping
+        Takes the size of the rate and returns that of the effort.
+    sticking
+        Largest effort at which the two sides stick.
+    """
+    mode, effort = symbol(f"{scope.path}.mode"), symbol(f"{scope.path}.holding")
+    return scope.hold(
+        Hold(
+            scope.path, effort, mode, rate,
+            moving=mode * slipping(mode * rate),
+            stays=sticking - ca.fabs(effort),
+            lands=mode * rate,
+            leads=ca.if_else(effort >= 0, 1, -1),
+            rebound=ca.SX(0),
+            first=ca.sign(rate),
+            words=((0, "sticks"), (1, "slips forward"), (-1, "slips backward")),
+            level=sticking,
+        )
+    )  # fmt: skip

@@ -1,0 +1,206 @@
+"""Bodies: what has an angle (or a position) of its own. Elements act between bodies."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+
+from ...quantity import Quantity
+from ...symbolic import Expression
+from ..core.element import ROTATION, TRANSLATION, Domain, Scope
+from ..core.part import Part, parameter
+
+
+class Motion(NamedTuple):
+    """Motion of a body and its rate."""
+
+    motion: Expression
+    rate: Expression
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body(Part):
+    """Base of everything that elements can be tied to."""
+
+    @property
+    @abstractmethod
+    def domain(self) -> Domain:
+        """Rotation or translation."""
+
+    @abstractmethod
+    def motion(self, scope: Scope) -> Motion:
+        """Return motion and rate, declaring states or inputs."""
+
+    @abstractmethod
+    def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
+        """Close the equations with the sum of the efforts of all elements on the body."""
+
+
+def _names(domain: Domain) -> tuple[str, str]:
+    return ("angle", "speed") if domain == ROTATION else ("position", "speed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Free(Body):
+    """Base of the bodies that move by themselves: two states."""
+
+    def motion(self, scope: Scope) -> Motion:
+        """Declare motion and speed as states."""
+        place, speed = _names(self.domain)
+        return Motion(
+            scope.state(place, self.domain.motion_unit, f"{place} of {scope.path}"),
+            scope.state(speed, self.domain.rate_unit, f"{speed} of {scope.path}"),
+        )
+
+    @abstractmethod
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
+        """Return the effort that acts on the body from outside, in the unit of the domain."""
+
+    @abstractmethod
+    def inertia_of(self, scope: Scope) -> Expression:
+        """Return the inertia or mass."""
+
+    def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
+        """Newton: inertia × acceleration = sum of efforts."""
+        acceleration = (self.drive(scope, motion) + effort) / self.inertia_of(scope)
+        scope.derive(motion.motion, motion.rate)
+        scope.derive(motion.rate, acceleration)
+        scope.signal(
+            "acceleration", acceleration, f"{self.domain.motion_unit}/s^2", f"acceleration of {scope.path}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inertia(Free):
+    """A turning body, J·ω̇ = ΣT + load torque."""
+
+    inertia: Quantity = parameter("kg*m^2", "moment of inertia", minimum=1e-12, maximum=1e6)
+
+    @property
+    def domain(self) -> Domain:
+        """Rotation."""
+        return ROTATION
+
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
+        """Return the torque from outside, an input."""
+        return scope.input("torque", "N*m", f"torque on {scope.path} from outside")
+
+    def inertia_of(self, scope: Scope) -> Expression:
+        """Return J."""
+        return scope.parameter("inertia")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mass(Free):
+    """A sliding body, m·v̇ = ΣF + outer force."""
+
+    mass: Quantity = parameter("kg", "mass", minimum=1e-9, maximum=1e9)
+
+    @property
+    def domain(self) -> Domain:
+        """Translation."""
+        return TRANSLATION
+
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
+        """Return the force from outside, an input."""
+        return scope.input("force", "N", f"force on {scope.path} from outside")
+
+    def inertia_of(self, scope: Scope) -> Expression:
+        """Return m."""
+        return scope.parameter("mass")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearedMotor(Free):
+    """Electric motor behind a rigid gear, seen from the output: J·ω̇ = n·k_T·I + ΣT.
+
+    The inertia is that of everything that turns, reflected to the output; the gear has no loss here, so
+    friction is an element of its own. Source: any text on electric drives.
+    """
+
+    inertia: Quantity = parameter(
+        "kg*m^2", "moment of inertia at the gear's output", minimum=1e-12, maximum=1e6
+    )
+    gear_ratio: Quantity = parameter("1", "motor turns per output turn", minimum=1e-3, maximum=1e4)
+    torque_constant: Quantity = parameter("N*m/A", "motor torque per current", minimum=1e-6, maximum=1e3)
+    current_limit: Quantity = parameter("A", "largest current", minimum=1e-6, maximum=1e4, default=20.0)
+
+    @property
+    def domain(self) -> Domain:
+        """Rotation."""
+        return ROTATION
+
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
+        """Return n·k_T·I with the current held within its limit."""
+        limit = scope.parameter("current_limit")
+        current = ca.fmin(ca.fmax(scope.input("current", "A", f"current of {scope.path}"), -limit), limit)
+        torque = scope.parameter("gear_ratio") * scope.parameter("torque_constant") * current
+        scope.signal("drive_torque", torque, "N*m", f"torque of {scope.path} at the gear's output")
+        return torque
+
+    def inertia_of(self, scope: Scope) -> Expression:
+        """Return J."""
+        return scope.parameter("inertia")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed(Body):
+    """A body that does not turn: the bench."""
+
+    @property
+    def domain(self) -> Domain:
+        """Rotation."""
+        return ROTATION
+
+    def motion(self, scope: Scope) -> Motion:
+        """Return zero."""
+        return Motion(ca.SX(0), ca.SX(0))
+
+    def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
+        """Name the torque that the bench has to hold."""
+        scope.signal("reaction", -effort, self.domain.effort_unit, f"what holds {scope.path}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedPoint(Fixed):
+    """A point that does not move: the clamp of a tensile machine."""
+
+    @property
+    def domain(self) -> Domain:
+        """Translation."""
+        return TRANSLATION
+
+
+@dataclass(frozen=True, kw_only=True)
+class Driven(Body):
+    """A body whose angle is prescribed from outside: angle and speed are inputs."""
+
+    @property
+    def domain(self) -> Domain:
+        """Rotation."""
+        return ROTATION
+
+    def motion(self, scope: Scope) -> Motion:
+        """Declare motion and speed as inputs."""
+        place, speed = _names(self.domain)
+        return Motion(
+            scope.input(place, self.domain.motion_unit, f"prescribed {place} of {scope.path}"),
+            scope.input(speed, self.domain.rate_unit, f"prescribed {speed} of {scope.path}"),
+        )
+
+    def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
+        """Name the effort that the prescribed motion takes."""
+        scope.signal("reaction", -effort, self.domain.effort_unit, f"what moves {scope.path}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrivenPoint(Driven):
+    """A point whose position is prescribed from outside: the grip of a tensile machine."""
+
+    @property
+    def domain(self) -> Domain:
+        """Translation."""
+        return TRANSLATION

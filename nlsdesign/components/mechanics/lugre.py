@@ -1,0 +1,67 @@
+"""Friction by bristles: before two surfaces slip, they bend each other's roughness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ...quantity import Quantity
+from ...symbolic import Expression
+from ..core.dampers import Viscous
+from ..core.element import ROTATION, Domain, Scope
+from ..core.part import parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class LuGreFriction(Viscous):
+    """LuGre friction without drift: T = σ₀·z + σ₁·ż + b·ω, ż = ω·(1 − α·z/z_s), z_s = sgn(ω)·g(ω)/σ₀.
+
+    g = T_c + ΔT·e^(−(ω/ω_St)²) is the torque at steady speed. α is 0 below the break-away deflection z_b =
+    r·|z_s| and while the bristles unload, 1 beyond |z_s|, with half a sine between: so below break-away the
+    bristles are a spring that returns, and a body that sticks does not creep. Continuous, with corners.
+    Sources: Canudas de Wit, Olsson, Åström, Lischinsky 1995; Dupont, Hayward, Armstrong, Altpeter 2002.
+    """
+
+    stiffness: Quantity = parameter("N*m/rad", "stiffness σ₀ of the bristles", minimum=1e-3, maximum=1e9)
+    bristle_damping: Quantity = parameter("N*m*s/rad", "damping σ₁ of bristles", minimum=0.0, maximum=1e6)
+    damping: Quantity = parameter("N*m*s/rad", "viscous friction b", minimum=0.0, maximum=1e9)
+    sliding_torque: Quantity = parameter("N*m", "friction T_c while sliding", minimum=1e-9, maximum=1e6)
+    breakaway: Quantity = parameter(
+        "N*m", "friction ΔT beyond sliding at low speed", minimum=0.0, maximum=1e6
+    )
+    stribeck_speed: Quantity = parameter(
+        "rad/s", "speed ω_St at which 37 % of that is left", minimum=1e-6, maximum=1e4
+    )
+    elastic_share: Quantity = parameter(
+        "1",
+        "share r of the largest deflection that is elastic",
+        minimum=0.0,
+        maximum=0.99,
+        default=0.7,
+    )
+
+    @property
+    def domain(self) -> Domain:
+        """Angle and torque."""
+        return ROTATION
+
+    @property
+    def dissipates(self) -> bool:
+        """False: the bristles store."""
+        return False
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return T."""
+        stiffness, share = scope.parameter("stiffness"), scope.parameter("elastic_share")
+        bent = scope.state("deflection", "rad", f"deflection of the bristles of {scope.path}")
+        fall = ca.exp(-((rate / scope.parameter("stribeck_speed")) ** 2))
+        most = (scope.parameter("sliding_torque") + scope.parameter("breakaway") * fall) / stiffness
+        # From 0 at the break-away deflection to 1 at the largest.
+        place = ca.fmin(ca.fmax((ca.fabs(bent) / most - share) / (1 - share), 0), 1)
+        plastic = ca.if_else(bent * rate > 0, (1 - ca.cos(ca.pi * place)) / 2, 0)
+        bending = rate * (1 - plastic * ca.fabs(bent) / most)
+        scope.derive(bent, bending)
+        damping = scope.parameter("bristle_damping") * bending + scope.parameter("damping") * rate
+        scope.loss(stiffness * bent * (rate - bending) + damping * rate)
+        return stiffness * bent + damping

@@ -1,0 +1,230 @@
+"""Sensors: what the bench and the controller see of a signal.
+
+Decision. A flat model is continuous, so a sensor gives it what is continuous of the reading: gain, bias,
+drift, delay and filter, and the rounding of an encoder as a static function. Noise, exact delay, sample rate
+and hold live in :meth:`Sensor.recorded`, which :func:`nlsdesign.simulation.measure` asks for what the bench
+would have written down of a simulated run. A controller that samples is a discrete flat model of its own with
+its own sample time; a hold inside the plant would count its half sample twice.
+
+A sensor may read an earlier sensor: ``of="cell.reading"``.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...quantity import Quantity, same_dimension
+from ...symbolic import Expression
+from ..core.element import Scope
+from ..core.part import Part, parameter
+
+Array = NDArray[np.float64]
+
+
+class Numbers(Protocol):
+    """Gives the symbols of a part's own numbers."""
+
+    def parameter(self, name: str) -> Expression:
+        """Return the symbol of one number."""
+        ...
+
+    def memory(self, name: str) -> Expression:
+        """Return the symbol of one of the part's own states."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor(Part):
+    """Base of everything that reads a signal.
+
+    Parameters
+    ----------
+    of
+        Full name of the signal that is read, for instance ``"motor.angle"``.
+    """
+
+    units: ClassVar[tuple[str, ...]] = ()
+    """Units of the signals that it can read; any if there are none."""
+
+    of: str
+
+    @classmethod
+    def sees(cls, unit: str) -> bool:
+        """Tell whether it can read a signal in this unit.
+
+        Parameters
+        ----------
+        unit
+            Of the signal.
+        """
+        return not cls.units or any(same_dimension(unit, own) for own in cls.units)
+
+    @abstractmethod
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return the continuous reading of a value.
+
+        Parameters
+        ----------
+        scope
+            Gives parameters, takes states.
+        value
+            What is read.
+        unit
+            Its unit.
+        """
+
+    @abstractmethod
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return what the bench would have written down.
+
+        Parameters
+        ----------
+        times
+            Strictly ascending, in s, shape (n,).
+        values
+            What was to be read at these times, shape (n,).
+        noise
+            Source of chance.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (n,).
+
+        Raises
+        ------
+        ValueRangeError
+            If the times lie wider apart than the samples of the sensor.
+        """
+
+    def reading_unit(self, unit: str) -> str:
+        """Return the unit of the reading of a signal.
+
+        Parameters
+        ----------
+        unit
+            Of the signal.
+        """
+        return unit
+
+    @property
+    def late_by(self) -> str | None:
+        """Name of the parameter that says by how much the reading is late, if there is one."""
+        return None
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return the value behind a reading: the inverse of :meth:`read`, but for rounding, noise and delay.
+
+        Parameters
+        ----------
+        numbers
+            Gives the sensor's own parameters.
+        reading
+            What the sensor gave, ``late_by`` later.
+        """
+        return reading
+
+
+@dataclass(frozen=True, kw_only=True)
+class Encoder(Sensor):
+    """Incremental encoder: reading = q·round(θ/q). The reading has no derivative; use the angle for that."""
+
+    units: ClassVar[tuple[str, ...]] = ("rad",)
+
+    quantum: Quantity = parameter("rad", "angle of one count", minimum=1e-9, maximum=1.0)
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return the angle rounded to whole counts."""
+        quantum = scope.parameter("quantum")
+        return quantum * ca.floor(value / quantum + 0.5)
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return the angles rounded to whole counts."""
+        quantum = self.quantum.number
+        rounded: Array = quantum * np.floor(values / quantum + 0.5)
+        return rounded
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceSensor(Sensor):
+    """Load cell: reading = gain·F + bias; ``noise`` is the standard deviation of a sample, white."""
+
+    units: ClassVar[tuple[str, ...]] = ("N",)
+
+    gain: Quantity = parameter("1", "gain", minimum=0.01, maximum=100.0, default=1.0)
+    bias: Quantity = parameter("N", "bias", minimum=-1e6, maximum=1e6, default=0.0)
+    noise: Quantity = parameter("N", "standard deviation of the noise", maximum=1e6, default=0.0)
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return gain·F + bias."""
+        return scope.parameter("gain") * value + scope.parameter("bias")
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return gain·F + bias + noise."""
+        scatter = self.noise.number * noise.standard_normal(len(values))
+        line: Array = self.gain.number * values + self.bias.number + scatter
+        return line
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return (reading − bias)/gain."""
+        return (reading - numbers.parameter("bias")) / numbers.parameter("gain")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueSensor(Sensor):
+    """Torque transducer: reading = gain·T + bias; ``noise`` is the standard deviation of a sample, white.
+
+    Examples
+    --------
+    >>> TorqueSensor(of="spring.torque", noise=5e-3).title()
+    'TorqueSensor(gain = 1, bias = 0 N*m, noise = 0.005 N*m)'
+    """
+
+    units: ClassVar[tuple[str, ...]] = ("N*m",)
+
+    gain: Quantity = parameter("1", "gain", minimum=0.01, maximum=100.0, default=1.0)
+    bias: Quantity = parameter("N*m", "bias", minimum=-1e6, maximum=1e6, default=0.0)
+    noise: Quantity = parameter("N*m", "standard deviation of the noise", maximum=1e6, default=0.0)
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return gain·T + bias."""
+        return scope.parameter("gain") * value + scope.parameter("bias")
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return gain·T + bias + noise."""
+        scatter = self.noise.number * noise.standard_normal(len(values))
+        line: Array = self.gain.number * values + self.bias.number + scatter
+        return line
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return (reading − bias)/gain."""
+        return (reading - numbers.parameter("bias")) / numbers.parameter("gain")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurrentSensor(Sensor):
+    """Ammeter: reading = I + bias. Its gain is not told apart from the motor's torque constant."""
+
+    units: ClassVar[tuple[str, ...]] = ("A",)
+
+    bias: Quantity = parameter("A", "bias", minimum=-1e4, maximum=1e4, default=0.0)
+    noise: Quantity = parameter("A", "standard deviation of the noise", maximum=1e4, default=0.0)
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return I + bias."""
+        return value + scope.parameter("bias")
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return I + bias + noise."""
+        line: Array = values + self.bias.number + self.noise.number * noise.standard_normal(len(values))
+        return line
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return reading − bias."""
+        return reading - numbers.parameter("bias")

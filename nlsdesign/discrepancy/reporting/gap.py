@@ -1,0 +1,102 @@
+"""The gap before and after, per record and over time, in the unit of each block."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...identification.equation_error.evidence import STRIDE
+from ...identification.statistics.filters import derivative
+from ...identification.statistics.residuals import Binned, shapes
+from ..selection.comparison import Comparison
+from ..selection.hypothesis import Hypothesis
+from .verdict import Course, RecordGap
+
+
+def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tuple[RecordGap, ...]:
+    """Return the error of every block on every record.
+
+    Parameters
+    ----------
+    before, after
+        Fitted to all samples.
+    comparison
+        Knows the records.
+    """
+    found = []
+    for then, now in zip(comparison.judged(before), comparison.judged(after), strict=True):
+        first, last, floor = (
+            float(np.sqrt(np.mean(np.square(r)))) for r in (then.error, now.error, then.floor.sigma)
+        )
+        name, record, unit = then.block.name, then.record, then.block.model.outputs[0].unit
+        count = len(then.residual)
+        found.append(RecordGap(name, record.name, record.role, first, last, floor, count, unit))
+    return tuple(found)
+
+
+def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str) -> Course:
+    """Return a held-out record of a block over time; the one with the largest error before.
+
+    Parameters
+    ----------
+    before, after, comparison
+        As above.
+    block
+        Name.
+    """
+    pairs = zip(comparison.judged(before), comparison.judged(after), strict=True)
+    mine = [(a, b) for a, b in pairs if a.block.name == block]
+    held = [pair for pair in mine if pair[0].record.role == "held_out"] or mine
+    then, now = max(held, key=lambda pair: float(np.mean(np.square(pair[0].error))))
+    target, trace, output = then.block.target, then.record.trace, then.block.model.outputs[0]
+    if target is None:
+        # A balance holds a second derivative: only filtered does it show more than noise.
+        places = then.floor.places
+        return Course(
+            then.record.name,
+            output.description,
+            output.unit,
+            trace.time[places],
+            np.zeros(len(places)),
+            -then.error,
+            -now.error,
+            float(np.mean(then.floor.sigma)),
+        )
+    return Course(
+        then.record.name,
+        target,
+        output.unit,
+        trace.time,
+        trace[target],
+        then.predicted,
+        now.predicted,
+        float(np.mean(then.floor.raw_sigma)),
+    )
+
+
+def shapes_of(
+    before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str
+) -> dict[str, tuple[Binned, Binned]]:
+    """Return the residual of a block over every measured signal, before and after, from all records.
+
+    Parameters
+    ----------
+    before, after, comparison, block
+        As above.
+    """
+    found = [_shapes(h, comparison, block) for h in (before, after)]
+    return {name: (found[0][name], found[1][name]) for name in found[0] if name in found[1]}
+
+
+def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[str, Binned]:
+    bench = comparison.bench
+    mine = [e for e in comparison.judged(hypothesis) if e.block.name == block]
+    error = np.concatenate([e.error for e in mine])
+
+    def gathered(signal: str, order: int) -> NDArray[np.float64]:
+        rows = [derivative(e.record.trace[signal], e.record.step, order=order)[e.floor.places] for e in mine]
+        return np.concatenate(rows)
+
+    signals = {s: gathered(s, 0) for s in bench.records.signals}
+    motion = next((s for s in bench.records.signals if bench.noise.rounded[s]), bench.records.signals[0])
+    return shapes(error, signals, gathered(motion, 1), STRIDE * mine[0].record.step)

@@ -1,0 +1,248 @@
+"""The declared numbers refitted to records, without any effect: what they are, how well known, how good.
+
+Every measured force or torque is simulated from the measured motion; every moving body is held to the balance
+of the efforts on it, because in a servoed record the motion is what the servo wanted. Where the motion is
+free, the whole model may be simulated over windows instead.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from ...errors import MeasurementError
+from ...identification.equation_error.evidence import Bench
+from ...identification.estimation.least_squares import Fit
+from ...identification.estimation.parameters import Parameter
+from ...identification.records.measurement import RecordSet
+from ...identification.records.quality import Finding
+from ...model import Assembly
+from ..blocks.tearing import blocks_of
+from ..screening.other_rig import out_of_reach
+from ..screening.scale_check import suspicions_of, typical_sizes
+from ..selection.comparison import Comparison
+from ..selection.hypothesis import Hypothesis
+from .advice import more_excitation
+from .gap import gaps_of
+from .verdict import RecordGap
+from .window_refit import fitted_over_windows, window_gaps
+
+_FROM_SPREAD = 0.8
+_AT_END = 1.96
+"""Declared ranges from the declared value; a refit is stopped at two."""
+
+
+class FittedNumber(NamedTuple):
+    """One refitted number.
+
+    Parameters
+    ----------
+    name, unit
+        Full name and SI unit.
+    declared, fitted, standard_error
+        In SI.
+    strain
+        How far it went, in declared ranges (spreads): 1 is the edge of what was declared, 2 where the fit
+        stops.
+    """
+
+    name: str
+    unit: str
+    declared: float
+    fitted: float
+    standard_error: float
+    strain: float
+
+
+class BlockError(NamedTuple):
+    """Root mean square errors of one block over the records of one role, and the noise floor, in its unit."""
+
+    block: str
+    role: str
+    declared: float
+    fitted: float
+    noise_floor: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A refit of the declared numbers.
+
+    Parameters
+    ----------
+    actuator
+        With the fitted numbers, marked with where they come from.
+    fits
+        One for each group of blocks that share numbers.
+    numbers
+        By group, in the order of the model.
+    gaps
+        Error of every block on every record, with the declared and with the fitted numbers.
+    findings
+        What makes the records suspect.
+    """
+
+    actuator: Assembly
+    fits: tuple[Fit, ...]
+    numbers: tuple[FittedNumber, ...]
+    gaps: tuple[RecordGap, ...]
+    findings: tuple[Finding, ...]
+
+    def errors(self) -> tuple[BlockError, ...]:
+        """Return the errors of each block, over the records that were fitted and over those that were not."""
+        keys = dict.fromkeys((g.block, g.role) for g in self.gaps)
+        return tuple(_mean([g for g in self.gaps if (g.block, g.role) == key]) for key in keys)
+
+    def words(self) -> tuple[str, ...]:
+        """Return what the records cannot tell, what is at the end of its range, and what is suspect."""
+        stuck = [
+            f"{n.name} stands at the end of its range, {n.strain:+.1f} declared spreads away: the declared "
+            "value, its spread or the structure is wrong; ask `nlsdesign diagnose` what is missing."
+            for n in self.numbers
+            if abs(n.strain) >= _AT_END
+        ]
+        silent = [n for n, share in self._told_by_spread().items() if share > _FROM_SPREAD]
+        open_ones = [
+            f"The records say next to nothing of {name}: what is given as its error is its declared spread."
+            for name in silent
+        ]
+        return (*[f"suspect: {f}" for f in self.findings], *stuck, *open_ones, *more_excitation(self.fits))
+
+    def _told_by_spread(self) -> dict[str, float]:
+        """Return by name the share of what is known of a number that comes from its declared spread."""
+        return {
+            p.name: float(fit.covariance[i, i]) / p.sigma**2
+            for fit in self.fits
+            for i, p in enumerate(fit.parameters)
+        }
+
+    def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
+        """Return the content of ``fit.json``.
+
+        Parameters
+        ----------
+        model
+            Path of the deck that was written.
+        """
+        return {
+            "numbers": [n._asdict() for n in self.numbers],
+            "errors": [e._asdict() for e in self.errors()],
+            "records": [
+                {"block": g.block, "record": g.record, "role": g.role, "unit": g.unit,
+                 "declared": g.before, "fitted": g.after, "noise_floor": g.noise_floor}
+                for g in self.gaps
+            ],
+            "converged": all(f.converged for f in self.fits),
+            "unidentified": [text for fit in self.fits for text in fit.unidentified()],
+            "words": list(self.words()),
+            "model": model,
+        }  # fmt: skip
+
+
+def _mean(gaps: Sequence[RecordGap]) -> BlockError:
+    total = sum(g.rows for g in gaps)
+
+    def rms(which: str) -> float:
+        return math.sqrt(sum(getattr(g, which) ** 2 * g.rows for g in gaps) / total)
+
+    first = gaps[0]
+    return BlockError(first.block, first.role, rms("before"), rms("after"), rms("noise_floor"), first.unit)
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+def refit(
+    actuator: Assembly,
+    records: RecordSet,
+    *,
+    window: float | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> Refit:
+    """Refit the numbers that are declared with a spread.
+
+    Parameters
+    ----------
+    actuator
+        As declared; the spreads are priors, and the fit stops at twice the range they stand for.
+    records
+        Bench records with their roles; those held out are only judged on.
+    window
+        Length in s of windows over which the whole model is then simulated from the measured state, driven by
+        the measured inputs, and the numbers fitted to that; without it the blocks decide.
+    progress
+        Told what is being done.
+
+    Raises
+    ------
+    MeasurementError
+        If no number has a spread, the records do not fit the model, or nothing moves enough.
+    ConvergenceError
+        If the numbers cannot be fitted.
+    """
+    progress("refitting the declared numbers")
+    bench = Bench(records, blocks_of(actuator, records.signals))
+    comparison = Comparison(bench, typical_sizes(actuator, records))
+    found = comparison.base(actuator)
+    if not any(fit.parameters for fit in found.fits.values()):
+        raise MeasurementError(
+            f"deck of '{actuator.name}'",
+            "declares no spread for any number that these records show, so none is free",
+            next_step="give what is uncertain a spread, for instance spread = 0.1",
+        )
+    findings = (*records.findings, *out_of_reach(actuator, records), *suspicions_of(comparison, found))
+    fits, gaps = tuple(found.fits.values()), tuple[RecordGap, ...]()
+    if window is not None:
+        progress(f"simulating windows of {window:g} s")
+        values, fit = fitted_over_windows(actuator, records, found.values, window)
+        found = comparison.on_all_samples(replace(found, values=values))
+        fits, gaps = (fit,), window_gaps(actuator, values, records, window)
+    numbers = tuple(_number(fit, p) for fit in fits for p in fit.parameters)
+    gaps = (*gaps_of(comparison.declared(actuator), found, comparison), *gaps)
+    return Refit(sourced(found), fits, numbers, gaps, findings)
+
+
+def _number(fit: Fit, parameter: Parameter) -> FittedNumber:
+    value = fit.values[parameter.name]
+    moved = parameter.inward(value) - parameter.inward(parameter.centre)
+    # The prior of a range of half width w has the standard deviation w/√3.
+    strain = moved / (math.sqrt(3.0) * parameter.sigma)
+    error = fit.standard_error(parameter.name)
+    return FittedNumber(parameter.name, parameter.unit, parameter.centre, value, error, strain)
+
+
+def sourced(hypothesis: Hypothesis) -> Assembly:
+    """Return the fitted assembly, its fitted numbers marked with where they come from.
+
+    Parameters
+    ----------
+    hypothesis
+        Fitted.
+    """
+    fitted = hypothesis.fitted
+    known, declared = fitted.quantities(), hypothesis.assembly.quantities()
+    rows = {name.partition("[")[0] for name in hypothesis.values}
+    return fitted.with_values(
+        {
+            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {declared[n].source}")
+            for n in rows
+        }
+    )
+
+
+def refit_text(found: Refit, model: str) -> str:
+    """Return the text of ``fit.json``.
+
+    Parameters
+    ----------
+    found
+        As fitted.
+    model
+        Path of the deck.
+    """
+    return json.dumps(found.to_dict(model), indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,259 @@
+"""What a diagnosis says, for people and for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...identification.estimation.least_squares import Fit
+from ...identification.statistics.residuals import Binned
+from ...model import Assembly
+from .remainder import Remainder
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that was added.
+
+    Parameters
+    ----------
+    name, location
+        Identifier of the catalogue, and the path of the part.
+    parameters
+        Value, unit and standard error by full name.
+    aliases
+        Effects of the catalogue that explain the records as well.
+    share_fit, share_held_out
+        Share of the excess over the noise that it explained when it was added.
+    signature, source
+        What it leaves in records, and where its law comes from.
+    """
+
+    name: str
+    location: str
+    parameters: Mapping[str, tuple[float, str, float]]
+    aliases: tuple[str, ...]
+    share_fit: float
+    share_held_out: float
+    signature: str
+    source: str
+
+
+@dataclass(frozen=True)
+class RecordGap:
+    """Error of one block on one record before and after, in the unit of the block.
+
+    Parameters
+    ----------
+    block, record, role
+        Which.
+    before, after, noise_floor
+        Root mean square of the filtered error of the refitted declared model, of the model with the effects,
+        and of the noise alone.
+    rows
+        Samples that count.
+    unit
+        Of the three.
+    """
+
+    block: str
+    record: str
+    role: str
+    before: float
+    after: float
+    noise_floor: float
+    rows: int
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One held-out record over time: measured, predicted before and after."""
+
+    record: str
+    quantity: str
+    unit: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
+    noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The outcome of a diagnosis.
+
+    Parameters
+    ----------
+    verdict
+        ``none``, ``named``, ``unknown`` or ``data_suspect``.
+    effects
+        In the order in which they were added.
+    where
+        Findings in words, one per block, and what is odd about the data.
+    gaps
+        Error of every block on every record.
+    block
+        The block that was furthest from its noise floor; errors are summed up for it.
+    runners_up
+        Effect and share of the excess that it would have explained, best first.
+    actuator
+        The refitted assembly with the effects.
+    declared
+        The refitted assembly without them.
+    course
+        A held-out record over time.
+    unidentified
+        What the records cannot tell, in words.
+    shapes
+        Residual of the summed-up block before and after, over every measured signal, frequency, time and
+        direction.
+    fits
+        Numbers of the better model with their covariance, one for each group of blocks that share some.
+    remainder
+        What is left without a name in the block that is furthest from its floor; ``None`` if nothing is.
+    next_steps
+        What to measure next to tell apart what these records cannot.
+    """
+
+    verdict: str
+    effects: tuple[NamedEffect, ...]
+    where: tuple[str, ...]
+    gaps: tuple[RecordGap, ...]
+    block: str
+    runners_up: tuple[tuple[str, float], ...]
+    actuator: Assembly
+    declared: Assembly
+    course: Course
+    unidentified: tuple[str, ...] = ()
+    shapes: Mapping[str, tuple[Binned, Binned]] = field(default_factory=dict)
+    fits: tuple[Fit, ...] = ()
+    remainder: Remainder | None = None
+    next_steps: tuple[str, ...] = ()
+
+    def rms(self, which: str, role: str) -> float:
+        """Return the rms error of the summed-up block over the records of a role.
+
+        Parameters
+        ----------
+        which
+            ``before``, ``after`` or ``noise_floor``.
+        role
+            ``fit`` or ``held_out``.
+        """
+        gaps = [g for g in self.gaps if g.block == self.block and g.role == role]
+        total = sum(g.rows for g in gaps)
+        return (
+            float(np.sqrt(sum(getattr(g, which) ** 2 * g.rows for g in gaps) / total))
+            if total
+            else float("nan")
+        )
+
+    @property
+    def held_out_ratio(self) -> float:
+        """Held-out error over the noise floor, after."""
+        return self.rms("after", "held_out") / self.rms("noise_floor", "held_out")
+
+    @property
+    def closed(self) -> float:
+        """Share of the held-out excess (in mean square) that is gone."""
+        floor = self.rms("noise_floor", "held_out") ** 2
+        before, after = (max(0.0, self.rms(w, "held_out") ** 2 - floor) for w in ("before", "after"))
+        return 1.0 - after / before if before > 0.0 else 0.0
+
+    def words(self) -> str:
+        """Return the verdict in a few sentences."""
+        said = {
+            "none": "The refitted model explains the records down to their noise; nothing is missing.",
+            "unknown": "Something is missing that no effect of the catalogue explains.",
+            "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
+            "named": "",
+        }[self.verdict]
+        if self.verdict == "none" and self.unidentified:
+            said += (
+                f" They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
+                "would not show all that could be missing."
+            )
+        for effect in self.effects:
+            numbers = ", ".join(
+                f"{name.rpartition('.')[2]} = {value:.4g} ± {error:.2g} {unit}"
+                for name, (value, unit, error) in effect.parameters.items()
+            )
+            said += f"`{effect.name}` at `{effect.location}`: {numbers}. "
+            said += f"It explains {100 * effect.share_held_out:.0f} % "
+            said += "of the excess over the noise on records that no fit has seen. "
+            if effect.aliases:
+                said += f"As good an explanation: {', '.join(effect.aliases)}. "
+        if self.remainder is not None:
+            said = f"{said.strip()} {self.remainder.words()}"
+        return said.strip()
+
+    def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
+        """Return the content of ``verdict.json``.
+
+        Parameters
+        ----------
+        model
+            Path of the deck of the better model.
+        """
+        unit = next(g.unit for g in self.gaps if g.block == self.block)
+        return {
+            "verdict": self.verdict,
+            "effects": [
+                {
+                    "name": e.name,
+                    "location": e.location,
+                    "parameters": [
+                        {"name": n, "value": v, "unit": u, "standard_error": s}
+                        for n, (v, u, s) in e.parameters.items()
+                    ],
+                    "aliases": list(e.aliases),
+                    "evidence": {
+                        "share_fit": e.share_fit,
+                        "share_held_out": e.share_held_out,
+                        "signature": e.signature,
+                    },
+                }
+                for e in self.effects
+            ],
+            "where": list(self.where),
+            "error": {
+                "unit": unit,
+                "block": self.block,
+                "noise_floor": self.rms("noise_floor", "held_out"),
+                "fit": {"before": self.rms("before", "fit"), "after": self.rms("after", "fit")},
+                "held_out": {
+                    "before": self.rms("before", "held_out"),
+                    "after": self.rms("after", "held_out"),
+                },
+            },
+            "runners_up": [{"name": n, "share": s} for n, s in self.runners_up],
+            "unidentified": list(self.unidentified),
+            "remainder": None if self.remainder is None else self.remainder.to_dict(),
+            "next": list(self.next_steps),
+            "model": model,
+        }
+
+    def rows(self) -> Sequence[tuple[str, ...]]:
+        """Return a table of the gap: block, record, role, before, after, noise floor."""
+        return [
+            (
+                g.block,
+                g.record,
+                g.role,
+                f"{g.before:.3g} {g.unit}",
+                f"{g.after:.3g} {g.unit}",
+                f"{g.noise_floor:.3g} {g.unit}",
+            )
+            for g in self.gaps
+        ]
+
+    def __str__(self) -> str:
+        return "\n".join([f"verdict: {self.verdict}", self.words(), *self.where, *self.next_steps])

@@ -1,0 +1,116 @@
+"""Numbers refitted by simulation over windows, begun where the blocks of a model have left them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ...errors import MeasurementError
+from ...identification.equation_error.block import Drive
+from ...identification.estimation.least_squares import Fit
+from ...identification.estimation.parameters import declared_parameter
+from ...identification.output_error.multiple_shooting import coloured_sigma, fit_by_simulation
+from ...identification.output_error.prediction import predict_in_windows
+from ...identification.output_error.simulation_error import Shots, Weights
+from ...identification.output_error.wiring import Wiring
+from ...identification.records.measurement import RecordSet
+from ...identification.statistics.metrics import rmse
+from ...model import Assembly, FlatModel, flatten
+from .verdict import RecordGap
+
+_PHASES = 4
+
+
+def fitted_over_windows(
+    actuator: Assembly, records: RecordSet, starts: Mapping[str, float], length: float
+) -> tuple[dict[str, float], Fit]:
+    """Fit numbers so that simulations over windows, each from the measured state, follow the records.
+
+    Parameters
+    ----------
+    actuator
+        As declared; the spreads of its numbers are the prior.
+    records
+        Those held out are left out.
+    starts
+        Where the numbers that are free begin, in SI by name.
+    length
+        Of a window in s.
+
+    Returns
+    -------
+    tuple
+        Values in SI by name, and the fit.
+    """
+    model = flatten(actuator)
+    free = [declared_parameter(model.variable(name), start) for name, start in starts.items()]
+    wiring, shots = wiring_of(actuator, model, records.signals), Shots(length, False, phases=_PHASES)
+    seen = records.of("fit")
+    alone = fit_by_simulation(model, seen, free, shots=shots, wiring=wiring)
+    # What a model leaves over is coloured; weighed as white it would drown the prior.
+    weights = Weights(coloured_sigma(alone))
+    found = fit_by_simulation(model, seen, free, shots=shots, wiring=wiring, weights=weights).fit
+    return dict(found.values), found
+
+
+def window_gaps(
+    actuator: Assembly, values: Mapping[str, float], records: RecordSet, length: float
+) -> tuple[RecordGap, ...]:
+    """Return the error of predictions over windows, with the declared and with other numbers.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    values
+        Fitted, in SI by name.
+    records
+        Of all roles.
+    length
+        Of a window in s.
+    """
+    models = [flatten(actuator), flatten(actuator.with_values(values))]
+    wiring = wiring_of(actuator, models[0], records.signals)
+    found = []
+    for record in records.records:
+        runs = [predict_in_windows(m, record, length, wiring=wiring) for m in models]
+        for signal in wiring.outputs:
+            before, after = (rmse(run.error[signal]) for run in runs)
+            floor, unit = record.grain_of(signal).noise, record.trace.units[signal]
+            name = f"{signal} over {length:g} s"
+            rows = len(runs[0].time)
+            found.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))
+    return tuple(found)
+
+
+def wiring_of(actuator: Assembly, model: FlatModel, signals: Sequence[str]) -> Wiring:
+    """Wire readings to the inputs and states that their sensors read.
+
+    Parameters
+    ----------
+    actuator, model
+        The same.
+    signals
+        Full names of measured signals.
+
+    Raises
+    ------
+    MeasurementError
+        If nothing measured is left to compare.
+    """
+    sensors = actuator.sensors()
+    inputs: dict[str, Drive] = {}
+    outputs: dict[str, str] = {}
+    names, states = {v.name for v in model.inputs}, {v.name for v in model.states}
+    for signal in signals:
+        owner = signal.rpartition(".")[0]
+        truth = sensors[owner].of if owner in sensors else signal
+        if truth in names:
+            inputs[truth] = Drive(signal)
+        else:
+            outputs[signal] = truth if truth in states else signal
+    if not any(truth in states for truth in outputs.values()):
+        raise MeasurementError(
+            "fit over windows", "no state of the model is measured, so no window can begin",
+            next_step="leave --window out, or measure an angle or a position",
+        )  # fmt: skip
+    return Wiring(inputs, outputs)

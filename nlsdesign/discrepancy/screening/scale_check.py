@@ -1,0 +1,76 @@
+"""Signs that the data themselves are wrong, seen against the refitted model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...identification.records.measurement import RecordSet
+from ...identification.records.quality import Finding
+from ...model import Assembly, flatten
+from ..selection.comparison import Comparison
+from ..selection.hypothesis import Hypothesis
+
+_FACTOR = 4.0
+
+
+def typical_sizes(actuator: Assembly, records: RecordSet) -> dict[str, float]:
+    """Return the size of each signal of the declared model where the measured signals are largest.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    records
+        All records.
+    """
+    model, sensors = flatten(actuator), actuator.sensors()
+    measured = {s: max(float(np.max(np.abs(r.trace[s]))) for r in records.records) for s in records.signals}
+    truth = {
+        sensors[owner].of if (owner := s.rpartition(".")[0]) in sensors else s: size
+        for s, size in measured.items()
+    }
+    state = [truth.get(v.name, v.start) for v in model.states]
+    inputs = [truth.get(v.name, v.start) for v in model.inputs]
+    found = {name: abs(value) for name, value in model.evaluate(state, inputs).items()}
+    return {name: value for name, value in (found | truth | measured).items() if value > 0.0}
+
+
+def suspicions_of(comparison: Comparison, base: Hypothesis) -> list[Finding]:
+    """Return records whose measured signal is many times, or a small part of, what the model predicts.
+
+    Parameters
+    ----------
+    comparison
+        Evaluates hypotheses.
+    base
+        Refitted declared model.
+    """
+    found = []
+    for evidence in comparison.judged(base):
+        target = evidence.block.target
+        if target is None:
+            continue
+        measured, predicted = evidence.record.trace[target], evidence.predicted
+        ratio = float(measured @ predicted) / max(float(predicted @ predicted), 1e-300)
+        if not 1.0 / _FACTOR < ratio < _FACTOR:
+            head = comparison.bench.records.column(target).name
+            found.append(
+                Finding(
+                    f"{evidence.record.source}: column '{head}'",
+                    f"is {ratio:.3g} times what the refitted model predicts from the motion" + _hint(ratio),
+                )
+            )
+    return found
+
+
+def _hint(ratio: float) -> str:
+    known: Mapping[str, float] = {
+        "the sign is turned": -1.0,
+        "is it in thousandths of the stated unit?": 1e3,
+        "is it in thousands of the stated unit?": 1e-3,
+        "degrees for radians?": 180.0 / np.pi,
+    }
+    close = [words for words, size in known.items() if 0.5 < ratio / size < 2.0]
+    return f"; {close[0]}" if close else "; are these records of another rig?"

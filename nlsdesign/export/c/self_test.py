@@ -1,0 +1,135 @@
+"""A C program that feeds recorded inputs to the generated step and compares with the Python evaluation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model.flat import FlatModel, Variable
+from .c_text import Real
+from .guarded_step import GuardedModel
+from .structures import member_paths
+
+SAMPLES = 120
+DOUBLE_TOLERANCE = 1e-12
+"""Largest difference relative to the largest size of each output, for double."""
+FLOAT_TOLERANCE = 2e-4
+"""The same for float: some 3000 times its rounding error of 6e-8. That is room for the rounding of a few
+hundred operations, which stable poles sum up over some ten samples, and finer than any wrong term."""
+
+
+def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
+    """Return an input sequence that sweeps each range, then holds NaN, infinities and excesses.
+
+    Parameters
+    ----------
+    model
+        Discrete model.
+    real
+        Number type; the inputs are exact in it.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (samples, inputs).
+    """
+    k = np.arange(SAMPLES)
+    columns = np.zeros((SAMPLES, len(model.inputs)))
+    for i, variable in enumerate(model.inputs):
+        middle, half = _range(variable)
+        wave = 0.6 * np.sin(0.071 * (i + 1) * k + i) + 0.3 * np.sin(0.39 * k + 2 * i)
+        columns[:, i] = middle + half * wave
+        for at, bad in ((50, math.nan), (60, math.inf), (70, -math.inf)):
+            columns[at + i % 8, i] = bad
+        if variable.maximum < math.inf:
+            columns[80 + i % 8, i] = variable.maximum + 0.1 * half
+        if variable.minimum > -math.inf:
+            columns[90 + i % 8, i] = variable.minimum - 10.0 * half
+    return np.vectorize(real.round, otypes=[float])(columns) if columns.size else columns
+
+
+def _range(variable: Variable) -> tuple[float, float]:
+    if math.isfinite(variable.minimum) and math.isfinite(variable.maximum):
+        return (variable.minimum + variable.maximum) / 2, (variable.maximum - variable.minimum) / 2
+    return variable.start, variable.nominal
+
+
+def selftest_source(model: FlatModel, name: str, real: Real) -> str:
+    """Return the self-test; its ``main`` returns 0, or the number of the first sample that differs.
+
+    Parameters
+    ----------
+    model
+        Discrete model.
+    name
+        First word of all C names.
+    real
+        Number type.
+    """
+    inputs = sample_inputs(model, real)
+    run = GuardedModel(model, real)
+    found = [run.step(row) for row in inputs.tolist()]
+    outputs = np.array([y for y, _ in found]).reshape(len(found), len(model.outputs))
+    size = np.abs(outputs).max(axis=0, initial=0.0)
+    relative = DOUBLE_TOLERANCE if real.name == "double" else FLOAT_TOLERANCE
+    tolerance = [relative * float(v) + real.epsilon**2 for v in size]
+    u, y = member_paths(model.inputs).values(), member_paths(model.outputs).values()
+    status = ", ".join(f"0x{s:x}u" for _, s in found)
+    lines = [
+        f"/* Self-test of {name}: returns 0, or the number of the first sample that differs. */",
+        "#include <math.h>",
+        "#include <stddef.h>",
+        "#include <stdio.h>",
+        "",
+        f'#include "{name}.h"',
+        "",
+        f"#define SAMPLES {len(found)}",
+        "",
+        *_rows("given", inputs.tolist(), real),
+        *_rows("expected", outputs.tolist(), real),
+        *_rows("tolerance", [tolerance], real),
+        f"static const uint32_t word[SAMPLES] = {{{status}}};",
+        "",
+        "int main(void)",
+        "{",
+        f"    {name}_state state;",
+        f"    {name}_inputs inputs = {{0}};",
+        f"    {name}_outputs outputs = {{0}};",
+        "",
+        f"    if ({name}_init(&state, NULL) != 0u) {{",
+        "        return 1;",
+        "    }",
+        "    for (int k = 0; k < SAMPLES; ++k) {",
+        *[f"        inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
+        f"        int differs = {name}_step(&state, &inputs, &outputs) != word[k];",
+        *[_comparison(real, path, i) for i, path in enumerate(y)],
+        "        if (differs) {",
+        '            (void)printf("sample %d differs\\n", k + 1);',
+        "            return k + 1;",
+        "        }",
+        "    }",
+        "    return 0;",
+        "}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _comparison(real: Real, path: str, i: int) -> str:
+    difference = f"{real.function('fabs')}(outputs.{path} - expected[k][{i}])"
+    return f"        differs |= !({difference} <= tolerance[0][{i}]);"
+
+
+def _rows(name: str, rows: Sequence[Sequence[float]], real: Real) -> list[str]:
+    width = len(rows[0]) if rows else 0
+    if not width:
+        return []
+    lines = [f"static const {real.name} {name}[{len(rows)}][{width}] = {{"]
+    lines += ["    {" + ", ".join(_number(v, real) for v in row) + "}," for row in rows]
+    return [*lines, "};"]
+
+
+def _number(value: float, real: Real) -> str:
+    return f"({real.name})NAN" if math.isnan(value) else real.literal(value)

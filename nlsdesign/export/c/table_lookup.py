@@ -1,0 +1,129 @@
+"""The table look-up in C: linear, held at the ends, no search because the grid is uniform, safe from NaN."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ...model.flat import FlatModel, Table
+from .c_text import Real, wrapped
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A table with the place of its first column among the looked-up numbers of the model.
+
+    Parameters
+    ----------
+    table
+        The numbers.
+    number
+        Number of the table in the model.
+    first
+        Index of its first column in the vector w.
+    """
+
+    table: Table
+    number: int
+    first: int
+
+    @property
+    def grid(self) -> tuple[str, float, float, int]:
+        """Argument, lower end, step and number of points; tables that share them share one index."""
+        return (self.table.argument, self.table.lower, self.table.step, self.table.values.shape[0])
+
+    def columns(self, used: set[int]) -> list[int]:
+        """Return the columns that are used.
+
+        Parameters
+        ----------
+        used
+            Indices into w.
+        """
+        return [c for c in range(len(self.table.columns)) if self.first + c in used]
+
+
+def placed(model: FlatModel) -> list[Placed]:
+    """Return the tables of a model with their places.
+
+    Parameters
+    ----------
+    model
+        Any model.
+    """
+    result, first = [], 0
+    for number, table in enumerate(model.tables):
+        result.append(Placed(table, number, first))
+        first += len(table.columns)
+    return result
+
+
+def table_data(each: Placed, real: Real) -> list[str]:
+    """Return the definition of one table, row by row as it is read.
+
+    Parameters
+    ----------
+    each
+        The table.
+    real
+        Number type.
+    """
+    rows, columns = each.table.values.shape
+    names = ", ".join(f"{variable.name} [{variable.unit}]" for variable in each.table.columns)
+    title = f"Over {each.table.argument} from {each.table.lower!r} by {each.table.step!r}: {names}"
+    lines = [
+        *wrapped(title),
+        f"static const {real.name} table_{each.number}[{rows}][{columns}] = {{",
+    ]
+    lines += ["    {" + ", ".join(real.literal(float(v)) for v in row) + "}," for row in each.table.values]
+    return [*lines, "};"]
+
+
+def look_up(model: FlatModel, real: Real, arguments: Mapping[str, str], used: set[int]) -> list[str]:
+    """Return the statements that define ``w<i>`` for the looked-up numbers that are used.
+
+    Parameters
+    ----------
+    model
+        The model.
+    real
+        Number type.
+    arguments
+        C text of each state and input by name.
+    used
+        Indices into w.
+    """
+    lines: list[str] = []
+    indexed: dict[tuple[str, float, float, int], int] = {}
+    for each in placed(model):
+        columns = each.columns(used)
+        if not columns:
+            continue
+        if each.grid not in indexed:
+            indexed[each.grid] = each.number
+            lines += _index(each, real, arguments[each.table.argument])
+        k = indexed[each.grid]
+        n = f"row_{each.number}"
+        lines.append(f"const {real.name} *const {n} = table_{each.number}[left_{k}];")
+        lines.append(f"const {real.name} *const {n}_next = table_{each.number}[left_{k} + 1];")
+        lines += [
+            f"const {real.name} w{each.first + c} = {n}[{c}] + share_{k} * ({n}_next[{c}] - {n}[{c}]);"
+            for c in columns
+        ]
+    return lines
+
+
+def _index(each: Placed, real: Real, argument: str) -> list[str]:
+    k, last = each.number, each.table.values.shape[0] - 1
+    low, high = real.literal(0.0), real.literal(float(last))
+    lower = each.table.lower
+    distance = f"{argument} {'-' if lower >= 0 else '+'} {real.literal(abs(lower))}"
+    scaled = f"({distance}) * {real.literal(1.0 / each.table.step)}"
+    return [
+        f"const {real.name} raw_{k} = {scaled};",
+        f"const {real.name} above_{k} = raw_{k} > {low} ? raw_{k} : {low}; /* NaN becomes the lower end */",
+        f"const {real.name} place_{k} = above_{k} < {high} ? above_{k} : {high};",
+        f"const int32_t floor_{k} = (int32_t)place_{k};",
+        f"const int32_t left_{k} = floor_{k} < {last - 1} ? floor_{k} : {last - 1};",
+        f"const {real.name} share_{k} = place_{k} - ({real.name})left_{k};",
+    ]

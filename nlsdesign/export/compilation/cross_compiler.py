@@ -1,0 +1,253 @@
+"""Compiling with the C cross-compiler of the ``ziglang`` wheel; no system compiler is needed or asked for."""
+
+from __future__ import annotations
+
+import os
+import platform as machine
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from types import MappingProxyType
+
+from ...errors import ExportError, unknown_name
+from ..files import shell
+
+STRICT = (
+    "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror",
+)  # fmt: skip
+"""Flags that the generated code must pass."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A machine that binaries are built for.
+
+    Parameters
+    ----------
+    name
+        Name as FMI 3.0 writes it: architecture-system.
+    target
+        Target triple of the compiler; glibc 2.17 of 2012 and macOS 11 are the oldest that are served.
+    extension
+        Of a shared library.
+    fmi2
+        Folder in the binaries of an FMI 2.0 unit.
+    """
+
+    name: str
+    target: str
+    extension: str
+    fmi2: str
+
+
+PLATFORMS: Mapping[str, Platform] = MappingProxyType(
+    {
+        each.name: each
+        for each in (
+            Platform("x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "linux64"),
+            Platform("aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "aarch64-linux"),
+            Platform("x86_64-windows", "x86_64-windows-gnu", ".dll", "win64"),
+            Platform("x86_64-darwin", "x86_64-macos.11.0", ".dylib", "darwin64"),
+            Platform("aarch64-darwin", "aarch64-macos.11.0", ".dylib", "darwin64"),
+        )
+    }
+)
+ALL_PLATFORMS = tuple(PLATFORMS)
+"""Names of all platforms; the first build for each adds some seconds."""
+
+
+def host_platform() -> str:
+    """Return the name of the platform this program runs on.
+
+    Raises
+    ------
+    ExportError
+        If nothing can be built for it.
+    """
+    processor = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
+        machine.machine().lower(), machine.machine()
+    )
+    name = f"{processor}-{machine.system().lower()}"
+    if name not in PLATFORMS:
+        raise ExportError(
+            f"this machine, {name}",
+            "is none of the platforms that binaries are built for",
+            next_step=f"name one of: {', '.join(PLATFORMS)}",
+        )
+    return name
+
+
+def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
+    """Return platforms by name; only the host when nothing is chosen.
+
+    Parameters
+    ----------
+    names
+        Keys of :data:`PLATFORMS`.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such platform.
+    """
+    chosen = [host_platform()] if names is None else list(dict.fromkeys(names))
+    for name in chosen:
+        if name not in PLATFORMS:
+            raise unknown_name("platform", name, PLATFORMS)
+    return [PLATFORMS[name] for name in chosen]
+
+
+def compiler() -> list[str]:
+    """Return the words that start the C compiler.
+
+    Raises
+    ------
+    ExportError
+        If the ``ziglang`` wheel is not installed.
+    """
+    if find_spec("ziglang") is None:
+        raise ExportError(
+            "the C compiler",
+            "is not installed",
+            next_step="pip install 'nlsdesign[export]' (the wheel ziglang)",
+        )
+    return [sys.executable, "-m", "ziglang", "cc"]
+
+
+def cache_folder() -> Path:
+    """Return the folder where the compiler keeps its start-up objects; it can be deleted at any time.
+
+    ``NLSDESIGN_CACHE`` names another one; a folder that cannot be written is replaced by a temporary one.
+    """
+    named = os.environ.get("NLSDESIGN_CACHE")
+    try:
+        folder = Path(named) if named else _users_caches() / "nlsdesign"
+        (folder / "zig").mkdir(parents=True, exist_ok=True)
+        if os.access(folder / "zig", os.W_OK):
+            return folder
+    except (OSError, RuntimeError):  # RuntimeError: there is no home folder
+        pass
+    owner = os.getuid() if hasattr(os, "getuid") else "user"
+    return Path(tempfile.gettempdir()) / f"nlsdesign-{owner}"
+
+
+def _users_caches() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+
+
+def run_compiler(arguments: Sequence[str | Path], *, about: str) -> None:
+    """Run the compiler.
+
+    Parameters
+    ----------
+    arguments
+        Its arguments.
+    about
+        What is being compiled, for the message.
+
+    Raises
+    ------
+    ExportError
+        If it is missing or finds a mistake.
+    """
+    cache = str(cache_folder() / "zig")
+    environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
+    command = [*compiler(), *[str(each) for each in arguments]]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
+        raise ExportError(about, f"does not compile: {first}", next_step="report this as a bug of nlsdesign")
+
+
+def compile_library(
+    sources: Sequence[Path],
+    target: Path,
+    *,
+    platform: Platform | None = None,
+    include: Sequence[Path] = (),
+    flags: Sequence[str] = ("-std=c99",),
+) -> Path:
+    """Compile C files to a shared library.
+
+    Parameters
+    ----------
+    sources
+        C files.
+    target
+        Path of the library.
+    platform
+        Machine to build for, this one by default.
+    include
+        Folders of foreign headers.
+    flags
+        Further flags.
+
+    Returns
+    -------
+    pathlib.Path
+        ``target``.
+
+    Raises
+    ------
+    ExportError
+        If the compiler is missing or finds a mistake.
+    """
+    where = platform or PLATFORMS[host_platform()]
+    arguments: list[str | Path] = ["-target", where.target, "-shared", "-O2", *flags]
+    # Same numbers on every machine: no fused multiply-add; and the checks stay IEEE.
+    arguments += ["-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-s"]
+    if where.extension == ".so":
+        arguments += ["-fPIC", "-lm"]
+    if where.extension == ".dylib":
+        arguments.append(f"-Wl,-install_name,@rpath/{target.name}")
+    if where.extension == ".dll":
+        arguments += _windows(target.parent)
+    for folder in include:
+        arguments += ["-isystem", folder]
+    run_compiler([*arguments, *sources, "-o", target], about=f"{sources[0].name} for {where.name}")
+    return target
+
+
+def _windows(folder: Path) -> list[str | Path]:
+    """Return arguments that spare Windows libraries the start-up code, see the shell for why."""
+    start = folder / "windows.c"
+    start.write_text(shell("windows.c"), encoding="utf-8")
+    home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
+    headers = home / "lib" / "libc" / "include" / "any-windows-any"
+    return ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
+
+
+def compile_program(sources: Sequence[Path], target: Path, *, flags: Sequence[str] = STRICT) -> Path:
+    """Compile C files to a program for this machine.
+
+    Parameters
+    ----------
+    sources
+        C files.
+    target
+        Path of the program.
+    flags
+        Further flags.
+
+    Returns
+    -------
+    pathlib.Path
+        ``target``.
+
+    Raises
+    ------
+    ExportError
+        If the compiler is missing or finds a mistake.
+    """
+    where = PLATFORMS[host_platform()]
+    arguments: list[str | Path] = ["-target", where.target, "-O2", "-ffp-contract=off", *flags, *sources]
+    run_compiler([*arguments, "-lm", "-o", target], about=f"{sources[0].name} for {where.name}")
+    return target

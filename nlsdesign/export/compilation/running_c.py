@@ -1,0 +1,159 @@
+"""Running generated C from Python: for tests, benchmarks, and to trust what was generated."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..c.controller_code import CSource
+from ..c.structures import member_paths
+from .cross_compiler import compile_library
+
+
+class CompiledStep:
+    """A controller's step, compiled for this machine and loaded; one object is one instance.
+
+    Parameters
+    ----------
+    source
+        Generated C files.
+    parameters
+        Parameters in the order of the model; those of the design by default.
+
+    Raises
+    ------
+    ExportError
+        If the compiler is missing or finds a mistake.
+
+    Examples
+    --------
+    >>> step = CompiledStep(export_c(observer, "out/c"))  # doctest: +SKIP
+    >>> outputs, status = step([0.1, 1.5])  # doctest: +SKIP
+    """
+
+    def __init__(self, source: CSource, parameters: Sequence[float] | None = None) -> None:
+        self._source = source
+        self._type: Any = ctypes.c_double if source.real == "double" else ctypes.c_float
+        with tempfile.TemporaryDirectory(prefix="nlsdesign-step-", ignore_cleanup_errors=True) as folder:
+            adapter = Path(folder) / "adapter.c"
+            adapter.write_text(_adapter(source), encoding="utf-8")
+            library = compile_library(
+                [adapter, source.source], Path(folder) / "step.so", include=[source.header.parent.resolve()]
+            )
+            self._library = ctypes.CDLL(str(library))
+        self._library.adapter_size.restype = ctypes.c_size_t
+        for function in ("adapter_init", "adapter_set_parameters", "adapter_step"):
+            getattr(self._library, function).restype = ctypes.c_uint32
+        # Of doubles, so that it is aligned.
+        self._state = (ctypes.c_double * (self._library.adapter_size() // 8 + 1))()
+        given = None if parameters is None else self._array(parameters)
+        self.first_status = int(self._library.adapter_init(self._state, given))
+
+    def __call__(self, inputs: Sequence[float]) -> tuple[NDArray[np.float64], int]:
+        """Advance by one sample.
+
+        Parameters
+        ----------
+        inputs
+            Shape (inputs,).
+
+        Returns
+        -------
+        tuple
+            Outputs, shape (outputs,), and the status word.
+        """
+        outputs = self._array([0.0] * len(self._source.model.outputs))
+        status = self._library.adapter_step(self._state, self._array(inputs), outputs)
+        return self._plain(outputs, len(self._source.model.outputs)), int(status)
+
+    def set_parameters(self, parameters: Sequence[float]) -> int:
+        """Change the parameters of the running instance.
+
+        Parameters
+        ----------
+        parameters
+            Shape (parameters,).
+
+        Returns
+        -------
+        int
+            Status word.
+        """
+        return int(self._library.adapter_set_parameters(self._state, self._array(parameters)))
+
+    @property
+    def states(self) -> NDArray[np.float64]:
+        """The states in the order of the model."""
+        found = self._array([0.0] * len(self._source.model.states))
+        self._library.adapter_states(self._state, found)
+        return self._plain(found, len(self._source.model.states))
+
+    def _array(self, values: Sequence[float]) -> Any:
+        return (self._type * max(1, len(values)))(*[float(v) for v in values])
+
+    @staticmethod
+    def _plain(values: Any, count: int) -> NDArray[np.float64]:
+        return np.array(values[:count], dtype=float)
+
+
+def _adapter(source: CSource) -> str:
+    """Return C that gives the named structures as vectors in the order of the model."""
+    model, name, real = source.model, source.name, source.real
+    x, u, p, y = (
+        list(member_paths(group).values())
+        for group in (model.states, model.inputs, model.parameters, model.outputs)
+    )
+    return "\n".join(
+        [
+            "#include <stddef.h>",
+            f'#include "{name}.h"',
+            "#ifdef _WIN32",
+            "#define GIVEN __declspec(dllexport)",
+            "#else",
+            '#define GIVEN __attribute__((visibility("default")))',
+            "#endif",
+            f"static void taken({name}_parameters *to, const {real} p[])",
+            "{",
+            f"    {name}_defaults(to);",
+            "    (void)p;",
+            *[f"    to->{path} = p[{i}];" for i, path in enumerate(p)],
+            "}",
+            f"GIVEN size_t adapter_size(void) {{ return sizeof({name}_state); }}",
+            f"GIVEN uint32_t adapter_set_parameters({name}_state *state, const {real} p[])",
+            "{",
+            f"    {name}_parameters parameters;",
+            "    taken(&parameters, p);",
+            f"    return {name}_set_parameters(state, &parameters);",
+            "}",
+            f"GIVEN uint32_t adapter_init({name}_state *state, const {real} p[])",
+            "{",
+            f"    {name}_parameters parameters;",
+            "    if (p != NULL) {",
+            "        taken(&parameters, p);",
+            "    }",
+            f"    return {name}_init(state, p != NULL ? &parameters : NULL);",
+            "}",
+            f"GIVEN uint32_t adapter_step({name}_state *state, const {real} u[], {real} y[])",
+            "{",
+            f"    {name}_inputs inputs = {{0}};",
+            f"    {name}_outputs outputs = {{0}};",
+            "    (void)u, (void)y;",
+            *[f"    inputs.{path} = u[{i}];" for i, path in enumerate(u)],
+            f"    const uint32_t status = {name}_step(state, &inputs, &outputs);",
+            *[f"    y[{i}] = outputs.{path};" for i, path in enumerate(y)],
+            "    return status;",
+            "}",
+            f"GIVEN void adapter_states(const {name}_state *state, {real} x[])",
+            "{",
+            "    (void)state, (void)x;",
+            *[f"    x[{i}] = state->states.{path};" for i, path in enumerate(x)],
+            "}",
+            "",
+        ]
+    )

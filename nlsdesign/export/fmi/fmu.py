@@ -1,0 +1,198 @@
+"""Functional mock-up units for co-simulation, FMI 3.0 and 2.0, of any flat model.
+
+A continuous model carries its own integrator, a discrete one the very C code that goes to the controller.
+Archives are deterministic: the same model gives the same bytes, and the instantiation token is a hash of the
+content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import struct
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ...errors import ExportError, ValueRangeError, nearest
+from ...model.flat import FlatModel
+from ...writing import draft
+from ..c.c_text import identifier
+from ..c.smooth_only import refuse_jumps
+from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
+from ..files import shell
+from .fmu_documentation import icon, page
+from .fmu_sources import fmu_sources, main_source
+from .fmu_variables import layout
+from .model_description import build_description, model_description, terminals_and_icons
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+_TOKEN = "{token-of-this-content}"
+
+
+def export_fmu(
+    model: FlatModel,
+    path: str | Path,
+    *,
+    version: str = "3.0",
+    platforms: Sequence[str] | None = None,
+    step: float | None = None,
+) -> Path:
+    """Write a co-simulation FMU with sources, documentation and compiled binaries.
+
+    Parameters
+    ----------
+    model
+        Continuous (plant) or discrete (observer, controller).
+    path
+        The file; nothing is left behind if something fails.
+    version
+        ``"3.0"`` or ``"2.0"``.
+    platforms
+        Names from :data:`~nlsdesign.export.compilation.cross_compiler.PLATFORMS`; by default only that of
+        the machine this runs on.
+    step
+        Communication step of the default experiment in s; 1 ms or the sample time by default.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ExportError
+        If the version is unknown, a name clashes, the compiler is missing or the file cannot be written.
+    UnknownNameError
+        If a platform is unknown.
+    ValueRangeError
+        If the step is not a positive number.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+    >>> from nlsdesign.model import flatten
+    >>> wheel, spring = Inertia(inertia=1e-3), tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> swing = assembly("swing", wheel=wheel, spring=spring)
+    >>> export_fmu(flatten(swing), "out/swing.fmu").name  # doctest: +SKIP
+    'swing.fmu'
+    """
+    if version not in ("2.0", "3.0"):
+        raise ExportError(
+            f"version='{version}'", "must be '2.0' or '3.0'", did_you_mean=nearest(version, ["2.0", "3.0"])
+        )
+    length = step if step is not None else (model.sample_time or 1e-3)
+    if not (math.isfinite(length) and length > 0.0):
+        raise ValueRangeError(f"step={length}", "must be a positive number of seconds")
+    chosen = chosen_platforms(platforms)
+    contents = fmu_texts(model, version=version, step=length)
+    target = Path(path)
+    with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
+        binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
+    with draft(target) as file:
+        _write_archive(file, contents | binaries)
+    return target
+
+
+def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes]:
+    """Return everything in an FMU but the binaries.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    version
+        ``"3.0"`` or ``"2.0"``.
+    step
+        Communication step of the default experiment in s.
+
+    Returns
+    -------
+    dict
+        Content by path within the FMU.
+    """
+    refuse_jumps(model)
+    variables = layout(model)
+    texts = {"modelDescription.xml": model_description(variables, version=version, token=_TOKEN, step=step)}
+    for name, text in fmu_sources(variables, version, _TOKEN).items():
+        texts[f"sources/{name}"] = text
+    token = _token(texts)
+    texts = {path: text.replace(_TOKEN, token) for path, text in texts.items()}
+    texts["documentation/index.html"] = page(variables)
+    texts["documentation/licenses/license.txt"] = shell("license.txt")
+    if version == "3.0":
+        texts["sources/buildDescription.xml"] = build_description(variables)
+        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons()
+    picture = "model.png" if version == "2.0" else "terminalsAndIcons/icon.png"
+    return {path: text.encode() for path, text in texts.items()} | {picture: icon()}
+
+
+def _token(texts: Mapping[str, str]) -> str:
+    """Return a token that belongs to this content and no other."""
+    digest = hashlib.sha256()
+    for name, text in sorted(texts.items()):
+        digest.update(f"{name}\0{text}\0".encode())
+    word = digest.hexdigest()
+    return f"{{{word[:8]}-{word[8:12]}-{word[12:16]}-{word[16:20]}-{word[20:32]}}}"
+
+
+def _binaries(
+    contents: Mapping[str, bytes], folder: Path, name: str, version: str, platforms: Sequence[Platform]
+) -> dict[str, bytes]:
+    for path, content in contents.items():
+        if path.startswith("sources/"):
+            (folder / path).parent.mkdir(exist_ok=True)
+            (folder / path).write_bytes(content)
+    source = folder / "sources" / main_source(version)
+    built: dict[str, dict[str, bytes]] = {}
+    for each in platforms:
+        place = folder / each.name
+        place.mkdir()
+        library = compile_library(
+            [source], place / f"{name}{each.extension}", platform=each, include=[fmi_headers()]
+        )
+        where = each.name if version == "3.0" else each.fmi2
+        built.setdefault(f"binaries/{where}/{library.name}", {})[each.name] = library.read_bytes()
+    return {
+        path: next(iter(parts.values())) if len(parts) == 1 else universal_binary(parts)
+        for path, parts in built.items()
+    }
+
+
+def fmi_headers() -> Path:
+    """Return the folder of the headers of the FMI standard, which come with fmpy."""
+    import fmpy
+
+    return Path(fmpy.__file__).parent / "c-code"
+
+
+def universal_binary(parts: Mapping[str, bytes]) -> bytes:
+    """Return one macOS library for several processors, which FMI 2.0 has only one folder for.
+
+    Parameters
+    ----------
+    parts
+        Mach-O libraries by platform name.
+    """
+    # (processor type, subtype) as in <mach/machine.h>; the header is big-endian, slices start on 16 KiB.
+    processors = {"x86_64-darwin": (0x01000007, 3), "aarch64-darwin": (0x0100000C, 0)}
+    align = 14
+    header = struct.pack(">II", 0xCAFEBABE, len(parts))
+    offset, body = 1 << align, b""
+    for name in sorted(parts):
+        body += bytes(offset - (1 << align) - len(body)) + parts[name]
+        header += struct.pack(">IIIII", *processors[name], offset, len(parts[name]), align)
+        offset = -(-(offset + len(parts[name])) // (1 << align)) * (1 << align)
+    return header + bytes((1 << align) - len(header)) + body
+
+
+def _write_archive(file: Path, contents: Mapping[str, bytes]) -> None:
+    # The description first, the rest in the order of the alphabet; no time of day, no rights of this machine.
+    names = sorted(contents, key=lambda name: (name != "modelDescription.xml", name))
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in names:
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, contents[name])

@@ -1,0 +1,250 @@
+"""The variables of an FMU: which there are, in which order, and what may be done with them.
+
+A value reference is an index into one array; the groups stand in it in the order time, states, derivatives,
+inputs, parameters, outputs, signals, one extra, and behind them the status word. An output that is a state is
+one variable, as is a signal that is an output.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ExportError
+from ...model.flat import FlatModel, Variable
+
+RELATIVE_TOLERANCE = 1e-8
+_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """One variable of an FMU.
+
+    Parameters
+    ----------
+    reference
+        Value reference.
+    variable
+        Name, unit, description, start, range.
+    causality, variability
+        As FMI names them.
+    initial
+        ``"exact"``, ``"calculated"`` or ``None`` where FMI wants none.
+    derivative_of
+        Value reference of the state whose derivative this is.
+    integer
+        Whether it is an integer, the status word.
+    """
+
+    reference: int
+    variable: Variable
+    causality: str
+    variability: str
+    initial: str | None = None
+    derivative_of: int | None = None
+    integer: bool = False
+
+    @property
+    def has_start(self) -> bool:
+        """Whether FMI wants a start value."""
+        return self.initial == "exact" or self.causality in ("input", "parameter")
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """All variables of an FMU by group.
+
+    Parameters
+    ----------
+    model
+        The model.
+    time, states, derivatives, inputs, parameters, outputs, signals, extra, status
+        The groups in the order of the value references. ``outputs`` and ``signals`` leave out what is a state
+        or has been named before; ``extra`` is the tolerance of the integrator, or the sample time.
+    """
+
+    model: FlatModel
+    time: FmuVariable
+    states: tuple[FmuVariable, ...]
+    derivatives: tuple[FmuVariable, ...]
+    inputs: tuple[FmuVariable, ...]
+    parameters: tuple[FmuVariable, ...]
+    outputs: tuple[FmuVariable, ...]
+    signals: tuple[FmuVariable, ...]
+    extra: FmuVariable
+    status: tuple[FmuVariable, ...]
+
+    @property
+    def reals(self) -> tuple[FmuVariable, ...]:
+        """All but the status word; the position is the value reference."""
+        groups = (self.states, self.derivatives, self.inputs, self.parameters, self.outputs, self.signals)
+        return (self.time, *[each for group in groups for each in group], self.extra)
+
+    @property
+    def everything(self) -> tuple[FmuVariable, ...]:
+        """All variables in the order of their value references."""
+        return (*self.reals, *self.status)
+
+    @property
+    def given_out(self) -> tuple[FmuVariable, ...]:
+        """What has the causality output, in the order of the value references."""
+        return tuple(each for each in self.reals if each.causality == "output")
+
+
+def layout(model: FlatModel) -> Layout:
+    """Return the variables of the FMU of a model.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+
+    Raises
+    ------
+    ExportError
+        If a name is not allowed by FMI, or two different things have one name.
+    """
+    continuous = model.sample_time is None
+    changing = "continuous" if continuous else "discrete"
+    _check_names(model)
+    outputs, signals = _named_once(model)
+    given_out = {v.name for v in model.outputs}
+    number = iter(range(10**9))
+
+    def group(
+        variables: Sequence[Variable], causality: str, variability: str, initial: str | None
+    ) -> tuple[FmuVariable, ...]:
+        return tuple(FmuVariable(next(number), v, causality, variability, initial) for v in variables)
+
+    (time,) = group([Variable("time", "s", "Time")], "independent", "continuous", None)
+    states = tuple(
+        FmuVariable(next(number), v, "output" if v.name in given_out else "local", changing, "exact")
+        for v in model.states
+    )
+    derivatives = tuple(
+        FmuVariable(next(number), _rate(s.variable), "local", changing, "calculated", s.reference)
+        for s in states
+        if continuous
+    )
+    return Layout(
+        model,
+        time,
+        states,
+        derivatives,
+        group(model.inputs, "input", changing, None),
+        # A plant is what it is, a controller may be tuned.
+        group(model.parameters, "parameter", "fixed" if continuous else "tunable", None),
+        group(outputs, "output", changing, "calculated"),
+        group(signals, "local", changing, "calculated"),
+        _extra(model, next(number)),
+        () if continuous else (_status(next(number)),),
+    )
+
+
+def _rate(state: Variable) -> Variable:
+    unit = state.unit + "^2" if state.unit.endswith("/s") else f"{state.unit}/s"
+    text = f"Rate of change: {state.description}"
+    return Variable(f"der({state.name})", unit, text, nominal=state.nominal)
+
+
+def _extra(model: FlatModel, reference: int) -> FmuVariable:
+    if model.sample_time is None:
+        text = "Largest local error of the integrator relative to the largest size of each state so far"
+        tolerance = Variable("solver.relative_tolerance", "1", text, RELATIVE_TOLERANCE, 1e-8, 1e-13, 1e-2)
+        return FmuVariable(reference, tolerance, "parameter", "fixed")
+    period = Variable("sample.time", "s", "Time from sample to sample", model.sample_time)
+    return FmuVariable(reference, period, "local", "constant", "exact")
+
+
+def _status(reference: int) -> FmuVariable:
+    text = (
+        "Status word of the last sample: bit 0 input held, 1 input saturated, 2 state held, 3 output held; "
+        "bit 8 + i: input i"
+    )
+    word = Variable("sample.status", "1", text)
+    return FmuVariable(reference, word, "local", "discrete", "calculated", integer=True)
+
+
+def _check_names(model: FlatModel) -> None:
+    own = (
+        ("time", "solver.relative_tolerance")
+        if model.sample_time is None
+        else ("time", "sample.time", "sample.status")
+    )
+    taken = dict.fromkeys(own, "variable of every FMU")
+    for kind, group in (("state", model.states), ("input", model.inputs), ("parameter", model.parameters)):
+        for variable in group:
+            if not _NAME.fullmatch(variable.name):
+                raise ExportError(
+                    f"{kind} '{variable.name}'", "is not a structured name", next_step="use words and dots"
+                )
+            if variable.name in taken:
+                raise ExportError(
+                    f"{kind} '{variable.name}'",
+                    f"has the name of {_a(taken[variable.name])}, an FMU knows one variable of a name",
+                    next_step="rename one of them",
+                )
+            taken[variable.name] = kind
+    for variable in model.outputs:
+        if taken.get(variable.name, "state") != "state":
+            raise ExportError(
+                f"output '{variable.name}'",
+                f"is {_a(taken[variable.name])} as well",
+                next_step="leave it out of the outputs",
+            )
+
+
+def _a(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
+
+
+def _named_once(model: FlatModel) -> tuple[list[Variable], list[Variable]]:
+    """Return outputs and signals without those that say again what has been named."""
+    probes = _probes(model)
+    rows = {v.name: probes["state"][i] for i, v in enumerate(model.states)}
+    rows |= {v.name: probes["input"][i] for i, v in enumerate(model.inputs)}
+    kept: dict[str, list[Variable]] = {"output": [], "signal": []}
+    for kind, group in (("output", model.outputs), ("signal", model.signals)):
+        for i, variable in enumerate(group):
+            if not _NAME.fullmatch(variable.name):
+                raise ExportError(
+                    f"{kind} '{variable.name}'", "is not a structured name", next_step="use words and dots"
+                )
+            values = probes[kind][i]
+            if variable.name not in rows:
+                rows[variable.name] = values
+                kept[kind].append(variable)
+            elif not np.allclose(rows[variable.name], values, rtol=1e-9, atol=0.0, equal_nan=True):
+                raise ExportError(
+                    f"'{variable.name}'",
+                    f"names {_a(kind)} and something else",
+                    next_step="rename one of them",
+                )
+    return kept["output"], kept["signal"]
+
+
+def _probes(model: FlatModel, points: int = 5) -> dict[str, NDArray[np.float64]]:
+    """Return states, inputs, outputs and signals at a few points, to see which are the same."""
+    generator = np.random.default_rng(1)
+    parameters = model.start(model.parameters)
+    found: dict[str, list[NDArray[np.float64]]] = {"state": [], "input": [], "output": [], "signal": []}
+    for _ in range(points):
+        x, u = (_around(group, generator) for group in (model.states, model.inputs))
+        _, y, s, _ = model.equations(0.0, x, u, parameters, model.look_up(x.tolist(), u.tolist()))
+        for kind, values in zip(found, (x, u, y, s), strict=True):
+            found[kind].append(np.array(values, dtype=float).reshape(-1))
+    return {kind: np.array(values).T for kind, values in found.items()}
+
+
+def _around(group: Sequence[Variable], generator: np.random.Generator) -> NDArray[np.float64]:
+    values = [v.start + 0.3 * v.nominal * generator.uniform(-1, 1) for v in group]
+    limits = [(v.minimum, v.maximum) for v in group]
+    return np.array(
+        [min(max(x, low), high) for x, (low, high) in zip(values, limits, strict=True) if not math.isnan(x)]
+    )

@@ -1,0 +1,223 @@
+"""modelDescription.xml and the other XML files of an FMU, for FMI 2.0 and 3.0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from xml.etree import ElementTree
+
+from ...locations import version as own_version
+from ...quantity import BASE, parse_unit
+from ..c.c_text import identifier
+from .dependencies import Structure, Unknown, model_structure
+from .fmu_sources import main_source
+from .fmu_variables import RELATIVE_TOLERANCE, FmuVariable, Layout
+
+LOG_CATEGORIES = {
+    "logStatusError": "What could not be done, and why",
+    "logStatusWarning": "Inputs outside the range for which the laws are stated",
+    "logSolver": "Steps of the integrator",
+}
+# Exponents of the base units of quantities that are shown in degrees.
+_SHOWN: Mapping[tuple[int, ...], str] = {(0, 0, 0, 0, 0, 1): "deg", (0, 0, -1, 0, 0, 1): "deg/s"}
+
+
+def model_description(layout: Layout, *, version: str, token: str, step: float) -> str:
+    """Return ``modelDescription.xml``.
+
+    Parameters
+    ----------
+    layout
+        Variables of the FMU.
+    version
+        ``"2.0"`` or ``"3.0"``.
+    token
+        Instantiation token or GUID.
+    step
+        Communication step of the default experiment in s.
+    """
+    model, two = layout.model, version == "2.0"
+    root = _element(
+        None,
+        "fmiModelDescription",
+        fmiVersion=version,
+        modelName=model.name,
+        **{"guid" if two else "instantiationToken": token},
+        description=model.description,
+        generationTool=f"nlsdesign {own_version()}",
+        variableNamingConvention="structured",
+    )
+    _co_simulation(root, layout, two)
+    _units(root, layout)
+    categories = ElementTree.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        _element(categories, "Category", name=name, description=text)
+    experiment = _element(root, "DefaultExperiment", startTime=0.0, stopTime=1000 * step)
+    if model.sample_time is None:
+        experiment.set("tolerance", _text(RELATIVE_TOLERANCE))
+    experiment.set("stepSize", _text(step))
+    variables = ElementTree.SubElement(root, "ModelVariables")
+    for each in layout.everything:
+        (_variable2 if two else _variable3)(variables, each)
+    (_structure2 if two else _structure3)(
+        ElementTree.SubElement(root, "ModelStructure"), model_structure(layout)
+    )
+    return _written(root)
+
+
+def build_description(layout: Layout) -> str:
+    """Return ``sources/buildDescription.xml`` of FMI 3.0.
+
+    Parameters
+    ----------
+    layout
+        Variables of the FMU.
+    """
+    root = _element(None, "fmiBuildDescription", fmiVersion="3.0")
+    configuration = _element(root, "BuildConfiguration", modelIdentifier=identifier(layout.model.name))
+    files = _element(configuration, "SourceFileSet", language="C99")
+    _element(files, "SourceFile", name=main_source("3.0"))
+    return _written(root)
+
+
+def terminals_and_icons() -> str:
+    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: the place of the icon."""
+    root = _element(None, "fmiTerminalsAndIcons", fmiVersion="3.0")
+    picture = ElementTree.SubElement(root, "GraphicalRepresentation")
+    corners = {"x1": -100.0, "y1": -100.0, "x2": 100.0, "y2": 100.0}
+    _element(picture, "CoordinateSystem", **corners, suggestedScalingFactorTo_mm=0.1)
+    _element(picture, "Icon", **corners)
+    return _written(root)
+
+
+def _co_simulation(root: ElementTree.Element, layout: Layout, two: bool) -> None:
+    continuous = layout.model.sample_time is None
+    kind = _element(
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier(layout.model.name),
+        canHandleVariableCommunicationStepSize=True,
+        **({"canGetAndSetFMUstate" if two else "canGetAndSetFMUState": True}),
+        **({"canSerializeFMUstate" if two else "canSerializeFMUState": True}),
+        **({"providesDirectionalDerivative" if two else "providesDirectionalDerivatives": continuous}),
+    )
+    if two:
+        kind.set("canNotUseMemoryManagementFunctions", "true")
+        _element(_element(kind, "SourceFiles"), "File", name=main_source("2.0"))
+    elif not continuous:
+        kind.set("fixedInternalStepSize", _text(layout.model.sample_time))
+
+
+def _units(root: ElementTree.Element, layout: Layout) -> None:
+    definitions = ElementTree.SubElement(root, "UnitDefinitions")
+    for text in sorted({each.variable.unit for each in layout.reals}):
+        unit = parse_unit(text)
+        element = _element(definitions, "Unit", name=text)
+        base = {name: power for name, power in zip(BASE, unit.exponents, strict=True) if power}
+        _element(element, "BaseUnit", **base, **({"factor": unit.factor} if unit.factor != 1.0 else {}))
+        shown = display_unit(text)
+        if shown:
+            _element(element, "DisplayUnit", name=shown, factor=unit.factor * 180.0 / math.pi)
+
+
+def display_unit(unit: str) -> str | None:
+    """Return the unit in which a value is shown, or ``None`` for its own.
+
+    Parameters
+    ----------
+    unit
+        SI unit; angles are shown in degrees.
+    """
+    return _SHOWN.get(parse_unit(unit).exponents)
+
+
+def _attributes(each: FmuVariable) -> dict[str, object]:
+    """Return unit, range and start as both versions name them."""
+    v = each.variable
+    found: dict[str, object] = {"unit": v.unit}
+    if display_unit(v.unit):
+        found["displayUnit"] = display_unit(v.unit)
+    if v.minimum > -math.inf:
+        found["min"] = v.minimum
+    if v.maximum < math.inf:
+        found["max"] = v.maximum
+    if each.causality not in ("parameter", "independent") and each.variability == "continuous":
+        found["nominal"] = abs(v.nominal) or 1.0
+    if each.has_start:
+        found["start"] = v.start
+    return found
+
+
+def _common(each: FmuVariable) -> dict[str, object]:
+    v = each.variable
+    text = v.description + (f" (source: {v.source})" if v.source else "")
+    found: dict[str, object] = {"name": v.name, "valueReference": each.reference, "description": text}
+    found |= {"causality": each.causality, "variability": each.variability}
+    return found | ({"initial": each.initial} if each.initial else {})
+
+
+def _variable2(parent: ElementTree.Element, each: FmuVariable) -> None:
+    scalar = _element(parent, "ScalarVariable", **_common(each))
+    if each.integer:
+        _element(scalar, "Integer")
+        return
+    real = _element(scalar, "Real", **_attributes(each))
+    if each.derivative_of is not None:
+        real.set("derivative", str(each.derivative_of + 1))
+
+
+def _variable3(parent: ElementTree.Element, each: FmuVariable) -> None:
+    if each.integer:
+        _element(parent, "Int32", **_common(each))
+        return
+    real = _element(parent, "Float64", **_common(each), **_attributes(each))
+    if each.derivative_of is not None:
+        real.set("derivative", str(each.derivative_of))
+
+
+def _structure2(parent: ElementTree.Element, structure: Structure) -> None:
+    # Variables stand in the order of their references, so the index is the reference + 1.
+    for name, unknowns in (
+        ("Outputs", structure.outputs),
+        ("Derivatives", structure.derivatives),
+        ("InitialUnknowns", structure.initial),
+    ):
+        if unknowns:
+            group = ElementTree.SubElement(parent, name)
+            for each in unknowns:
+                _element(group, "Unknown", index=each.variable.reference + 1, **_dependencies(each, 1))
+
+
+def _structure3(parent: ElementTree.Element, structure: Structure) -> None:
+    for name, unknowns in (
+        ("Output", structure.outputs),
+        ("ContinuousStateDerivative", structure.derivatives),
+        ("InitialUnknown", structure.initial),
+    ):
+        for each in unknowns:
+            _element(parent, name, valueReference=each.variable.reference, **_dependencies(each, 0))
+
+
+def _dependencies(each: Unknown, offset: int) -> Mapping[str, object]:
+    return {
+        "dependencies": " ".join(str(reference + offset) for reference in each.dependencies),
+        "dependenciesKind": " ".join(each.kinds),
+    }
+
+
+def _element(parent: ElementTree.Element | None, tag: str, /, **attributes: object) -> ElementTree.Element:
+    written = {key: _text(value) for key, value in attributes.items()}
+    return (
+        ElementTree.Element(tag, written) if parent is None else ElementTree.SubElement(parent, tag, written)
+    )
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _written(root: ElementTree.Element) -> str:
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,414 @@
+"""The response of a block to a record, with exact derivatives with respect to parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ConvergenceError, unknown_name
+from ...symbolic import Expression, depends
+from ..records.measurement import Record
+from ..statistics.filters import calmed, derivative
+from .batch import Batch
+from .block import Block, Drive
+from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
+
+Array = NDArray[np.float64]
+
+_PROBES = 50
+"""Samples at which it is looked how fast a block is."""
+
+
+class Response(NamedTuple):
+    """Output over time, shape (n,), and its derivatives, shape (n, parameters)."""
+
+    output: Array
+    slope: Array
+
+
+class Samples(NamedTuple):
+    """What a record gives to a block, worked out once.
+
+    Parameters
+    ----------
+    at
+        Everything that neither states nor free parameters enter, at the samples.
+    begin, end
+        The same at both ends of each step, with rates of the straight line in between.
+    step
+        Time between samples in s.
+    """
+
+    at: Array
+    begin: Array
+    end: Array
+    step: float
+
+
+class _Walk(NamedTuple):
+    """Functions of a step: tables over the parameters, and the step itself.
+
+    ``near`` holds the states of the stages that take their derivative from the start of the record; ``stiff``
+    tells whether there are short implicit steps, ``mean`` whether the mean output over these is taken.
+    """
+
+    tables: ca.Function
+    step: Batch
+    near: list[list[int]]
+    stiff: bool
+    mean: bool
+    instructions: int
+
+
+class _Equations(NamedTuple):
+    """A block's expressions: f(x, v, p), y(x, v, p), and v as functions of inputs and their rates.
+
+    Everything that neither state nor free parameter enters is worked out once per record: that is v.
+    """
+
+    state: Expression
+    digested: Expression
+    parameter: Expression
+    now: Expression
+    derivative: Expression
+    output: Expression
+    digest: ca.Function
+
+
+class DrivenBlock:
+    """A block made ready for evaluation with some of its parameters free.
+
+    Parameters
+    ----------
+    block
+        Model, drives and output.
+    free
+        Names of the parameters with respect to which derivatives are taken; those on which the output does
+        not depend are left out, see :attr:`free`.
+
+    Raises
+    ------
+    UnknownNameError
+        If the model has no such parameter.
+    """
+
+    def __init__(self, block: Block, free: Sequence[str]) -> None:
+        names = [v.name for v in block.model.parameters]
+        for name in free:
+            if name not in names:
+                raise unknown_name("parameter", name, names)
+        self.block = block
+        self.free = _influential(block, free)
+        self._fixed = block.model.values
+        e = _equations(block, self.free)
+        self._digest, self._size = Batch(e.digest), e.state.numel()
+        self._late = [str(d.late_by) for d in _late_drives(block, self.free)]
+        self._output = Batch(_output_function(e))
+        self._equations = e
+        if self._size:
+            self._stages = stages_of(e.derivative, e.state, e.digested)
+            arguments = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
+            slope = ca.jacobian(e.derivative, e.state)
+            self._rate = ca.Function("rate", arguments, [e.derivative, ca.densify(slope)])
+        self._walk: _Walk | None = None
+
+    def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
+        """Return the inputs of the block from a record.
+
+        Parameters
+        ----------
+        record
+            Must hold every signal that drives the block.
+        values
+            Free parameters by name; a late signal is advanced by what stands there.
+        """
+        model, n = self.block.model, len(record.trace)
+        inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
+        rates = np.zeros_like(inputs)
+        for i, variable in enumerate(model.inputs):
+            drive = self.block.drives.get(variable.name)
+            if drive is None:
+                continue
+            signal = record.trace[drive.signal]
+            late = {**self._fixed, **values}[drive.late_by] if drive.late_by else 0.0
+            if self.stiff and drive.order == 0 and self._moves(drive.signal):
+                signal = calmed(signal)
+            inputs[i] = derivative(signal, record.step, order=drive.order)
+            if drive.late_by:
+                inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], late)
+        at = self._digest(inputs.shape[1], [inputs, rates])
+        return Samples(at, *self._ends(inputs, rates, at, record.step), record.step)
+
+    def _moves(self, signal: str) -> bool:
+        """Tell whether a signal is a motion, whose rate drives the block too."""
+        return any(d.signal == signal and d.order == 1 for d in self.block.drives.values())
+
+    @property
+    def needs_new_samples(self) -> bool:
+        """Whether the samples depend on free parameters, that is, whether a free delay advances a signal."""
+        return bool(self._late)
+
+    def prepare(self, given: Samples, values: Mapping[str, float]) -> None:
+        """Make the functions of a step, if there are none yet; they suit all records.
+
+        Parameters
+        ----------
+        given, values
+            As for :meth:`respond`.
+        """
+        if self._size and self._walk is None:
+            p = np.array([values[name] for name in (*self.free, *self._late)])
+            self._walk = self._made_walk(self._rest(given.begin[:, 0], p), given, p)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether some states move faster than the samples, as contact does; known once prepared."""
+        return self._walk is not None and self._walk.stiff
+
+    @property
+    def instructions(self) -> int:
+        """How many operations one step with all its derivatives takes; known once prepared."""
+        return self._walk.instructions if self._walk is not None else 0
+
+    def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
+        """Return the output and its derivatives.
+
+        Parameters
+        ----------
+        given
+            From :meth:`samples`, with the same values where :attr:`needs_new_samples`.
+        values
+            Free parameters by name.
+
+        Raises
+        ------
+        ConvergenceError
+            If a number is not finite.
+        """
+        p = np.array([values[name] for name in (*self.free, *self._late)])
+        n = given.at.shape[1]
+        states, mean = self._states(given, p) if self._size else (np.zeros((0, n)), None)
+        found = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
+        if not np.all(np.isfinite(found)):
+            raise ConvergenceError(
+                f"block '{self.block.name}'",
+                "its response is not finite",
+                next_step="narrow the bounds of the parameters",
+            )
+        return Response(found[0], found[1:].T)
+
+    def _states(self, given: Samples, p: Array) -> tuple[Array, Array | None]:
+        """Return states and sensitivities, and the mean output over each step where the walk takes it."""
+        (n, size), begin, end = (given.at.shape[1], self._size), given.begin, given.end
+        rest = self._rest(begin[:, 0], p)
+        walk, many = self._walk or self._made_walk(rest, given, p), size * (1 + len(self.free))
+        self._walk = walk
+        start = np.zeros(many + (1 + len(self.free) if walk.mean else 0))
+        start[:size] = rest
+        slope = self._rate(rest, begin.mean(axis=1), p)[1].full()
+        near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
+        tables = walk.tables(p, given.step).full().ravel(order="F")
+        constant = np.concatenate([p, tables, *near, [given.step]])
+        found = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
+        return found[:many], found[many:] if walk.mean else None
+
+    def _made_walk(self, rest: Array, given: Samples, p: Array) -> _Walk:
+        """Return the functions of a step, with short implicit steps for what is faster than a sample."""
+        few = given.begin[:, :: max(1, given.begin.shape[1] // _PROBES)].T
+        slopes = [self._rate(rest, column, p)[1].full() for column in few]
+        steepest = [
+            max(float(np.linalg.norm(m[np.ix_(g.states, g.states)], 2)) for m in slopes) for g in self._stages
+        ]
+        stiff = [not g.linear and s * given.step > STIFF for g, s in zip(self._stages, steepest, strict=True)]
+        # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
+        mean = any(stiff) and self.block.target is None
+        tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
+        rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
+        near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
+        return _Walk(tables, Batch(step, chained=True), near, any(stiff), mean, step.n_instructions())
+
+    def _ends(self, inputs: Array, rates: Array, at: Array, step: float) -> tuple[Array, Array]:
+        """Return what is known at both ends of every step; rates are those of the line in between."""
+        names, drives = [v.name for v in self.block.model.inputs], self.block.drives
+        sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
+        s = self.block.model.symbols()
+        if not self._size or not depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped])):
+            return at[:, :-1], at[:, 1:]
+        left, right = inputs[:, :-1].copy(), inputs[:, 1:].copy()
+        for i in sloped:
+            signal = drives[names[i]].signal
+            value = names.index(next(n for n, d in drives.items() if d.signal == signal and d.order == 0))
+            left[i] = right[i] = np.diff(inputs[value]) / step
+        count = left.shape[1]
+        return self._digest(count, [left, rates[:, :-1]]), self._digest(count, [right, rates[:, 1:]])
+
+    def _rest(self, begin: Array, p: Array) -> Array:
+        """Return the state in which the block rests at the first sample: bench records start at rest."""
+        x = self.block.model.start(self.block.model.states)
+        for _ in range(3):
+            rate, slope = (m.full() for m in self._rate(x, begin, p))
+            if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
+                raise ConvergenceError(
+                    f"block '{self.block.name}'", "has no state of rest at the first sample"
+                )
+            x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        return x
+
+
+def _centred(mean: Array) -> Array:
+    """Return means over the steps, of which the first column is void, as values at the samples."""
+    steps = mean[:, 1:]
+    result: Array = 0.5 * (
+        np.concatenate([steps[:, :1], steps], axis=1) + np.concatenate([steps, steps[:, -1:]], axis=1)
+    )
+    return result
+
+
+def _advanced(time: Array, signal: Array, late: float) -> tuple[Array, Array]:
+    """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
+    slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
+    place = np.clip(np.searchsorted(time, time + late, side="right") - 1, 0, len(time) - 1)
+    return np.interp(time + late, time, signal), slopes[place]
+
+
+def _late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
+    return [d for d in block.drives.values() if d.late_by in free]
+
+
+def _influential(block: Block, free: Sequence[str]) -> tuple[str, ...]:
+    """Return the names that the output depends on, directly, through the states, or as a delay."""
+    s = block.model.symbols()
+    names = [v.name for v in block.model.parameters]
+    together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
+    late = {d.late_by for d in block.drives.values()}
+    return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
+
+
+def _equations(block: Block, free: Sequence[str]) -> _Equations:
+    model, s = block.model, block.model.symbols()
+    names = [v.name for v in model.parameters]
+    place = [names.index(n) for n in free]
+    rest = [i for i in range(len(names)) if i not in place]
+    p = ca.SX(ca.vertcat(*[s.parameter[i] for i in place]))
+    rates = ca.SX.sym("rate", s.input.shape)
+    late = _late_drives(block, free)
+    now = ca.SX.sym("now", len(late))
+    together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
+    fixed = ca.vertcat(*[s.parameter[i] for i in rest])
+    together = ca.substitute(together, fixed, ca.DM(model.start(model.parameters)[rest]))
+    for i, variable in enumerate(model.inputs):
+        drive = block.drives.get(variable.name)
+        if drive in late:
+            # The samples were advanced by the present delay; its derivative is that of the signal.
+            k = late.index(drive)
+            shift = (p[list(free).index(str(drive.late_by))] - now[k]) * rates[i]
+            together = ca.substitute(together, s.input[i], s.input[i] + shift)
+    given = ca.vertcat(s.input, rates)
+    core, symbols, parts = ca.extract_parametric(ca.cse(together), given)
+    core = ca.cse(core)
+    # Inputs that stand alone, as a factor of a parameter, are not extracted: they pass as they are.
+    bare = [given[i] for i in range(given.numel()) if depends(core, given[i])]
+    aliases = [ca.SX.sym(f"bare_{k}") for k in range(len(bare))]
+    core = ca.substitute(core, ca.vertcat(*bare), ca.vertcat(*aliases)) if bare else core
+    symbols, parts = [*symbols, *aliases], [*parts, *bare]
+    digest = ca.Function(
+        "digest", [s.input, rates], [ca.densify(ca.vertcat(*parts)) if parts else ca.SX(0, 1)]
+    )
+    n = s.state.numel()
+    digested = ca.SX(ca.vertcat(*symbols)) if symbols else ca.SX(0, 1)
+    return _Equations(s.state, digested, p, now, core[:n], core[n:], digest)
+
+
+def _sensitivities(e: _Equations) -> tuple[Expression, Expression]:
+    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column."""
+    slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
+    return slope, ca.vertcat(e.state, ca.vec(slope))
+
+
+def _output_function(e: _Equations) -> ca.Function:
+    slope, everything = _sensitivities(e)
+    total = ca.jacobian(e.output, e.parameter) + ca.jacobian(e.output, e.state) @ slope
+    column = ca.cse(ca.densify(ca.vertcat(e.output, ca.vec(total))))
+    return ca.Function("output", [everything, e.digested, ca.vertcat(e.parameter, e.now)], [column])
+
+
+def _walk_functions(
+    e: _Equations, stages: Sequence[Stage], stiff: Sequence[bool], *, mean: bool
+) -> tuple[ca.Function, ca.Function]:
+    """Return the tables of the exact steps over the parameters, and one step of states and sensitivities.
+
+    With ``mean`` the step gives out the mean of the output over a stiff stage's short steps as well.
+    """
+    h, free = ca.SX.sym("h"), ca.vertcat(e.parameter, e.now)
+    tables, symbols, matrices, outputs = [], [], [], []
+    guess: list[Expression] = []
+    guessed: list[Expression] = []
+    new = ca.SX(e.state)
+    right = ca.SX.sym("right", e.digested.shape)
+    for stage, fast in zip(stages, stiff, strict=True):
+        inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
+        rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
+        n, ends = inner.numel(), (ca.vertcat(e.state, e.digested), ca.vertcat(new, right))
+        at = _placed(rate, e, stage.states)
+        if stage.linear:
+            table = ca.SX.sym("table", n, 3 * n)
+            tables.append(ca.vec(ca.densify(exact_step(ca.jacobian(rate, inner), h))))
+            symbols.append(ca.vec(table))
+            zero = ca.SX.zeros(n)
+            later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
+        elif fast:
+            found = implicit_steps(at, inner, ends, h)
+            later, guess, guessed = found.states[-1], guess + found.guess, guessed + found.guessed
+            seen, count = _placed(e.output, e, stage.states), len(found.states)
+            corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
+            outputs += [seen(x, v) / count for x, v in zip(found.states, corners, strict=True)]
+        else:
+            w = None if is_short(rate) else ca.SX.sym("w", n, n)
+            matrices += [] if w is None else [w]
+            later = rosenbrock_step(at, inner, ends, w, h)
+        for k, i in enumerate(stage.states):
+            new[i] = later[k]
+    table, symbol = _column(tables), _column(symbols)
+    dependence = ca.jacobian(table, e.parameter)
+    prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
+    slope, everything = _sensitivities(e)
+    along = ca.SX.sym("along", table.numel(), e.parameter.numel())
+
+    def with_slope(value: Expression) -> Expression:
+        total = ca.jacobian(value, e.state) @ slope + ca.jacobian(value, e.parameter)
+        return ca.SX(ca.vertcat(value, ca.vec(total + ca.jacobian(value, symbol) @ along)))
+
+    column = with_slope(new)
+    if mean:
+        column = ca.vertcat(column, with_slope(sum(outputs, start=ca.SX(0))))
+        everything = ca.vertcat(everything, ca.SX.sym("before", 1 + e.parameter.numel()))
+    if guess:
+        # Backwards: each symbol stands for an expression of those before it.
+        for name, value in zip(reversed(guess), reversed(guessed), strict=True):
+            column = ca.substitute(column, name, value)
+    constant = ca.vertcat(free, symbol, ca.vec(along), _column([ca.vec(w) for w in matrices]), h)
+    return prepare, ca.Function(
+        "step", [everything, e.digested, right, constant], [ca.cse(ca.densify(column))]
+    )
+
+
+def _placed(
+    value: Expression, e: _Equations, states: Sequence[int]
+) -> Callable[[Expression, Expression], Expression]:
+    """Return an expression as a function of some states and of everything else, all states and samples."""
+
+    def at(x: Expression, v: Expression) -> Expression:
+        place = ca.SX(v)
+        for k, i in enumerate(states):
+            place[i] = x[k]
+        return ca.SX(ca.substitute(value, ca.vertcat(e.state, e.digested), place))
+
+    return at
+
+
+def _column(items: Sequence[Expression]) -> Expression:
+    return ca.SX(ca.vertcat(*items)) if items else ca.SX(0, 1)

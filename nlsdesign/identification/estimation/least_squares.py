@@ -1,0 +1,229 @@
+"""Fits of parameters to several records and blocks at once, by least squares with exact derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ConvergenceError
+from ..equation_error.evidence import Evidence
+from ..statistics.losses import bent, saturated
+from ..statistics.residuals import autocorrelation
+from .levenberg_marquardt import Minimum, minimise
+from .parameters import Parameter as Parameter
+from .parameters import box
+from .parameters import declared_parameter as declared_parameter
+
+Array = NDArray[np.float64]
+
+_EVALUATIONS = 40
+_OPEN_END = 1e-6
+"""Least information on the fitted scale."""
+_WILD = 1e3
+"""Where a body coasts, a response to a number that is steeper than this, in standard deviations of the noise,
+is that of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
+_BEND = 3.0
+"""Standard deviations beyond which, where a body coasts, a residual counts as Huber says."""
+_WEAK = 0.3
+"""A direction known no better than this (relative) is reported as not identified."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Fitted numbers and how well they are known.
+
+    Parameters
+    ----------
+    parameters
+        In the order of the vectors.
+    values
+        In SI by name.
+    covariance
+        In the fitted scale; allows for coloured residuals.
+    cost
+        Half the sum of squares of residuals and priors.
+    misfit
+        Half the sum of squares of the residuals alone, per block and record.
+    converged
+        Whether the descent ended by itself.
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: Mapping[str, float]
+    covariance: Array
+    cost: float
+    misfit: Mapping[tuple[str, str], float]
+    converged: bool
+
+    def standard_error(self, name: str) -> float:
+        """Return the standard error of a parameter in SI.
+
+        Parameters
+        ----------
+        name
+            Full name.
+        """
+        i = [p.name for p in self.parameters].index(name)
+        return float(np.sqrt(self.covariance[i, i])) * abs(self.parameters[i].slope(self.values[name]))
+
+    def correlation(self) -> Array:
+        """Return the correlation matrix of the parameters."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        result: Array = self.covariance / np.outer(deviation, deviation)
+        return result
+
+    def strain(self) -> dict[str, float]:
+        """Return how far each parameter has moved from its declared value, in prior standard deviations."""
+        return {
+            p.name: (p.inward(self.values[p.name]) - p.inward(p.centre)) / p.sigma
+            for p in self.parameters
+            if math.isfinite(p.sigma)
+        }
+
+    def unidentified(self) -> list[str]:
+        """Return in words what the records cannot tell: combinations of parameters that they leave open."""
+        spread, axes = np.linalg.eigh(self.covariance)
+        found = []
+        for deviation, axis in zip(np.sqrt(np.maximum(spread, 0.0)), axes.T, strict=True):
+            if deviation < _WEAK:
+                continue
+            order = np.argsort(-np.abs(axis))
+            named = [(self.parameters[i].name, axis[i]) for i in order if abs(axis[i]) > 0.3]
+            first = np.sign(named[0][1])
+            words = [f"{n} {'up' if a * first > 0 else 'down'}" for n, a in named]
+            known = f"known to {100 * deviation:.0f} % only" if deviation < 3.0 else "not known at all"
+            found.append(f"{' with '.join(words)}: {known}")
+        return found
+
+
+def fit(
+    evidence: Sequence[Evidence],
+    parameters: Sequence[Parameter],
+    *,
+    evaluations: int = _EVALUATIONS,
+    tolerance: float = 0.0,
+    least: float = 0.0,
+    known: Mapping[tuple[str, str], float] | None = None,
+) -> Fit:
+    """Fit parameters to everything that the records say.
+
+    Parameters
+    ----------
+    evidence
+        Records seen by blocks.
+    parameters
+        What is free; each must be free in at least one block or have a prior.
+    evaluations
+        Bound on the number of evaluations.
+    tolerance
+        Ends too when the predicted gain is below this share of the cost: enough to tell a bad hypothesis.
+    least
+        Ends too when the predicted gain is below this.
+    known
+        Sum of squares by block and record that another model reaches. If this is given, then where a body
+        coasts far residuals count as Huber says, and a record that is worse than what is known counts ever
+        less, see :func:`~.losses.saturated`. Without it every residual counts alike.
+
+    Raises
+    ------
+    ConvergenceError
+        If the fit ends without a finite cost.
+    """
+    rows = _Rows(evidence, parameters, known)
+    low, high, start = box(parameters)
+    if not parameters:
+        fixed = rows(start)[0]
+        found = Minimum(start, 0.5 * float(fixed @ fixed), True)
+    else:
+        found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
+    if not np.isfinite(found.cost):
+        raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
+    residual, slope = rows(found.x)
+    misfit, place = {}, len(parameters)
+    for each in evidence:
+        own = residual[place : place + len(each.floor.sigma)]
+        misfit[each.driven.block.name, each.record.name] = 0.5 * float(own @ own)
+        place += len(own)
+    covariance = covariance_of(residual[len(parameters) :], slope, len(parameters))
+    return Fit(tuple(parameters), rows.values(found.x), covariance, found.cost, misfit, found.converged)
+
+
+def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
+    """Return the cost that the linearised problem would reach from a start, at the price of one evaluation.
+
+    Parameters
+    ----------
+    evidence, parameters
+        As for :func:`fit`.
+    """
+    low, high, start = box(parameters)
+    residual, slope = _Rows(evidence, parameters, None)(start)
+    size = np.linalg.norm(slope, axis=0)
+    used = size > 0.0
+    step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
+    step = np.clip(start[used] + step, low[used], high[used]) - start[used]
+    return 0.5 * float(np.sum((residual + slope[:, used] @ step) ** 2))
+
+
+class _Rows:
+    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered."""
+
+    def __init__(
+        self,
+        evidence: Sequence[Evidence],
+        parameters: Sequence[Parameter],
+        known: Mapping[tuple[str, str], float] | None,
+    ) -> None:
+        self._evidence, self._parameters, self._known = evidence, parameters, known
+        self._names = [p.name for p in parameters]
+        self._prior = np.diag([1.0 / p.sigma for p in parameters])
+        self._centre = np.array([p.inward(p.centre) if math.isfinite(p.sigma) else 0.0 for p in parameters])
+        self._last: tuple[bytes, tuple[Array, Array]] | None = None
+
+    def values(self, x: Array) -> dict[str, float]:
+        return {p.name: p.outward(v) for p, v in zip(self._parameters, x, strict=True)}
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        if self._last is None or self._last[0] != x.tobytes():
+            self._last = x.tobytes(), self._evaluated(x)
+        return self._last[1]
+
+    def _evaluated(self, x: Array) -> tuple[Array, Array]:
+        values = self.values(x)
+        rows, slopes = [self._prior @ (x - self._centre)], [self._prior]
+        for each in self._evidence:
+            residual, slope = each.residual(values)
+            wide = np.zeros((len(residual), len(x)))
+            for k, name in enumerate(each.driven.free):
+                j = self._names.index(name)
+                wide[:, j] = slope[:, k] * self._parameters[j].slope(values[name])
+            if each.driven.stiff:
+                wide[np.abs(wide).max(axis=1) > _WILD] = 0.0
+            if each.driven.stiff and self._known is not None:
+                residual, wide = bent(residual, wide, _BEND)
+                bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
+                residual, wide = saturated(residual, wide, max(bound, float(len(residual))))
+            rows.append(residual)
+            slopes.append(wide)
+        return np.concatenate(rows), np.vstack(slopes)
+
+
+def covariance_of(residual: Array, slope: Array, priors: int) -> Array:
+    """Return (JᵀJ)⁻¹ with the data's share of information reduced by the colour of the residuals."""
+    data = slope[priors:]
+    if len(residual) > 1:
+        rho = autocorrelation(residual, min(200, len(residual) - 1))[1:]
+        quiet = np.flatnonzero(rho < 2.0 / math.sqrt(len(residual)))
+        colour = 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho))
+        size = max(1.0, float(np.mean(residual**2)))
+    else:
+        colour, size = 1.0, 1.0
+    information = data.T @ data / (colour * size) + slope[:priors].T @ slope[:priors]
+    # What the records leave open altogether gets a large variance, not an infinite one.
+    strength, axes = np.linalg.eigh(information)
+    result: Array = np.asarray((axes / np.maximum(strength, _OPEN_END)) @ axes.T, dtype=np.float64)
+    return result

@@ -1,0 +1,105 @@
+"""Bounded nonlinear least squares: Levenberg–Marquardt, each step the exact minimum inside the box."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from ...errors import ConvergenceError
+
+Array = NDArray[np.float64]
+Rows = Callable[[Array], tuple[Array, Array]]
+
+ENOUGH = 0.02
+"""A predicted gain of half a sum of squares below this cannot matter to any decision on noisy data."""
+_LONGEST = 1.5
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-9, 1e8
+
+
+class Minimum(NamedTuple):
+    """Where the descent ended.
+
+    Parameters
+    ----------
+    x
+        Point inside the bounds.
+    cost
+        Half the sum of squares there.
+    converged
+        Whether no step promised any more; otherwise the number of evaluations ran out.
+    """
+
+    x: Array
+    cost: float
+    converged: bool
+
+
+def minimise(
+    rows: Rows,
+    start: Array,
+    box: tuple[Array, Array],
+    *,
+    evaluations: int,
+    share: float = 0.0,
+    least: float = 0.0,
+) -> Minimum:
+    """Return the minimum of half a sum of squares within bounds.
+
+    Parameters
+    ----------
+    rows
+        Residuals and their derivatives at a point.
+    start
+        Inside the bounds.
+    box
+        Lower and upper bounds.
+    evaluations
+        At most so many; a point where there is no response counts as a bad one.
+    share
+        Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
+    least
+        Ends too when the predicted gain is below this.
+    """
+    low, high = box
+    x, damping = start, _FIRST_DAMPING
+    residual, slope = rows(x)
+    cost = 0.5 * float(residual @ residual)
+    if not x.size:
+        return Minimum(x, cost, True)  # nothing is free: what is known is all there is
+    for _ in range(evaluations):
+        gradient, curvature = slope.T @ residual, slope.T @ slope
+        step = _step(gradient, curvature, damping, (x, low, high))
+        gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
+        if gain < max(ENOUGH, share * cost, least) * (1.0 if damping <= 1.0 else 1e-2):
+            return Minimum(x, cost, True)
+        try:
+            trial, trial_slope = rows(x + step)
+        except ConvergenceError:
+            damping *= 10.0
+            continue
+        new = 0.5 * float(trial @ trial)
+        if np.isfinite(new) and new < cost:
+            good = (cost - new) / gain
+            x, residual, slope, cost = x + step, trial, trial_slope, new
+            damping = max(damping * (0.1 if good > 0.5 else 1.0 if good > 0.1 else 4.0), _LEAST_DAMPING)
+        else:
+            damping *= 10.0
+            if damping > _MOST_DAMPING:
+                return Minimum(x, cost, True)
+    return Minimum(x, cost, False)
+
+
+def _step(gradient: Array, curvature: Array, damping: float, place: tuple[Array, Array, Array]) -> Array:
+    """Return the step that minimises the damped quadratic model inside the box."""
+    x, low, high = place
+    diagonal = np.diag(curvature)
+    matrix = curvature + np.diag(damping * diagonal + 1e-12 * diagonal.max() + 1e-300)
+    lower = np.linalg.cholesky(matrix)
+    target = -np.linalg.solve(lower, gradient)
+    walls = np.maximum(low - x, -_LONGEST), np.minimum(high - x, _LONGEST)
+    found: Array = lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=20 * len(x)).x
+    return found

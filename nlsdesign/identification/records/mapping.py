@@ -1,0 +1,355 @@
+"""Which column of a file measures which signal of a model, and in what unit."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ...errors import MeasurementError, UnitError, nearest
+from ...model import FlatModel
+from ...quantity import parse_unit, same_dimension
+
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
+_TIME_NAMES = ("t", "time")
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column of a file measures.
+
+    Parameters
+    ----------
+    name
+        Head of the column in the file.
+    signal
+        Full name of the signal in the model.
+    unit
+        Unit in the file.
+    noise, quantum
+        Declared standard deviation of the noise and size of one count, in SI; 0 where nothing is declared.
+        Declared numbers are a claim: the noise is also estimated from the records.
+    time
+        Head of the clock of this column, in the unit of ``[time]``; empty where it is that of ``[time]``.
+    """
+
+    name: str
+    signal: str
+    unit: str
+    noise: float = 0.0
+    quantum: float = 0.0
+    time: str = ""
+
+
+@dataclass(frozen=True)
+class Align:
+    """A lag to be estimated and removed.
+
+    Parameters
+    ----------
+    column, to
+        Heads of two columns that show the same motion; the first may be late. They need not be mapped.
+    time
+        Head of the clock of ``column`` where that is not mapped. All columns of a clock of its own move
+        together; a column on the clock of ``[time]`` moves alone.
+    longest
+        Largest lag looked for, in s; a quarter of the record where ``None``.
+    """
+
+    column: str
+    to: str
+    time: str = ""
+    longest: float | None = None
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """Columns of a set of records, the time column, and what is kept apart.
+
+    Parameters
+    ----------
+    time, columns
+        Heads, signals and units.
+    held_out, selection
+        Globs on the names of records.
+    held_out_after
+        Time in s after which every record is held out; ``None`` where records are held out as a whole.
+    resample
+        Rate in Hz of the common clock that all columns are put on; ``None`` where they are left as sampled.
+    align
+        Lags to be removed before; these need a rate.
+    """
+
+    time: Column
+    columns: tuple[Column, ...]
+    held_out: tuple[str, ...] = ()
+    selection: tuple[str, ...] = ()
+    held_out_after: float | None = None
+    resample: float | None = None
+    align: tuple[Align, ...] = ()
+
+    def clock_of(self, column: Column) -> Column:
+        """Return the column of times of a column.
+
+        Parameters
+        ----------
+        column
+            Of the file.
+        """
+        return replace(self.time, name=column.time) if column.time else self.time
+
+
+def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
+    """Return heads that name a time, with their units.
+
+    Parameters
+    ----------
+    heads
+        Of a table.
+    """
+    named = [(head, *_name_and_unit(head)) for head in heads]
+    return [(h, u) for h, n, u in named if u and same_dimension(u, "s") and n.lower() in _TIME_NAMES]
+
+
+def read_mapping(path: Path) -> ColumnMap:
+    """Read the mapping of columns to signals.
+
+    Parameters
+    ----------
+    path
+        TOML file.
+
+    Raises
+    ------
+    MeasurementError
+        If it is not valid or a column lacks signal or unit.
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf8"))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise MeasurementError(path.name, f"cannot be read as a mapping: {error}") from None
+    known = ("time", "columns", "held_out", "selection", "held_out_after", "resample_Hz", "align")
+    _check_fields(path.name, tables, known)
+    columns = tuple(_mapped(path, head, table) for head, table in tables.get("columns", {}).items())
+    time = tables.get("time", {"column": "t_s"})
+    if not columns:
+        raise MeasurementError(
+            path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."'
+        )
+    found = ColumnMap(
+        Column(str(time.get("column", "t_s")), "time", str(time.get("unit", "s"))),
+        columns,
+        tuple(tables.get("held_out", ())),
+        tuple(tables.get("selection", ())),
+        _seconds(f"{path.name}: held_out_after", tables.get("held_out_after")),
+        _rate(path.name, tables.get("resample_Hz")),
+        tuple(_align(f"{path.name}: align", table) for table in _list_of_tables(path.name, tables)),
+    )
+    _check_clock(path.name, found)
+    return found
+
+
+def _check_fields(where: str, given: Mapping[str, Any], known: Sequence[str], between: str = ": ") -> None:
+    for key in given:
+        if key not in known:
+            raise MeasurementError(
+                f"{where}{between}{key}", "no such field", did_you_mean=nearest(key, known)
+            )
+
+
+def _seconds(where: str, given: Any) -> float | None:
+    if given is None:
+        return None
+    try:
+        return float(given["value"]) * parse_unit(given["unit"]).factor
+    except (KeyError, TypeError, ValueError, UnitError):
+        field = where.rpartition(" ")[2].rpartition(".")[2]
+        raise MeasurementError(
+            where, "is not a time", next_step=f'write {field} = {{value = 12.5, unit = "s"}}'
+        ) from None
+
+
+def _rate(file: str, given: Any) -> float | None:
+    if given is None:
+        return None
+    number = isinstance(given, int | float) and not isinstance(given, bool)
+    if not number or not 0.0 < given < float("inf"):
+        raise MeasurementError(
+            f"{file}: resample_Hz",
+            f"{given!r} is not a rate",
+            next_step="write for instance resample_Hz = 500",
+        )
+    return float(given)
+
+
+def _list_of_tables(file: str, tables: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    given = tables.get("align", [])
+    if not isinstance(given, list) or not all(isinstance(each, dict) for each in given):
+        raise MeasurementError(
+            f"{file}: align",
+            "is not a list of tables",
+            next_step='write [[align]] column = "...", to = "..."',
+        )
+    return given
+
+
+def _align(where: str, table: Mapping[str, Any]) -> Align:
+    _check_fields(where, table, ("column", "to", "time", "longest"), ".")
+    for key in ("column", "to"):
+        if not isinstance(table.get(key), str):
+            raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "<head of a column>"')
+    longest = _seconds(f"{where}.longest", table.get("longest"))
+    if longest is not None and longest <= 0.0:
+        raise MeasurementError(f"{where}.longest", "must be above zero")
+    return Align(table["column"], table["to"], str(table.get("time", "")), longest)
+
+
+def _check_clock(file: str, found: ColumnMap) -> None:
+    """Check that what needs a common clock asks for one: nothing is resampled unless it is said."""
+    if found.resample is not None:
+        return
+    for column in found.columns:
+        if column.time:
+            raise _without_rate(f"{file}: columns.{column.name}.time", "is a clock of its own")
+    if found.align:
+        raise _without_rate(f"{file}: align", "moves a clock")
+
+
+def _without_rate(where: str, what: str) -> MeasurementError:
+    return MeasurementError(
+        where, f"{what}, but no common rate is given", next_step="add resample_Hz = <rate in Hz> at the top"
+    )
+
+
+def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
+    where = f"{path.name}: columns.{head}"
+    for key in ("signal", "unit"):
+        if key not in table:
+            raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "..."')
+    _check_fields(where, table, ("signal", "unit", "noise", "quantum", "time"), ".")
+    try:
+        factor = parse_unit(table["unit"]).factor
+    except UnitError as error:
+        raise MeasurementError(
+            where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean
+        ) from None
+    noise, quantum = float(table.get("noise", 0.0)) * factor, float(table.get("quantum", 0.0)) * factor
+    own = str(table.get("time", ""))
+    return Column(head, str(table["signal"]), str(table["unit"]), noise, quantum, own)
+
+
+def default_mapping(heads: Sequence[str], model: FlatModel, file: str) -> ColumnMap:
+    """Return the mapping that the heads of the columns speak for themselves.
+
+    Parameters
+    ----------
+    heads
+        ``name [unit]`` or ``name_unit``.
+    model
+        Its signals, and the readings of its sensors.
+    file
+        For messages.
+
+    Raises
+    ------
+    MeasurementError
+        If there is no time, or a column could be several signals or none.
+    """
+    split_heads = [(head, *_name_and_unit(head)) for head in heads]
+    times = times_among(heads)
+    if not times:
+        raise MeasurementError(file, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+    columns = [
+        Column(head, signal, str(unit), *_declared(model, signal))
+        for head, name, unit in split_heads
+        if head != times[0][0] and (signal := _signal(head, name, unit, model, file))
+    ]
+    for column in columns:
+        if sum(other.signal == column.signal for other in columns) > 1:
+            raise MeasurementError(
+                f"{file}: column '{column.name}'",
+                f"is not the only one that could be '{column.signal}'",
+                next_step="write a records.toml that maps each column to its signal",
+            )
+    return ColumnMap(Column(times[0][0], "time", times[0][1]), tuple(columns))
+
+
+def _name_and_unit(head: str) -> tuple[str, str | None]:
+    match = _BRACKETED.match(head)
+    name, unit = (
+        (match["name"], match["unit"]) if match else (head.rpartition("_")[0], head.rpartition("_")[2])
+    )
+    try:
+        parse_unit(unit)
+    except UnitError:
+        return head, None
+    return name, unit
+
+
+def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str) -> str | None:
+    everything = {v.name: v for v in model.states + model.inputs + model.signals}
+    if unit is None:
+        raise MeasurementError(
+            f"{file}: column '{head}'",
+            "names no unit",
+            next_step="write for instance 'force_N', or map it in records.toml",
+        )
+    if name in everything:
+        return name
+    for group in ([v for v in everything.values() if v.name.endswith(".reading")], list(model.inputs)):
+        fitting = [v.name for v in group if same_dimension(v.unit, unit)]
+        if len(fitting) == 1:
+            return fitting[0]
+        if fitting:
+            break
+    raise MeasurementError(
+        f"{file}: column '{head}'",
+        f"could be {' or '.join(fitting)}" if fitting else f"no sensor of the model reads in {unit}",
+        next_step="write a records.toml that maps each column to its signal"
+        + ("" if fitting else ", or give the deck of the rig that was measured"),
+    )
+
+
+def _declared(model: FlatModel, signal: str) -> tuple[float, float]:
+    owner = signal.rpartition(".")[0]
+    values = model.values
+    return values.get(f"{owner}.noise", 0.0), values.get(f"{owner}.quantum", 0.0)
+
+
+def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:
+    """Check that every column measures something that the model has, in a unit that fits.
+
+    Parameters
+    ----------
+    file
+        For messages.
+    columns
+        Mapped.
+    model
+        Whose signals are measured.
+
+    Raises
+    ------
+    MeasurementError
+        Naming the column, the signal and both units.
+    """
+    everything = {v.name: v for v in model.states + model.inputs + model.signals}
+    for column in columns:
+        where = f"{file}: column '{column.name}'"
+        if column.signal not in everything:
+            raise MeasurementError(
+                where,
+                f"is mapped to '{column.signal}', which the model does not have",
+                did_you_mean=nearest(column.signal, everything),
+                next_step="map it to a signal of this deck, or give the deck of the rig that was measured",
+            )
+        variable = everything[column.signal]
+        if not same_dimension(column.unit, variable.unit):
+            raise MeasurementError(
+                where,
+                f"is in {column.unit}, but {column.signal} is measured in {variable.unit}",
+                next_step="mend the unit or the mapping",
+            )

@@ -1,0 +1,324 @@
+"""Measured records: files of tables, read through a mapping of their columns to signals with units."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import MeasurementError, nearest, unknown_name
+from ...model import FlatModel
+from ...simulation import Trace
+from ..statistics.residuals import noise_of, quantum_of
+from .clocks import Grain
+from .ingest import read_run
+from .mapping import Column as Column
+from .mapping import ColumnMap as ColumnMap
+from .mapping import check_signals, default_mapping, read_mapping, times_among
+from .quality import Finding
+from .table_files import Table, read_table, table_files
+
+Array = NDArray[np.float64]
+Role = Literal["fit", "selection", "held_out"]
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One measured run on a uniform time grid.
+
+    Parameters
+    ----------
+    name
+        Name of the file without its ending.
+    trace
+        Signals in SI by full name.
+    role
+        ``fit``: parameters are fitted to it; ``selection``: hypotheses are compared on it; ``held_out``: only
+        judged on, at the end.
+    source
+        File, and what was done to the samples on the way in.
+    grain
+        Noise and count of signals that were interpolated or filtered, which no longer show it.
+    """
+
+    name: str
+    trace: Trace
+    role: Role = "fit"
+    source: str = ""
+    grain: Mapping[str, Grain] = field(default_factory=dict)
+
+    @property
+    def step(self) -> float:
+        """Time between samples in s."""
+        return float((self.trace.time[-1] - self.trace.time[0]) / (len(self.trace) - 1))
+
+    def grain_of(self, signal: str) -> Grain:
+        """Return noise and size of a count of a signal, in SI.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+
+        Returns
+        -------
+        Grain
+            Kept from before where the signal was resampled; estimated from its samples otherwise.
+        """
+        if signal in self.grain:
+            return self.grain[signal]
+        return Grain(noise_of(self.trace[signal]), quantum_of(self.trace[signal]))
+
+
+@dataclass(frozen=True, eq=False)
+class RecordSet:
+    """Records of one rig with the same signals.
+
+    Parameters
+    ----------
+    records
+        In order of name.
+    columns
+        What was measured.
+    findings
+        What makes the data suspect.
+    """
+
+    records: tuple[Record, ...]
+    columns: tuple[Column, ...]
+    findings: tuple[Finding, ...] = field(default=())
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Full names of the measured signals."""
+        return tuple(c.signal for c in self.columns)
+
+    def of(self, *roles: Role) -> tuple[Record, ...]:
+        """Return the records of some roles.
+
+        Parameters
+        ----------
+        *roles
+            For instance ``"fit"``.
+        """
+        return tuple(r for r in self.records if r.role in roles)
+
+    def column(self, signal: str) -> Column:
+        """Return the column that measures a signal.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        """
+        for each in self.columns:
+            if each.signal == signal:
+                return each
+        raise unknown_name("measured signal", signal, self.signals)
+
+
+def load_records(
+    folder: Path,
+    model: FlatModel,
+    *,
+    mapping: Path | None = None,
+    hold_out: Sequence[str] = (),
+) -> RecordSet:
+    """Read all tables of a folder as records of one rig.
+
+    Parameters
+    ----------
+    folder
+        Holds one file per record, ``*.csv``, ``*.parquet``, ``*.mat``, ``*.h5`` or ``*.hdf5``, and perhaps
+        ``records.toml``. Files without a column of time are not records and are left out.
+    model
+        Whose signals are measured.
+    mapping
+        TOML with ``[time] column, unit``, ``[columns.<head>] signal, unit, noise, quantum``, the lists of
+        globs ``held_out`` and ``selection``, and ``held_out_after``, a time with unit at which every record
+        is cut. ``resample_Hz`` puts all columns on one clock, also those with one of their own,
+        ``[columns.<head>] time``; ``[[align]] column, to`` removes a lag first. By default ``records.toml``
+        in the folder; without it the heads must be names of signals, or name a unit that only one sensor of
+        the model has.
+    hold_out
+        Globs on record names. Without any, here or in the mapping, every third record in order of name is
+        held out, beginning with the second; a single record is cut after two thirds.
+
+    Raises
+    ------
+    MeasurementError
+        If a file cannot be used as it stands: file, column and rows are named.
+    MissingLibraryError
+        If a library is missing that reads a file of the folder.
+    """
+    folder = Path(folder)
+    files = table_files(folder)
+    path = mapping or (folder / "records.toml" if (folder / "records.toml").exists() else None)
+    given = read_mapping(path) if path else None
+    tables = {file: read_table(file) for file in files}
+    runs = {file: table for file, table in tables.items() if _is_run(table.heads, given)}
+    if not runs:
+        raise MeasurementError(
+            str(folder), "no file has a column of time", next_step="name it 't_s' or 'time [s]'"
+        )
+    first = next(iter(runs))
+    chosen = given or default_mapping(runs[first].heads, model, first.name)
+    check_signals(first.name, chosen.columns, model)
+    records: list[Record] = []
+    findings: list[Finding] = []
+    for file, table in runs.items():
+        record, found = _record(file, table, chosen)
+        records.append(record)
+        findings += found
+    held = tuple(hold_out) or chosen.held_out
+    if chosen.held_out_after is not None and not hold_out:
+        parts = [part for r in records for part in cut_in_time(r, chosen.held_out_after)]
+        return RecordSet(tuple(parts), chosen.columns, tuple(findings))
+    return RecordSet(split(records, held, chosen.selection), chosen.columns, tuple(findings))
+
+
+def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) -> RecordSet:
+    """Read one table as a record of its own, whole, whatever else stands in its folder.
+
+    Parameters
+    ----------
+    file
+        As for :func:`load_records`.
+    model
+        Whose signals are measured.
+    mapping
+        As for :func:`load_records`; by default ``records.toml`` beside the file.
+
+    Returns
+    -------
+    RecordSet
+        With this record alone; its role is ``"held_out"``.
+
+    Raises
+    ------
+    MeasurementError
+        If the file does not exist, or cannot be used as it stands.
+    """
+    file = Path(file)
+    if not file.is_file():
+        near = nearest(file.name, [f.name for f in file.parent.glob("*")] if file.parent.is_dir() else [])
+        raise MeasurementError(str(file), "there is no such file", did_you_mean=near)
+    beside = file.parent / "records.toml"
+    path = mapping or (beside if beside.exists() else None)
+    given = read_mapping(path) if path else None
+    table = read_table(file)
+    if not _is_run(table.heads, given):
+        raise MeasurementError(file.name, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+    chosen = given or default_mapping(table.heads, model, file.name)
+    check_signals(file.name, chosen.columns, model)
+    record, findings = _record(file, table, chosen)
+    return RecordSet((replace(record, role="held_out"),), chosen.columns, tuple(findings))
+
+
+def _is_run(heads: Sequence[str], mapping: ColumnMap | None) -> bool:
+    """Tell whether a file is a record: tables without any of the columns may lie in the same folder."""
+    if mapping is not None:
+        return any(c.name in heads for c in (mapping.time, *mapping.columns))
+    return bool(times_among(heads))
+
+
+def split(
+    records: Sequence[Record], held_out: Sequence[str] = (), selection: Sequence[str] = ()
+) -> tuple[Record, ...]:
+    """Return the records with their roles.
+
+    Parameters
+    ----------
+    records
+        In order of name.
+    held_out, selection
+        Globs on names; see :func:`load_records` for what happens without ``held_out``.
+
+    Raises
+    ------
+    MeasurementError
+        If a glob matches nothing, or no record is left for fitting.
+    """
+    if not held_out and len(records) == 1:
+        return _cut_after_two_thirds(records[0])
+    names = [r.name for r in records]
+    chosen = {n for g in held_out for n in fnmatch.filter(names, g)} if held_out else set(names[1::3])
+    compared = {n for g in selection for n in fnmatch.filter(names, g)} - chosen
+    for glob in (*held_out, *selection):
+        if not fnmatch.filter(names, glob):
+            raise MeasurementError(
+                f"held-out records '{glob}'",
+                "no record has such a name",
+                did_you_mean=nearest(glob, names),
+                next_step=f"records are: {', '.join(names)}",
+            )
+    roles: dict[str, Role] = dict.fromkeys(compared, "selection")
+    roles.update(dict.fromkeys(chosen, "held_out"))
+    if len(roles) == len(names):
+        raise MeasurementError("records", "none is left for fitting", next_step="hold out fewer records")
+    return tuple(replace(r, role=roles.get(r.name, "fit")) for r in records)
+
+
+def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
+    """Return what came before a time, for fitting, and what came after it, held out.
+
+    Parameters
+    ----------
+    record
+        To be cut.
+    at
+        Time in s; the sample there belongs to the first part.
+
+    Raises
+    ------
+    MeasurementError
+        If one of the parts would hold less than two samples.
+    """
+    trace = record.trace
+    cut = int(np.searchsorted(trace.time, at, side="right"))
+    if cut < 2 or len(trace) - cut < 2:
+        raise MeasurementError(
+            f"record '{record.name}'",
+            f"cannot be cut at {at:g} s; it runs from {trace.time[0]:g} to {trace.time[-1]:g} s",
+        )
+    return (
+        _part(record, slice(None, cut), "fit", f"until {at:g} s"),
+        _part(record, slice(cut, None), "held_out", f"after {at:g} s"),
+    )
+
+
+def from_sample(record: Record, first: int) -> Record:
+    """Return a record without what came before a sample.
+
+    Parameters
+    ----------
+    record
+        To be shortened.
+    first
+        Index of the sample that is to be the first.
+    """
+    return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
+
+
+def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
+    cut = 2 * len(record.trace) // 3
+    return (
+        _part(record, slice(None, cut), "fit", "first two thirds"),
+        _part(record, slice(cut, None), "held_out", "last third"),
+    )
+
+
+def _part(record: Record, rows: slice, role: Role, words: str) -> Record:
+    trace, name = record.trace, f"{record.name} ({words})"
+    signals = {n: v[rows] for n, v in trace.signals.items()}
+    return replace(record, name=name, role=role, trace=Trace(trace.time[rows], signals, trace.units, name))
+
+
+def _record(file: Path, table: Table, mapping: ColumnMap) -> tuple[Record, tuple[Finding, ...]]:
+    run = read_run(file.stem, table, mapping)
+    return Record(file.stem, run.trace, source=run.source, grain=run.grain), run.findings

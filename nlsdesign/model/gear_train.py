@@ -1,0 +1,215 @@
+"""Bodies that turn together: one state pair for all bodies that rigid gears join.
+
+With the acceleration α of the leading body, what each gear carries follows from the bodies behind it, so the
+balance of the leading body is one rising equation for α: linear where no gear has a loss, piecewise linear
+otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from ..components.assembly.named_parts import Assembly
+from ..components.core.element import Scope
+from ..components.mechanics.bodies import Free, Motion
+from ..components.mechanics.gear import Gear, LossyGear
+from ..components.transmission.stretchy_cable import newton_root
+from ..symbolic import Expression, depends, solve_monotone, symbol
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A gear of a train and what is behind it, seen from the leading body.
+
+    ``outward`` tells whether the gear's second body is the one behind.
+    """
+
+    name: str
+    gear: Gear
+    outward: bool
+    behind: Wheel
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A body of a train and the gears that lead on from it."""
+
+    name: str
+    body: Free
+    joints: list[Joint] = field(default_factory=list)
+
+    def wheels(self) -> Iterator[Wheel]:
+        """Yield this wheel and all behind it."""
+        yield self
+        for joint in self.joints:
+            yield from joint.behind.wheels()
+
+    def gears(self) -> Iterator[tuple[Wheel, Joint]]:
+        """Yield every gear of the train with the wheel in front of it, nearest first."""
+        for joint in self.joints:
+            yield self, joint
+            yield from joint.behind.gears()
+
+
+def trains(assembly: Assembly) -> dict[str, Wheel]:
+    """Return each train of two or more bodies by the name of its leading body, the one written first.
+
+    Parameters
+    ----------
+    assembly
+        Its gears have been checked.
+    """
+    gears = [(name, part) for name, part in assembly.parts if isinstance(part, Gear)]
+    found: dict[str, Wheel] = {}
+    taken: set[str] = set()
+    for name, part in assembly.parts:
+        if isinstance(part, Free) and name not in taken and any(name in g.between for _, g in gears):
+            found[name] = _wheel(assembly, name, gears, taken)
+    return found
+
+
+def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Gear]], taken: set[str]) -> Wheel:
+    taken.add(name)
+    body = assembly[name]
+    assert isinstance(body, Free)
+    found = Wheel(name, body)
+    for label, gear in gears:
+        for end, other, outward in ((0, 1, True), (1, 0, False)):
+            if gear.between[end] == name and gear.between[other] not in taken:
+                behind = _wheel(assembly, gear.between[other], gears, taken)
+                found.joints.append(Joint(label, gear, outward, behind))
+    return found
+
+
+def train_motions(
+    root: Wheel, scopes: Mapping[str, Scope], lead: Motion
+) -> dict[str, tuple[Motion, Expression]]:
+    """Return the motion of each body of a train, and its turns per turn of the leading body.
+
+    Parameters
+    ----------
+    root
+        Leading body.
+    scopes
+        Of bodies and gears, by name.
+    lead
+        Motion of the leading body.
+    """
+    found = {root.name: (lead, ca.SX(1))}
+    for front, joint in root.gears():
+        ratio = scopes[joint.name].parameter("ratio")
+        turns = found[front.name][1] * (1 / ratio if joint.outward else ratio)
+        found[joint.behind.name] = Motion(turns * lead.motion, turns * lead.rate), turns
+    return found
+
+
+@dataclass(frozen=True)
+class _Load:
+    """What acts on a train: torque and turns of each body, scopes, and the acceleration that is sought."""
+
+    torques: Mapping[str, Expression]
+    turns: Mapping[str, Expression]
+    scopes: Mapping[str, Scope]
+    speed: Expression
+    acceleration: Expression
+
+    def missing(self, wheel: Wheel, carried: dict[str, tuple[Expression, Expression]]) -> Expression:
+        """Return the torque that a wheel lacks for its acceleration; notes what the gears behind it carry."""
+        scope = self.scopes[wheel.name]
+        lacking = wheel.body.inertia_of(scope) * self.turns[wheel.name] * self.acceleration
+        lacking -= self.torques[wheel.name]
+        for joint in wheel.joints:
+            inside = self.scopes[joint.name]
+            ratio = inside.parameter("ratio")
+            wanted = self.missing(joint.behind, carried)
+            first = wheel if joint.outward else joint.behind
+            speed = self.turns[first.name] * self.speed
+            if joint.outward:
+                given = wanted / ratio / joint.gear.share(inside, wanted / ratio, speed)
+                carried[joint.name] = given, wanted
+                lacking += given
+            else:
+                given = -wanted
+                got = ratio * given * joint.gear.share(inside, given, speed)
+                carried[joint.name] = given, got
+                lacking -= got
+        return lacking
+
+
+def balance_train(
+    root: Wheel,
+    scopes: Mapping[str, Scope],
+    motions: Mapping[str, tuple[Motion, Expression]],
+    efforts: Mapping[str, Expression],
+) -> None:
+    """Close the equations of a train with the efforts of all elements on its bodies.
+
+    Parameters
+    ----------
+    root
+        Leading body.
+    scopes
+        Of bodies and gears, by name.
+    motions
+        As :func:`train_motions` gave them.
+    efforts
+        Sum of the torques of all elements on each body.
+    """
+    lead, own = motions[root.name][0], scopes[root.name]
+    acting = {
+        w.name: w.body.drive(scopes[w.name], motions[w.name][0]) + efforts[w.name] for w in root.wheels()
+    }
+    turns = {name: turn for name, (_, turn) in motions.items()}
+    acceleration, carried = _solved(root, scopes, turns, acting, lead.rate)
+    own.derive(lead.motion, lead.rate)
+    own.derive(lead.rate, acceleration)
+    moved = sum(
+        (w.body.inertia_of(scopes[w.name]) * turns[w.name] ** 2 for w in root.wheels()), start=ca.SX(0)
+    )
+    own.signal(
+        "train_inertia", moved, "kg*m^2", f"inertia of all that is geared to {root.name}, seen from there"
+    )
+    for name, (motion, turn) in motions.items():
+        scopes[name].signal("angle", motion.motion, "rad", f"angle of {name}")
+        scopes[name].signal("speed", motion.rate, "rad/s", f"speed of {name}")
+        scopes[name].signal("acceleration", turn * acceleration, "rad/s^2", f"acceleration of {name}")
+    for name, gear in ((joint.name, joint.gear) for _, joint in root.gears()):
+        given, got = carried[name]
+        first, second = (motions[end][0].rate for end in gear.between)
+        scopes[name].signal("input_torque", given, "N*m", f"what {gear.between[0]} gives to {name}")
+        scopes[name].signal("torque", got, "N*m", f"what {gear.between[1]} gets from {name}")
+        scopes[name].signal("loss", given * first - got * second, "W", f"heat in {name}")
+
+
+def _solved(
+    root: Wheel,
+    scopes: Mapping[str, Scope],
+    turns: Mapping[str, Expression],
+    acting: Mapping[str, Expression],
+    speed: Expression,
+) -> tuple[Expression, dict[str, tuple[Expression, Expression]]]:
+    """Return the acceleration of the leading body, and what each gear takes and gives."""
+    # The equation is solved in stand-ins, so that a step of the solution does not repeat the whole spring.
+    stand_ins = {name: symbol(f"{name}.acting") for name in acting}
+    unknown, turning = symbol(f"{root.name}.sought"), symbol(f"{root.name}.turning")
+    carried: dict[str, tuple[Expression, Expression]] = {}
+    lacking = _Load(stand_ins, turns, scopes, turning, unknown).missing(root, carried)
+    found = _root(lacking, unknown)
+    rest = ca.vertcat(lacking, *[torque for pair in carried.values() for torque in pair])
+    results = ca.vertcat(found, ca.substitute(rest, unknown, found))
+    old, new = ca.vertcat(*stand_ins.values(), turning), ca.vertcat(*acting.values(), speed)
+    acceleration, remainder, *torques = ca.vertsplit(ca.SX(ca.substitute(results, old, new)))
+    if any(isinstance(joint.gear, LossyGear) for _, joint in root.gears()):
+        size = sum((ca.fabs(torque) for torque in torques), start=ca.SX(1))
+        scopes[root.name].check(f"{root.name}.acceleration", remainder / size)
+    pairs = zip(torques[::2], torques[1::2], strict=True)
+    return acceleration, dict(zip(carried, pairs, strict=True))
+
+
+def _root(lacking: Expression, unknown: Expression) -> Expression:
+    if depends(ca.jacobian(lacking, unknown), unknown):
+        return newton_root(lacking, unknown, ca.SX(0))
+    return solve_monotone(lambda z: ca.substitute(lacking, unknown, z), unknown, ca.SX(0))
