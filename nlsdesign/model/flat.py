@@ -15,6 +15,7 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
+from .structure import MovingBody, ReadingNames, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -142,6 +143,8 @@ class FlatModel:
         Looked-up numbers w; empty for a continuous model.
     switching
         Where the equations are not smooth; ``None`` if they are everywhere, or if nobody said.
+    bodies, springs, readings
+        What the model is made of: which variables belong together, in written order. Empty where nobody said.
     """
 
     name: str
@@ -155,6 +158,9 @@ class FlatModel:
     sample_time: float | None = None
     tables: tuple[Table, ...] = ()
     switching: Switching | None = None
+    bodies: tuple[MovingBody, ...] = ()
+    springs: tuple[SpringNames, ...] = ()
+    readings: tuple[ReadingNames, ...] = ()
 
     def symbols(self) -> Symbols:
         """Return fresh symbols and the expressions in them."""

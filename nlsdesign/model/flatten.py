@@ -22,6 +22,7 @@ from .equation_builder import Ledger, PartScope
 from .flat import FlatModel, Variable
 from .gear_train import balance_train, train_motions, trains
 from .stiction import Laws, natural_modes, switch_laws, switching
+from .structure import moving_bodies, readings_of, springs_of
 
 
 def flatten(
@@ -185,6 +186,8 @@ def _model(
         tuple(ledger.states[n][0] for n in states), tuple(ledger.inputs[n][0] for n in kept),
         tuple(v for v, _ in ledger.parameters.values()), tuple(_variable_of(ledger, n) for n in given),
         tuple(v for v, _ in ledger.signals.values()), equations, switching=switches,
+        bodies=moving_bodies(assembly, states, kept, list(ledger.signals)),
+        springs=springs_of(assembly), readings=readings_of(assembly),
     )  # fmt: skip
 
 
