@@ -88,7 +88,10 @@ def over_the_angle(model: Any, count: int) -> Any:
 
 def observers(actuator: Any, model: Any, stop: float) -> dict[str, Any]:
     """Design both observers and let them watch the bench and the free drivetrain through the encoder."""
-    observer, published = nls.observer_design(model), nls.observer_design(model, form=nls.AsPublished())
+    observer, published = (
+        nls.design_observer_with_details(model),
+        nls.design_observer_with_details(model, form=nls.PaperForm()),
+    )
     time = np.arange(0.0, stop, observer.step.sample_time)
     loose = actuator.with_part(
         "load", nls.Inertia(inertia=nls.Quantity(2e-3, "kg*m^2", "assumed: a light link"))

@@ -376,7 +376,7 @@ def readings_of(assembly: Assembly) -> tuple[ReadingNames, ...]:
 
 
 @dataclass(frozen=True)
-class Structure:
+class ModelParts:
     """Bodies, springs and readings of a model.
 
     Parameters
@@ -389,7 +389,7 @@ class Structure:
     springs: tuple[SpringNames, ...]
     readings: tuple[ReadingNames, ...]
 
-    def within(self, names: Collection[str], inputs: Collection[str]) -> Structure:
+    def within(self, names: Collection[str], inputs: Collection[str]) -> ModelParts:
         """Return what is left where a model has these variables only.
 
         A body stays while it has motion and rate, a spring while it has motion and effort, a reading while
@@ -402,7 +402,7 @@ class Structure:
         inputs
             Names of the inputs.
         """
-        return Structure(
+        return ModelParts(
             tuple(
                 _with_drives(body, inputs) for body in self.bodies if {body.motion, body.rate} <= set(names)
             ),
@@ -414,7 +414,7 @@ class Structure:
             tuple(reading for reading in self.readings if reading.signal in names),
         )
 
-    def with_state(self, old: str, new: str) -> Structure:
+    def with_state(self, old: str, new: str) -> ModelParts:
         """Return what there is where another inner state of a spring stands in the place of one.
 
         Parameters
@@ -448,6 +448,4 @@ def _with_states(spring: SpringNames, names: Collection[str]) -> SpringNames:
     cams = (
         replace(cam, states=tuple(state for state in cam.states if state in names)) for cam in spring.cams
     )
-    return replace(
-        spring, states=tuple(state for state in spring.states if state in names), cams=tuple(cams)
-    )
+    return replace(spring, states=tuple(state for state in spring.states if state in names), cams=tuple(cams))
