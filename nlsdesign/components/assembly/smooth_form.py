@@ -46,7 +46,7 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
     >>> rub = tie(DryFriction(sliding_torque=0.05), "wheel")
     >>> rubbing = assembly("a", wheel=Inertia(inertia=1e-3), rub=rub)
     >>> smoothed(rubbing, {"rub": 0.01}).element("rub").title()
-    'CoulombFriction(sliding_torque = 0.05 N*m, creep_speed = 0.01 rad/s)'
+    'CoulombFriction(sliding_torque = 0.05 N·m, creep_speed = 0.01 rad/s)'
     """
     widths = dict(widths or {})
     sharp = {path: part for path, part in assembly.walk() if isinstance(_law(part), Sharp)}
