@@ -87,7 +87,7 @@ def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
         f"unit '{unit}'",
         f"'{token}' is not a known unit",
         did_you_mean=nearest(token, names),
-        next_step="write products and quotients of SI units, for instance 'N·m/rad' or 'N*m/rad', 'MPa', 'kg*m^2'",
+        next_step="write products and quotients of SI units, for instance 'N·m/rad' or 'N*m/rad', 'kg*m^2'",
     )
 
 
@@ -121,7 +121,9 @@ def parse_unit(text: str) -> Unit:
         match = _POWER.match(piece)
         if not match:
             raise UnitError(
-                f"unit '{text}'", f"'{piece}' cannot be read", next_step="write for instance 'N·m/rad' or 'N*m/rad'"
+                f"unit '{text}'",
+                f"'{piece}' cannot be read",
+                next_step="write for instance 'N·m/rad' or 'N*m/rad'",
             )
         power = sign * int(match["power"] or 1)
         one_factor, one = _atom(match["atom"], text)
