@@ -1,7 +1,7 @@
-"""Equations as MathML, which browsers typeset without any library, names in full.
+"""Equations as MathML, which browsers typeset without a library, with full names.
 
-Every text is escaped here (SymPy's own printer does not), products carry a visible dot because names have
-many letters, and a long sum is several formulas in a row, so that it wraps like words.
+Every text is escaped here (SymPy's printer does not escape), products carry a visible dot because names have
+several letters, and a long sum is a row of formulas, so that its lines wrap.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sympy.core.function import AppliedUndef
 
 from ..model.equations import Equations
 from .html import Html
-from .sections import Place, Section
+from .sections import PagePosition, Section
 
 _INDEXED = re.compile(r"^(?P<name>.+)\[(?P<index>\d+)\]$")
 _RELATIONS = {"==": "=", "!=": "≠", "<=": "≤", ">=": "≥"}
@@ -41,7 +41,7 @@ class EquationsSection(Section):
     caption: str = ""
     template: ClassVar[str] = "equations.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the rows of the derivatives and of the definitions."""
         left = _next if self.equations.discrete else _derivative
         states = [_row(left(name), e) for name, e in self.equations.derivatives.items()]
@@ -55,7 +55,7 @@ def formula(expression: Any) -> Html:
     Parameters
     ----------
     expression
-        Anything SymPy; what has no layout here stands as SymPy writes it.
+        Any SymPy expression; one without a layout here is printed as by SymPy.
     """
     return _math(_layout(expression))
 
