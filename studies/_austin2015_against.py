@@ -23,11 +23,15 @@ def figure_pages(done: dict[str, Any]) -> list[Any]:
         "best linear spring": nls.figures.metric_note(found.hooke_agreement),
     }
     rows = [
-        nls.PublishedNumber(
+        nls.report.PublishedNumber(
             "mean relative error, model", 13.6, found.agreement.relative, "%", "paper: own bench data"
         ),
-        nls.PublishedNumber("rms error, model", 0.10, found.agreement.rmse, "N*m", "here: points of Fig. 8"),
-        nls.PublishedNumber("mean relative error, linear spring", 25.2, found.hooke_agreement.relative, "%"),
+        nls.report.PublishedNumber(
+            "rms error, model", 0.10, found.agreement.rmse, "N*m", "here: points of Fig. 8"
+        ),
+        nls.report.PublishedNumber(
+            "mean relative error, linear spring", 25.2, found.hooke_agreement.relative, "%"
+        ),
     ]
     element = [
         (amplitude, f"{result.relative:.1f} %", f"{result.rmse:.1f} N")
@@ -35,21 +39,21 @@ def figure_pages(done: dict[str, Any]) -> list[Any]:
         for result in [nls.agreement(force, model)]
     ]
     return [
-        nls.Chapter("Model and measurement", "The points are read off the figures of the paper."),
-        nls.FigureSection(
+        nls.report.Chapter("Model and measurement", "The points are read off the figures of the paper."),
+        nls.report.FigureSection(
             "Fig. 8: torque over angle",
             nls.figures.torque_against_measured(models, {"Fig. 8": (angle, measured)}, notes=notes),
             caption="Points: measured. Lines: model with all relaxation at rest, and the best linear spring.",
             assumed="The cam follows from this figure by energy: this checks the chain, not the law.",
         ),
-        nls.FigureSection(
+        nls.report.FigureSection(
             "Fig. 1: hysteresis",
             nls.figures.torque_loops(found.loops),
             caption="Measured and simulated loops.",
             assumed="Driven at 1 Hz, which is not printed; the viscosity was chosen for the 45° loop.",
         ),
-        nls.comparison_table("In the metrics of the paper", rows),
-        nls.TableSection(
+        nls.report.comparison_table("In the metrics of the paper", rows),
+        nls.report.TableSection(
             "Fig. 6: force of one element",
             ("amplitude", "mean relative error", "rms error"),
             tuple(element),

@@ -20,14 +20,14 @@ def diagnosed(actuator: Any, out: Path, steps: Any) -> Any:
 
 def with_bench_sensors(actuator: Any) -> Any:
     """Return the actuator as it stands on the bench: its cable only pulls, load cell and ammeter are read."""
-    rubber = nls.InextensibleCable(members=(("rubber", actuator.element("spring.rubber")),))
+    rubber = nls.components.InextensibleCable(members=(("rubber", actuator.element("spring.rubber")),))
     before = actuator.element("spring")
     spring = nls.through(before.cam, cable=rubber, pretension=before.pretension)
     cell, meter = (nls.quantity(*number, source="rig simulation") for number in ((0.3, "N"), (0.04, "A")))
     bench = (
         actuator.with_part("spring", spring)
-        .with_part("load_cell", nls.ForceSensor(of="spring.cable.force", noise=cell))
-        .with_part("ammeter", nls.CurrentSensor(of="motor.current", noise=meter))
+        .with_part("load_cell", nls.components.ForceSensor(of="spring.cable.force", noise=cell))
+        .with_part("ammeter", nls.components.CurrentSensor(of="motor.current", noise=meter))
     )
     return bench.with_values(
         {name: replace(q, spread=0.0) for name, q in bench.quantities().items() if geometry(name)}

@@ -56,7 +56,7 @@ def compare_with_figures(actuator: Any) -> AgainstFigures:
     actuator
         Assembly of the deck.
     """
-    driven = actuator.with_part("motor", nls.Driven()).without_part("motor_encoder")
+    driven = actuator.with_part("motor", nls.components.Driven()).without_part("motor_encoder")
     model = nls.flatten(driven, outputs=["spring.torque"])
     angle, measured = points("fig08_torque_profile_nls").T
     torque = nls.equilibrium_torque(nls.flatten(actuator), "spring", angle)
@@ -93,7 +93,7 @@ def element_loop(actuator: Any, degrees: int) -> tuple[Array, Array, Array]:
     extension, force = (points(f"fig06_measured_{degrees}deg_force_vs_extension") * [1e-3, 1.0]).T
     rubber = nls.tie(actuator.element("spring.rubber"), "grip")
     model = nls.flatten(
-        nls.assembly("element", grip=nls.DrivenPoint(), rubber=rubber), outputs=["rubber.force"]
+        nls.assembly("element", grip=nls.components.DrivenPoint(), rubber=rubber), outputs=["rubber.force"]
     )
     # Two stretches, as the time axis shows; it gives no extension over time, so a sine is assumed.
     time = np.linspace(0.0, 2.0 / FIG6_FREQUENCY, 801)

@@ -35,24 +35,24 @@ def key_numbers(done: dict[str, Any], found: dict[str, float]) -> tuple[Any, ...
     """Return what stands at the top of the page."""
     assumed = nls.sources(done["actuator"].quantities())["assumed"]
     return (
-        nls.KeyNumber(
+        nls.report.KeyNumber(
             "torque of the model", f"{found['fig8_rms_error_Nm']:.3f} N·m rms", "against Fig. 8; paper: 0.10"
         ),
-        nls.KeyNumber(
+        nls.report.KeyNumber(
             "designed torque", f"{found['design_torque_error_mNm_rms']:.2g} mN·m rms", "5 N·m at 53°"
         ),
-        nls.KeyNumber(
+        nls.report.KeyNumber(
             "torque observer",
             f"{found['observer_minimal_error_mNm_rms']:.2g} mN·m rms",
             "through the encoder",
         ),
-        nls.KeyNumber(
+        nls.report.KeyNumber(
             "FMUs against one piece", f"{found['cosimulation_difference_Nm']:.1e} N·m", "closed loop"
         ),
-        nls.KeyNumber(
+        nls.report.KeyNumber(
             "held-out error", f"{found['verdict_held_out_error_over_noise']:.2f} × noise", "after diagnosis"
         ),
-        nls.KeyNumber("numbers only assumed", f"{100 * assumed:.0f} %", "of the deck"),
+        nls.report.KeyNumber("numbers only assumed", f"{100 * assumed:.0f} %", "of the deck"),
     )
 
 

@@ -34,14 +34,14 @@ def write_pages(done: dict[str, Any]) -> dict[str, float]:
     """
     results = numbers(done)
     sections = [
-        nls.NumbersSection("Key numbers", key_numbers(done, results)),
+        nls.report.NumbersSection("Key numbers", key_numbers(done, results)),
         *actuator_pages(done),
         *design_pages(done),
         *figure_pages(done),
         *observer_pages(done, results),
         *loop_pages(done, results),
-        *nls.verdict_sections(done["verdict"]),
-        nls.TextSection("Where the records come from", RECORDS),
+        *nls.report.verdict_sections(done["verdict"]),
+        nls.report.TextSection("Where the records come from", RECORDS),
         *file_pages(done),
     ]
     title = "A cam-rubber actuator, from deck to report"
@@ -53,12 +53,14 @@ def actuator_pages(done: dict[str, Any]) -> list[Any]:
     """Show what was declared."""
     actuator, model = done["actuator"], done["model"]
     return [
-        nls.Chapter(
+        nls.report.Chapter(
             "The actuator", "Every number has a unit, a source and a spread; what is assumed says so."
         ),
-        nls.TextSection("Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)),
-        nls.numbers_table("Numbers of the deck", actuator.quantities(), folded=True),
-        nls.EquationsSection(
+        nls.report.TextSection(
+            "Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)
+        ),
+        nls.report.numbers_table("Numbers of the deck", actuator.quantities(), folded=True),
+        nls.report.EquationsSection(
             "Equations", nls.equations(model), "The flat model; `f(…)` stands for a long law."
         ),
     ]
@@ -74,20 +76,20 @@ def design_pages(done: dict[str, Any]) -> list[Any]:
         design.target, {"designed actuator": (check.angles, check.torques)}
     )
     return [
-        nls.Chapter("Design", "Contour, pretension and rubber designed together for 5 N·m at 53°."),
-        nls.CamSection(
+        nls.report.Chapter("Design", "Contour, pretension and rubber designed together for 5 N·m at 53°."),
+        nls.report.CamSection(
             "Cam, cable and rubber",
             motion,
             caption="Move the slider to turn the cam.",
             means="The contact point wanders outwards, so the lever arm grows and the spring stiffens.",
             assumed="Rubber at rest; the anchor of the cable is not dimensioned in the paper.",
         ),
-        nls.FigureSection(
+        nls.report.FigureSection(
             "Torque against the target",
             figure,
             caption="Torque of the flattened, changed assembly.",
             means=f"Worst case over the moduli's spread: {design.sensitivity}.",
         ),
-        nls.TableSection("What was found", ("what", "value"), tuple(design.rows())),
-        nls.TableSection("Limits", ("limit",), tuple((str(state),) for state in design.limits)),
+        nls.report.TableSection("What was found", ("what", "value"), tuple(design.rows())),
+        nls.report.TableSection("Limits", ("limit",), tuple((str(state),) for state in design.limits)),
     ]

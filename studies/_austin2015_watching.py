@@ -18,27 +18,27 @@ def observer_pages(done: dict[str, Any], results: dict[str, float]) -> list[Any]
     minimal, published = (results[f"observer_{name}_error_mNm_rms"] for name in ("minimal", "published"))
     free = done["free"]
     return [
-        nls.Chapter(
+        nls.report.Chapter(
             "Observer", "The torque is not measured: it is estimated from the encoder and the current."
         ),
-        nls.FigureSection(
+        nls.report.FigureSection(
             "Observability over the cam angle",
             nls.figures.observability_over_angle(chart),
             caption="Rank and condition of angle, speed and rubber memory, seen through the encoder.",
             means="At zero angle the lever arm vanishes: the rubber's memory is not seen, nor needed.",
         ),
-        nls.FigureSection(
+        nls.report.FigureSection(
             "Stability over the cam angle",
             nls.figures.stability_over_angle(chart),
             caption="Poles and stiffness of the actuator at rest.",
         ),
-        nls.FigureSection(
+        nls.report.FigureSection(
             "Estimated torque on the bench",
             nls.figures.observer_error(bench.time[first], bench["spring.torque"][first], estimates),
             caption="Current 6 A at 2 Hz, 8192 counts per turn; the minimal form starts wrong.",
             means=f"After 1 s: {minimal:.2f} mN·m rms in minimal, {published:.2f} in the paper's form.",
         ),
-        nls.FigureSection(
+        nls.report.FigureSection(
             "Free drivetrain",
             nls.figures.over_time(
                 free.time,
@@ -48,27 +48,26 @@ def observer_pages(done: dict[str, Any], results: dict[str, float]) -> list[Any]
             ),
             caption="The load is let go: a link of 2e-3 kg·m² behind the spring, current 0.5 A at 2 Hz.",
         ),
-        nls.TextSection("Observer", "The table and its error.", drawing=str(done["observer"])),
+        nls.report.TextSection("Observer", "The table and its error.", drawing=str(done["observer"])),
     ]
 
 
 def loop_pages(done: dict[str, Any], results: dict[str, float]) -> list[Any]:
     """Show the co-simulated closed loop."""
     run, whole = done["run"].trace, done["whole"]
-    names = {
-        "desired": "controller.spring.torque.desired",
-        "true": "plant.spring.torque",
-        "estimated": "observer.spring.torque",
-        "current": "controller.motor.current",
-    }
+    loop = nls.figures.closed_loop_of(
+        run,
+        desired="controller.spring.torque.desired",
+        true="plant.spring.torque",
+        estimated="observer.spring.torque",
+        current="controller.motor.current",
+    )
     difference = run["plant.spring.torque"] - np.interp(run.time, whole.time, whole["plant.spring.torque"])
     return [
-        nls.Chapter("Co-simulation", "Plant, observer and torque controller as FMUs, wired by name."),
-        nls.FigureSection(
+        nls.report.Chapter("Co-simulation", "Plant, observer and torque controller as FMUs, wired by name."),
+        nls.report.FigureSection(
             "Closed torque loop",
-            nls.figures.closed_loop(
-                nls.figures.closed_loop_of(run, **names), differences={"true torque": difference}
-            ),
+            nls.figures.closed_loop(loop, differences={"true torque": difference}),
             caption="0.8 N·m at 1 Hz; the controller has one sample to compute.",
             means=f"The same loop simulated in one piece differs by at most "
             f"{results['cosimulation_difference_Nm']:.1e} N·m.",
@@ -90,4 +89,4 @@ def file_pages(done: dict[str, Any]) -> list[Any]:
         **{path: "co-simulation FMU" for path in done["fmus"]},
         **{path: "drawing of the cam" for path in sorted((out / "drawing").iterdir())},
     }
-    return [nls.Chapter("Files"), nls.FileSection("Written beside this page", files)]
+    return [nls.report.Chapter("Files"), nls.report.FileSection("Written beside this page", files)]

@@ -14,7 +14,6 @@ import click
 
 from ..errors import NlsError, unknown_name
 from ..locations import bundled, folder
-from ..progress import Steps
 from .output import json_option, show_json, show_table
 
 
@@ -119,6 +118,8 @@ def list_studies() -> None:
 @json_option
 def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
     """Run a study; exit status 1 if one of its numbers is not the one that it claims."""
+    from ..progress import Steps
+
     module = load_study(name)
     target = out if out is not None else Path("out") / Path(name).stem
     target.mkdir(parents=True, exist_ok=True)
