@@ -115,9 +115,7 @@ class EstimateDeviation(View):
         unit = model.variable(estimate).unit
         return (
             Variable("deviation.model", unit, f"standard deviation of {estimate} from the model alone"),
-            Variable(
-                "deviation.best", unit, f"standard deviation of {estimate} with the best correction"
-            ),
+            Variable("deviation.best", unit, f"standard deviation of {estimate} with the best correction"),
         )
 
     def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:

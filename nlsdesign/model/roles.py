@@ -43,7 +43,9 @@ def series_spring(model: FlatModel, name: str | None = None) -> SpringNames:
         model,
         "the series spring (the only spring with a cam, or else the only spring)",
         _listed("spring", [spring.name for spring in candidates], "with a cam" if with_cam else ""),
-        _choice("spring", [spring.name for spring in candidates], "tie an elastic element between two bodies"),
+        _choice(
+            "spring", [spring.name for spring in candidates], "tie an elastic element between two bodies"
+        ),
     )
 
 
@@ -105,8 +107,12 @@ def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
     raise _undecided(
         model,
         "the driven body (the only one with a motor, or else the only one that moves freely)",
-        _listed("body", [body.name for body in candidates], "with a motor" if motors else "that moves freely"),
-        _choice("measured", [body.motion for body in candidates], "declare a body that moves, such as a motor"),
+        _listed(
+            "body", [body.name for body in candidates], "with a motor" if motors else "that moves freely"
+        ),
+        _choice(
+            "measured", [body.motion for body in candidates], "declare a body that moves, such as a motor"
+        ),
     )
 
 
@@ -188,7 +194,9 @@ def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
     prescribed = {body.name: body for body in model.bodies if body.prescribed}
     if name is not None:
         return _named("driven load", name, prescribed)
-    ends = {end for spring in model.springs if spring.cams or len(model.springs) == 1 for end in spring.between}
+    ends = {
+        end for spring in model.springs if spring.cams or len(model.springs) == 1 for end in spring.between
+    }
     candidates = [body for body in prescribed.values() if body.name in ends] or list(prescribed.values())
     if len(candidates) == 1:
         return candidates[0]

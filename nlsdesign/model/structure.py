@@ -448,6 +448,4 @@ def _with_states(spring: SpringNames, names: Collection[str]) -> SpringNames:
     cams = (
         replace(cam, states=tuple(state for state in cam.states if state in names)) for cam in spring.cams
     )
-    return replace(
-        spring, states=tuple(state for state in spring.states if state in names), cams=tuple(cams)
-    )
+    return replace(spring, states=tuple(state for state in spring.states if state in names), cams=tuple(cams))

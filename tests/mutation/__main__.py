@@ -2,10 +2,10 @@
 
     python -m tests.mutation nlsdesign/model nlsdesign/observer --count 100 --seed 1 --out out/mutation
 
-The first step runs the quick tests once with coverage, to know which tests reach which line; the second breaks
-one spot after the other in a copy of the project and runs those tests until one fails. What was tried stands
-in ``tried.jsonl`` and is not tried again, so a run can be stopped and goes on where it was. Survivors are
-listed at the end; each is to be killed by a test, or argued. Needs ``pip install .[mutation]``.
+The first step runs the quick tests once with coverage, to know which tests reach which line; the second
+breaks one spot after the other in a copy of the project and runs those tests until one fails. What was tried
+stands in ``tried.jsonl`` and is not tried again, so a run can be stopped and goes on where it was. Survivors
+are listed at the end; each is to be killed by a test, or argued. Needs ``pip install .[mutation]``.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def _node(context: str, copy: Path) -> str:
 
 
 def _outcome(copy: Path, tried: Path, mutant: Mutant, reach: dict[str, dict[int, list[str]]]) -> str:
-    """Return ``noticed``, ``survived`` or ``unreached``, from the file of what was tried where it stands there."""
+    """Return ``noticed`` or ``survived``, from the file of what was tried where it stands there."""
     known = [json.loads(line) for line in tried.read_text().splitlines()] if tried.exists() else []
     for each in known:
         if {k: each[k] for k in asdict(mutant)} == asdict(mutant):
