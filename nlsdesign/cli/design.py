@@ -7,19 +7,7 @@ from typing import Any
 
 import click
 
-from ..components.assembly.deck_writer import declare, write_deck
-from ..deck import load_deck
-from ..design import (
-    ExponentialTorque,
-    Limit,
-    MaximumCamRadius,
-    MaximumStrain,
-    MinimumRadiusOfCurvature,
-    design_cam,
-    write_drawings,
-)
-from ..progress import Steps
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
 from .units import Number
 
 
@@ -33,10 +21,9 @@ from .units import Number
 @click.option(
     "--free",
     multiple=True,
-    default=("spring.cam.contour",),
-    show_default=True,
-    help="What may change; repeatable.",
+    help="What may change, for instance spring.cam.contour; the contour alone by default; repeatable.",
 )
+@spring_option
 @click.option(
     "--minimum-radius",
     type=Number("mm"),
@@ -54,6 +41,19 @@ from .units import Number
 @json_option
 def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     """Design the cam for tau(angle) = maximum * (exp(c angle) - 1) / (exp(c end) - 1)."""
+    from ..components.assembly.deck_writer import declare, write_deck
+    from ..deck import load_deck
+    from ..design import (
+        ExponentialTorque,
+        Limit,
+        MaximumCamRadius,
+        MaximumStrain,
+        MinimumRadiusOfCurvature,
+        design_cam,
+        write_drawings,
+    )
+    from ..progress import Steps
+
     keep: list[Limit] = [
         MinimumRadiusOfCurvature(given["minimum_radius"]),
         MaximumCamRadius(given["maximum_radius"]),
@@ -61,7 +61,13 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     ]
     target = ExponentialTorque(maximum=given["maximum"], angle=given["angle"], shape=given["shape"])
     with Steps().step("design"):
-        found = design_cam(declare(load_deck(deck_name)), target=target, free=list(given["free"]), keep=keep)
+        found = design_cam(
+            declare(load_deck(deck_name)),
+            target=target,
+            free=list(given["free"]) or None,
+            spring=given["spring"],
+            keep=keep,
+        )
     out.mkdir(parents=True, exist_ok=True)
     write_deck(found.actuator, out / "model.toml")
     files = [out / "model.toml", *write_drawings(out, found.contour, note=f"design {found.fingerprint}")]

@@ -91,7 +91,7 @@ def design_observer_with_details(
     form: StateForm | None = None,
     grid: Grid | None = None,
 ) -> ObserverDesign:
-    """Design an observer as :func:`design_observer` does; return it with table error and start values.
+    """Design an observer and return it with its table error and start values.
 
     Parameters
     ----------

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.block import Block, Drive
-from ...model import Assembly, FlatModel, Variable, flatten
+from ...model import FlatModel, Variable, flatten
 from ...model.flat import Symbols
 from ...model.transform import cut, named, without_idle_states
 from ...symbolic import Expression, depends

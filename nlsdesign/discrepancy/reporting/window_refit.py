@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.block import Drive
 from ...identification.estimation.least_squares import Fit
@@ -14,7 +15,7 @@ from ...identification.output_error.simulation_error import Shots, Weights
 from ...identification.output_error.wiring import Wiring
 from ...identification.records.measurement import RecordSet
 from ...identification.statistics.metrics import rmse
-from ...model import Assembly, FlatModel, flatten
+from ...model import FlatModel, flatten
 from .verdict import RecordGap
 
 _PHASES = 4
@@ -75,7 +76,7 @@ def window_gaps(
         runs = [predict_in_windows(m, record, length, wiring=wiring) for m in models]
         for signal in wiring.outputs:
             before, after = (rmse(run.error[signal]) for run in runs)
-            floor, unit = record.grain_of(signal).noise, record.trace.units[signal]
+            floor, unit = record.resolution_of(signal).noise, record.trace.units[signal]
             name = f"{signal} over {length:g} s"
             rows = len(runs[0].time)
             found.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))

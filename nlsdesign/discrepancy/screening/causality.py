@@ -9,11 +9,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.loop_work import Loop, loop_of
-from ...model import Assembly, FlatModel, flatten
+from ...model import FlatModel, flatten
 from ...symbolic import depends
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
         extension = _extension(assembly, model, motion, records.signals)
         if extension is None:
             continue
-        noise = float(np.median([r.grain_of(signal).noise for r in records.records]))
+        noise = float(np.median([r.resolution_of(signal).noise for r in records.records]))
         paths = [(r, extension(r)) for r in records.records]
         loops = [
             (r, loop)

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...model import Assembly
 from ..selection.comparison import Comparison
 from ..selection.excess import DECLARED, Excess, excesses
 from ..selection.hypothesis import Hypothesis

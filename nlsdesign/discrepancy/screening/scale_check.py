@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...model import Assembly, flatten
+from ...model import flatten
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
 

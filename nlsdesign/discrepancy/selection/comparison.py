@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import ConvergenceError
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import DrivenBlock
@@ -17,8 +18,8 @@ from ...identification.estimation.least_squares import declared_parameter, fit
 from ...identification.estimation.parameters import free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
-from ...model import Assembly, Variable
-from ...parallel import shared_out
+from ...model import Variable
+from ...parallel_map import shared_out
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from .hypothesis import Hypothesis
