@@ -85,7 +85,7 @@ def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
 
 
 def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
-    """Return the body that the drive moves: the only one with a motor, or else the only one that is free.
+    """Return the body that the drive moves: the only one with a motor, or else the only one free to move.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
     if name is not None:
         return _named("body", name, {body.name: body for body in free})
     motors = [body for body in free if body.motor]
-    candidates, which = (motors, "with a motor") if motors else (free, "that moves freely")
+    candidates, which = (motors, "with a motor") if motors else (free, "free to move")
     if len(candidates) == 1:
         return candidates[0]
     raise _undecided(
         model,
-        "the driven body (the only one with a motor, or else the only one that moves freely)",
+        "the driven body (the only one with a motor, or else the only one free to move)",
         _listed("body", [body.name for body in candidates], which),
         _choice(
             [f"its motion '{body.motion}' (--measured {body.motion})" for body in candidates],
