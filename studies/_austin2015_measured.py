@@ -93,7 +93,8 @@ def element_loop(actuator: Any, degrees: int) -> tuple[Array, Array, Array]:
     extension, force = (points(f"fig06_measured_{degrees}deg_force_vs_extension") * [1e-3, 1.0]).T
     rubber = nls.tie(actuator.element("spring.rubber"), "grip")
     model = nls.flatten(
-        nls.assembly("element", grip=nls.DrivenPoint(), rubber=rubber), outputs=["rubber.force"]
+        nls.assembly("element", grip=nls.Driven(domain=nls.TRANSLATION), rubber=rubber),
+        outputs=["rubber.force"],
     )
     # Two stretches, as the time axis shows; it gives no extension over time, so a sine is assumed.
     time = np.linspace(0.0, 2.0 / FIG6_FREQUENCY, 801)

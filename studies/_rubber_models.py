@@ -22,7 +22,9 @@ EVERY = 4
 def laws() -> dict[str, Any]:
     """Return the laws by name; the first six are those that the paper compares or prints."""
     stiffening = nls.StrainStiffening(modulus=(2e6, 1.5e6, 2e6, 2e6), knots=KNOTS)
-    rounded = nls.SmoothStrainStiffening(modulus=(2e6, 1.5e6, 2e6, 2e6), knots=KNOTS, width=0.01)
+    rounded = nls.StrainStiffening(
+        modulus=(2e6, 1.5e6, 2e6, 2e6), knots=KNOTS, contact=nls.Rounded(width=0.01)
+    )
     yeoh, one = nls.Yeoh(c1=0.5e6, c2=1e5, c3=1e4), {"modulus": 1e6, "viscosity": 2e4}
     return {
         "Hooke": nls.LinearElastic(modulus=3e6),
@@ -43,7 +45,7 @@ def element(actuator: Any, law: Any) -> Any:
     """Return one rubber element of the actuator with another law, pulled by a grip."""
     rubber = actuator.element("spring.rubber")
     piece = nls.specimen(area=rubber.area, rest_length=rubber.rest_length, law=law)
-    return nls.assembly("element", grip=nls.DrivenPoint(), rubber=nls.tie(piece, "grip"))
+    return nls.assembly("element", grip=nls.Driven(domain=nls.TRANSLATION), rubber=nls.tie(piece, "grip"))
 
 
 def record(name: str, time: Any, extension: Any, force: Any) -> Any:

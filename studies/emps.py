@@ -23,7 +23,7 @@ BANDWIDTH, EDGE = 20.0, 100
 PHASES = 4
 MISSING = ("dry_friction", "offset")
 FITTED = {"mass_kg": "carriage.mass", "viscous_Ns_per_m": "guide.damping"}
-FITTED |= {"coulomb_N": "dry_friction.sliding_force", "offset_N": "offset.load"}
+FITTED |= {"coulomb_N": "dry_friction.sliding_effort", "offset_N": "offset.load"}
 UNITS = dict(zip(FITTED, ("kg", "N*s/m", "N", "N"), strict=True))
 
 

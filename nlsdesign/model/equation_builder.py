@@ -42,7 +42,7 @@ class Ledger:
 
     def _declare(self, path: str, part: Part) -> None:
         inner = part.element if isinstance(part, Tie) else part
-        for field_name, info in inner.parameter_infos().items():
+        for field_name, info in inner.infos().items():
             given = part.parameters()[field_name]
             row = isinstance(given.value, tuple)
             for number, value in enumerate(given.values, start=1):

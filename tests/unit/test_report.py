@@ -18,7 +18,7 @@ import pytest
 import sympy
 
 from nlsdesign import report
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
@@ -70,7 +70,7 @@ class Page(HTMLParser):
 
 
 def swing(name: str = "swing") -> Any:
-    spring, damper = TorsionSpring(stiffness=2.0), TorsionDashpot(damping=0.01)
+    spring, damper = Spring(stiffness=2.0, domain=ROTATION), Dashpot(damping=0.01, domain=ROTATION)
     return assembly(
         name, wheel=Inertia(inertia=1e-3), spring=tie(spring, "wheel"), damper=tie(damper, "wheel")
     )

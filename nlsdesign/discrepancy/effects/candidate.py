@@ -68,7 +68,7 @@ class Candidate:
     sketch: Assembly | None = None
 
 
-Effect: TypeAlias = Callable[[Assembly], Sequence[Candidate]]
+EffectFunction: TypeAlias = Callable[[Assembly], Sequence[Candidate]]
 """A function from an assembly to the ways in which it can have the effect; none where it cannot."""
 
 

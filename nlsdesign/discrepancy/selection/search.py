@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from ...errors import ConvergenceError
 from ...parallel import shared_out
-from ..effects.candidate import Candidate, Effect
+from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
 from .excess import DECLARED, Excess, excesses, explained, total_excess
 from .hypothesis import Hypothesis
@@ -78,7 +78,10 @@ class Outcome:
 
 
 def search(
-    comparison: Comparison, base: Hypothesis, catalogue: Sequence[Effect], progress: Callable[[str], None]
+    comparison: Comparison,
+    base: Hypothesis,
+    catalogue: Sequence[EffectFunction],
+    progress: Callable[[str], None],
 ) -> Outcome:
     """Add effects to a hypothesis while a block stays open and one helps.
 
@@ -110,7 +113,7 @@ class _Seeker:
     """Tries candidates on hypotheses, on all cores."""
 
     def __init__(
-        self, comparison: Comparison, catalogue: Sequence[Effect], progress: Callable[[str], None]
+        self, comparison: Comparison, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
     ) -> None:
         self._comparison, self._catalogue, self._progress = comparison, catalogue, progress
 
