@@ -1,6 +1,9 @@
 """Parts that can be declared; they never learn what they are used for."""
 
+from typing import NoReturn
+
 from .assembly.named_parts import Assembly, assembly
+from .assembly.renamed import renamed
 from .assembly.smooth_form import smoothed
 from .core.contacts import Rounded, Sharp, Smooth
 from .core.dampers import Dashpot, ViscousMaterial
@@ -162,3 +165,9 @@ __all__ = [
     "through",
     "tie",
 ]
+
+
+def __getattr__(name: str) -> NoReturn:
+    """Say the new name of a component that had another one."""
+    error = renamed(name)
+    raise error or AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -205,7 +205,12 @@ def test_a_loaded_gear_holds_its_load() -> None:
 
 def test_two_frictions_on_one_shaft_share_the_load() -> None:
     """Their torques add: it slips at the sum, and while it sticks each carries its share."""
-    made = wheel(CoulombFriction(sliding_effort=T), more=CoulombFriction(sliding_effort=3 * T))
+    made = assembly(
+        "two_bearings",
+        wheel=Inertia(inertia=J), bench=Fixed(),
+        rub=tie(CoulombFriction(sliding_effort=T), "wheel"),
+        more=tie(CoulombFriction(sliding_effort=3 * T), "wheel", "bench"),
+    )  # fmt: skip
     run = simulate(flatten(made), np.linspace(0.0, 1.0, 11), inputs={"wheel.torque": lambda t: 0.4 * t})
     (event,) = run.events
     assert event.time == pytest.approx(4 * T / 0.4, rel=1e-11)
@@ -282,14 +287,29 @@ def test_friction_without_inertia_is_refused_by_name() -> None:
 
 
 def test_the_same_motion_held_twice_is_refused_by_name() -> None:
+    """Two frictions in a row and a third around both: what each carries is not defined while all stick."""
     made = assembly(
         "net",
-        a=Inertia(inertia=J), b=Inertia(inertia=J),
+        a=Inertia(inertia=J), b=Inertia(inertia=J), c=Inertia(inertia=J),
         one=tie(CoulombFriction(sliding_effort=T), "a", "b"),
-        two=tie(CoulombFriction(sliding_effort=T), "b", "a"),
+        two=tie(CoulombFriction(sliding_effort=T), "b", "c"),
+        three=tie(CoulombFriction(sliding_effort=T), "a", "c"),
     )  # fmt: skip
-    with pytest.raises(ArrangementError, match=r"'one' and 'two'.*hold the same motion"):
+    with pytest.raises(ArrangementError, match=r"'one' and 'two' and 'three'.*hold the same motion"):
         flatten(made)
+
+
+def test_two_dry_frictions_between_the_same_bodies_are_refused_when_they_are_put_together() -> None:
+    bodies = {"a": Inertia(inertia=J), "b": Inertia(inertia=J)}
+    rub, oil = CoulombFriction(sliding_effort=T), Dashpot(damping=1e-3, domain=ROTATION)
+    for second in (rub, rub.smooth(), parallel(oil=oil, rub=rub)):
+        with pytest.raises(
+            ArrangementError, match=r"'one' and 'two'.*both bring dry friction to 'b' and 'a'"
+        ):
+            assembly("net", **bodies, one=tie(rub, "a", "b"), two=tie(second, "b", "a"))
+    # What is no twin: viscous friction twice, and dry friction against another body.
+    assembly("net", **bodies, one=tie(oil, "a", "b"), two=tie(oil, "a", "b"), three=tie(rub, "a", "b"))
+    assembly("net", **bodies, one=tie(rub, "a", "b"), two=tie(rub, "a"))
 
 
 def test_load_that_contains_friction_is_refused_by_name() -> None:

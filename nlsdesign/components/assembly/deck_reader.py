@@ -23,6 +23,7 @@ from ..mechanics.bodies import Body
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
+from .renamed import NUMBERS, renamed
 
 
 @functools.cache
@@ -112,10 +113,12 @@ class Builder:
                     self.problems.append(error)
             elif key not in keys and not _is_part(raw):
                 valid = [*keys, *names]
-                meant.add(nearest(key, valid))
+                new = NUMBERS.get(key)
+                near = new if new in names else nearest(key, valid)
+                meant.add(near)
                 step = f"fields are: {', '.join(valid)}"
                 rule = f"{kind.__name__} has no field '{key}'"
-                self._problem(full, rule, did_you_mean=nearest(key, valid), next_step=step)
+                self._problem(full, rule, did_you_mean=near, next_step=step)
         stated = self._stated_domain(path, table, kind)
         domain = stated or _domain_of(kind, given, inner)
         infos, found = kind.parameter_infos(domain), {}
@@ -242,6 +245,10 @@ class Builder:
                 did_you_mean="component" if slip else None,
                 next_step='write component = "..."',
             )
+            return None
+        old = renamed(str(name))
+        if old:
+            self.problems.append(old.at(self.deck.place(f"{path}.component")))
             return None
         if not isinstance(name, str) or name not in self.classes:
             self._problem(
