@@ -1,14 +1,15 @@
-"""What the audit finds on one statement: calculation, numbers, verdict; and how it is shown and written."""
+"""What the audit finds on one statement: calculation, numbers and verdict; and all statements together."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import KW_ONLY, dataclass, field
 
-import sympy
+import sympy as sp
+from matplotlib.figure import Figure
 
 import nlsdesign as nls
+from nlsdesign.report import OUTCOMES, CalculationSection, CalculationStep, FigureSection, Section
 
 HOLDS, FAILS = "holds", "does not hold"
 OPEN, AGAINST_FIGURES = "cannot be decided", "contradicts the figures"
@@ -29,16 +30,16 @@ LATEX = {
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """One statement with what became of it.
+    """One statement, tested.
 
     Parameters
     ----------
     key
         Short identifier; the number before the dot is that of the list of the design notes.
-    says
-        Who makes the statement: the paper or the project's design notes.
+    stated_by
+        The paper or the project's design notes.
     statement, verdict, why
-        What is tested, what came out, and the reason in words.
+        What is tested, the outcome, and the reason in words.
     steps
         The calculation.
     numbers
@@ -48,21 +49,22 @@ class Finding:
     """
 
     key: str
-    says: str
+    stated_by: str
+    _: KW_ONLY
     statement: str
     verdict: str
     why: str
-    steps: tuple[nls.CalculationStep, ...] = ()
+    steps: tuple[CalculationStep, ...] = ()
     numbers: Mapping[str, tuple[float, str]] = field(default_factory=dict)
-    figures: Mapping[str, tuple[Any, str]] = field(default_factory=dict)
+    figures: Mapping[str, tuple[Figure, str]] = field(default_factory=dict)
 
-    def section(self) -> Any:
+    def section(self) -> Section:
         """Return the finding as a section of the page."""
         shown = {_label(n, u): f"{nls.figures.compact(v, 4)} {u}" for n, (v, u) in self.numbers.items()}
-        parts = tuple(nls.FigureSection(t, f, caption=c) for t, (f, c) in self.figures.items())
-        return nls.CalculationSection(
+        parts = tuple(FigureSection(t, f, caption=c) for t, (f, c) in self.figures.items())
+        return CalculationSection(
             f"{self.key} {_title(self.statement)}",
-            f"{self.statement} (Said by: {self.says}.)",
+            f"{self.statement} (Stated by: {self.stated_by}.)",
             self.verdict,
             steps=self.steps,
             why=self.why,
@@ -70,11 +72,11 @@ class Finding:
             parts=parts,
         )
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """Return the finding as plain data."""
         return {
-            "key": self.key, "says": self.says, "statement": self.statement, "verdict": self.verdict,
-            "why": self.why,
+            "key": self.key, "stated_by": self.stated_by, "statement": self.statement,
+            "verdict": self.verdict, "why": self.why,
             "numbers": {n: {"value": v, "unit": u} for n, (v, u) in self.numbers.items()},
             "calculation": [
                 {"words": s.words, "formula": "" if s.formula is None else str(s.formula), "latex": s.latex}
@@ -83,17 +85,41 @@ class Finding:
         }  # fmt: skip
 
 
-def step(words: str, formula: Any = None) -> nls.CalculationStep:
+@dataclass(frozen=True, eq=False)
+class Results:
+    """All findings by chapter, in the order of reading."""
+
+    chapters: Mapping[str, tuple[Finding, ...]]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of all chapters."""
+        return tuple(finding for chapter in self.chapters.values() for finding in chapter)
+
+    @property
+    def verdicts(self) -> dict[str, int]:
+        """How many statements got each verdict."""
+        return {verdict: sum(f.verdict == verdict for f in self.findings) for verdict in OUTCOMES}
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Every number of the audit by name, and how many statements got each verdict."""
+        numbers = {name: value for each in self.findings for name, (value, _) in each.numbers.items()}
+        counts = {f"verdicts_{v.replace(' ', '_')}": float(count) for v, count in self.verdicts.items()}
+        return numbers | counts
+
+
+def step(words: str, formula: sp.Basic | None = None) -> CalculationStep:
     """Return a line of a calculation with its LaTeX."""
     if formula is None:
-        return nls.CalculationStep(words)
+        return CalculationStep(words)
     names = {s: LATEX[s.name] for s in formula.free_symbols if s.name in LATEX}
-    return nls.CalculationStep(words, formula, sympy.latex(formula, symbol_names=names))
+    return CalculationStep(words, formula, sp.latex(formula, symbol_names=names))
 
 
-def equal(left: Any, right: Any) -> Any:
+def equal(left: sp.Basic, right: sp.Basic) -> sp.Eq:
     """Return an equation as it stands, without any evaluation."""
-    return sympy.Eq(left, right, evaluate=False)
+    return sp.Eq(left, right, evaluate=False)
 
 
 def _label(name: str, unit: str) -> str:

@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from . import _audit_paper as p
+from .._published import Array
+from . import paper as p
 
 SAMPLES = 4096
 _GRID = np.linspace(0.0, 20e-3, 40_001)
 
 
-class Cam(NamedTuple):
+@dataclass(frozen=True)
+class Cam:
     """A cam by the energy that all elements hold at an angle, and the scale of the rubber behind it."""
 
-    energy: Callable[[p.Array], p.Array]
+    energy: Callable[[Array], Array]
     scale: float
 
 
-def fig8_energy(angle: p.Array) -> p.Array:
+def fig8_energy(angle: Array) -> Array:
     """Return ∫τ dθ of the power law through Fig. 8."""
-    result: p.Array = 4.35 * np.abs(angle) ** 3.09 / 3.09
+    result: Array = 4.35 * np.abs(angle) ** 3.09 / 3.09
     return result
 
 
-def target_energy(angle: p.Array) -> p.Array:
+def target_energy(angle: Array) -> Array:
     """Return ∫τ dθ of the target of 2014, 5 N·m at 53° with c = 1."""
     x = np.abs(angle)
-    result: p.Array = p.TARGET_TORQUE / np.expm1(p.TARGET_ANGLE) * (np.expm1(x) - x)
+    result: Array = p.TARGET_TORQUE / np.expm1(p.TARGET_ANGLE) * (np.expm1(x) - x)
     return result
 
 
@@ -41,13 +43,13 @@ CAMS = {
 }
 
 
-def extension_of(cam: Cam, angle: p.Array) -> p.Array:
+def extension_of(cam: Cam, angle: Array) -> Array:
     """Return δ(θ) from N·U(δ) = ∫τ dθ."""
     stored = p.ELEMENTS * cam.scale * p.static_energy(_GRID)
     return np.interp(cam.energy(angle), stored, _GRID)
 
 
-def cycle(cam: Cam, amplitude: float, frequency: float, viscosity: float, scale: float) -> dict[str, p.Array]:
+def cycle(cam: Cam, amplitude: float, frequency: float, viscosity: float, scale: float) -> dict[str, Array]:
     """Return angle, force and extension rate of one element over a steady cycle; exact for each harmonic."""
     angle = amplitude * np.sin(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES)
     extension = extension_of(cam, angle)

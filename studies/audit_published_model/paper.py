@@ -1,4 +1,4 @@
-"""What the paper prints, as numbers, symbols and equations; and the points of its figures.
+"""What the paper prints, as numbers, symbols and equations.
 
 Austin, Schepelmann, Geyer, IROS 2015. The equations (1), (3) and (4) stand here as the project's design notes
 transcribe them; where a printed form is known by its consequences only (a sign, a missing factor) the audit
@@ -7,13 +7,10 @@ rebuilds it and tests the consequence.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .._published import Array
 
 AREA, REST_LENGTH = 1e-4, 0.0125  # m², m
 STIFFNESS_PER_MODULUS = AREA / REST_LENGTH  # a, m
@@ -32,8 +29,14 @@ ENGAGED, OFF, OFFSET = sp.symbols("K K_off D", nonnegative=True)
 THETA, OMEGA, H, H_SLOPE, CURRENT = sp.symbols("θ ω h dh/dθ I", real=True)
 INERTIA, GEAR, CONSTANT, N = sp.symbols("J n k_T N", positive=True)
 
-CORRECT_FORCE_RATE = A * (K + ENGAGED) * RATE + K / ETA * (A * (ENGAGED * DELTA - OFFSET) - F)
-"""dF/dt of the network; F* = a·(K·δ − D)."""
+STATIC_FORCE = A * (ENGAGED * DELTA - OFFSET)
+"""F* between two knots, a·(K·δ − D)."""
+BRANCH_FORCE_RATE = A * K * RATE - K / ETA * F_M
+"""dF_M/dt of the spring k and the dashpot η in series."""
+CORRECT_FORCE_RATE = A * (K + ENGAGED) * RATE + K / ETA * (STATIC_FORCE - F)
+"""dF/dt of the network."""
+STATED_FORCE = F_STAR + ETA / K * A * (K + ENGAGED) * RATE - ETA / K * FORCE_RATE
+"""F as (1) has it."""
 PRINTED_FORCE_RATE = A * (K + ENGAGED + OFF) * RATE + K / ETA * (A * (ENGAGED * DELTA + OFFSET) - F)
 """dF/dt as (3) with its matrices A, B and E has it: no Heaviside in B, the other sign in E."""
 
@@ -54,20 +57,3 @@ def engaged(extension: float) -> tuple[float, float]:
     """Return Σ k* and Σ k*·δᵢ over the moduli that are engaged at an extension; a knot itself counts."""
     on = extension >= KNOTS
     return float(MODULI[on].sum()), float((MODULI * KNOTS)[on].sum())
-
-
-def points(name: str) -> Array:
-    """Return the points of one figure, shape (n, 2), in the units of the figure."""
-    file = Path(__file__).parent / "austin2015_figures" / f"{name}.csv"
-    return np.loadtxt(file, delimiter=",", comments="#", skiprows=2)
-
-
-def element_loop(degrees: int, kind: str = "measured") -> tuple[Array, Array]:
-    """Return extension in m and force in N of Fig. 6, in drawing order."""
-    extension, force = points(f"fig06_{kind}_{degrees}deg_force_vs_extension").T
-    return extension * 1e-3, force
-
-
-def closed_integral(x: Array, y: Array) -> float:
-    """Return ∮ y dx of a closed polygon in drawing order."""
-    return float(np.sum((y + np.roll(y, -1)) / 2 * (np.roll(x, -1) - x)))
