@@ -24,7 +24,8 @@ class Cam:
 
 def fig8_energy(angle: Array) -> Array:
     """Return ∫τ dθ of the power law through Fig. 8."""
-    result: Array = 4.35 * np.abs(angle) ** 3.09 / 3.09
+    factor, power = p.POWER_LAW
+    result: Array = factor * np.abs(angle) ** (power + 1.0) / (power + 1.0)
     return result
 
 

@@ -16,7 +16,15 @@ PRINTED_INERTIA, NOTED_INERTIA = 8.83e-5, 5.97e-4  # kg·m²
 
 
 def rise_time(inertia: float, load: str) -> float:
-    """Return the time to 53° at full current from rest, against nothing, the target or a straight line."""
+    """Return the time in s from rest to 53° at full current.
+
+    Parameters
+    ----------
+    inertia
+        In kg·m².
+    load
+        Resisting torque: ``"none"``, ``"target"`` (the curve of 2014) or ``"line"`` (a linear spring).
+    """
     torque = p.GEARED_CONSTANT * p.CURRENT_LIMIT
 
     def against(angle: float) -> float:
@@ -25,15 +33,15 @@ def rise_time(inertia: float, load: str) -> float:
         share = angle / p.TARGET_ANGLE
         return p.TARGET_TORQUE * (share if load == "line" else math.expm1(angle) / math.expm1(p.TARGET_ANGLE))
 
-    def there(_: float, x: Array) -> float:
+    def arrival(_: float, x: Array) -> float:
         return float(x[0] - p.TARGET_ANGLE)
 
-    there.terminal = True  # type: ignore[attr-defined]
+    arrival.terminal = True  # type: ignore[attr-defined]
     run = solve_ivp(
         lambda _, x: [x[1], (torque - against(x[0])) / inertia],
         (0.0, 0.2),
         [0.0, 0.0],
-        events=there,
+        events=arrival,
         rtol=1e-8,
     )
     return float(run.t_events[0][0])
@@ -42,7 +50,7 @@ def rise_time(inertia: float, load: str) -> float:
 def _inertia() -> list[Finding]:
     loads = ("none", "target", "line")
     printed = {load: rise_time(PRINTED_INERTIA, load) for load in loads}
-    # The time goes with the root of the inertia.
+    # The time is proportional to the square root of the inertia.
     implied = {(load, t): PRINTED_INERTIA * (t / printed[load]) ** 2 for load in loads for t in RISE_TIMES}
     t, j, angle = sp.symbols("t J θ_m", positive=True)
     steps = (
@@ -59,7 +67,7 @@ def _inertia() -> list[Finding]:
             PAPER,
             statement="J = 8.83e-5 kg·m² (2014) goes with rise times of 16 and 18.3 ms",
             verdict=FAILS if max(printed.values()) < 0.6 * min(RISE_TIMES) else HOLDS,
-            why="With that inertia and 4.4 N·m the drive would be there in 6 to 7 ms, whatever it works against.",
+            why="With that inertia and 4.4 N·m the drive takes 6 to 7 ms, whatever it works against.",
             steps=steps,
             numbers={"rise_time_with_printed_inertia_ms": (1e3 * max(printed.values()), "ms")},
         ),
@@ -69,8 +77,8 @@ def _inertia() -> list[Finding]:
             statement="The rise times give J = 5.97e-4 kg·m² with n·kT = 0.220 N·m/A and 20 A",
             verdict=OPEN,
             why="5.97e-4 lies inside what 16 and 18.3 ms allow; unloaded it takes 15.8 ms. What the times "
-            "were measured against, and to which angle, is not in the notes: anything from 4.7e-4 to "
-            "8.0e-4 can be had.",
+            "were measured against, and to which angle, is not in the notes: any inertia from 4.7e-4 to "
+            "8.0e-4 is possible.",
             steps=steps,
             numbers={
                 "smallest_inertia_from_rise_times_kg_m2": (min(implied.values()), "kg·m²"),
@@ -114,7 +122,8 @@ def _below_crossover() -> Finding:
     return Finding(
         "C.4",
         NOTES,
-        statement="Below crossover zero-torque RMS ≈ θ_a·ω/(√2·Kp), whatever the spring; Kp = 32 meets Fig. 9",
+        statement="Below crossover zero-torque RMS ≈ θ_a·ω/(√2·Kp), whatever the spring; "
+        "Kp = 32 meets Fig. 9",
         verdict=HOLDS if agree and free else FAILS,
         why="The stiffness drops out of the slow limit: the gain, not the spring, sets what Fig. 9 shows "
         "there. The amplitude of ±10° is assumed; only its ratio to Kp is tested.",
@@ -134,9 +143,10 @@ def _below_crossover() -> Finding:
 
 
 def _stiffening() -> Finding:
-    angle = (2.8 / 4.35) ** (1 / 2.09)
-    slopes = {"power law of Fig. 8": 2.09 * 2.8 / angle}
-    for c in (1.0, 3.62):
+    factor, power = p.POWER_LAW
+    angle = (2.8 / factor) ** (1 / power)
+    slopes = {"power law of Fig. 8": power * 2.8 / angle}
+    for c in (1.0, p.BEST_SHAPE):
         scale = p.TARGET_TORQUE / math.expm1(c * p.TARGET_ANGLE)
         slopes[f"exponential, c = {c:g}"] = c * (2.8 + scale)
     change = 20 * math.log10(18.0 / 5.7)
@@ -144,11 +154,12 @@ def _stiffening() -> Finding:
     return Finding(
         "C.5",
         NOTES,
-        statement="At 2.8 N·m the tangent stiffness is 5.7 to 18 N·m/rad, not 3.4; gain margin +4.9 → −5.2 dB",
+        statement="At 2.8 N·m the tangent stiffness is 5.7 to 18 N·m/rad, not 3.4; "
+        "gain margin +4.9 → −5.2 dB",
         verdict=OPEN,
         why="All laws that the figures allow lie above 3.4 and inside the stated range, but its upper end "
-        "is not reached by any of them at rest. The fall of the margin is just the ratio of the two "
-        "ends, so it stands or falls with them.",
+        "is not reached by any of them at rest. The fall of the margin is the ratio of the two ends, "
+        "so it holds only if they do.",
         steps=(
             step("At 2.8 N·m in N·m/rad: " + ", ".join(f"{v:.1f} ({n})" for n, v in slopes.items())),
             step(f"Ratio of the ends in dB: {change:.1f}; stated: 10.1."),

@@ -99,8 +99,8 @@ def _sign() -> Finding:
         verdict=HOLDS if max(areas.values()) < 0.0 and in_time else FAILS,
         why="The drawing order is that of time: the forces of the loop come in the same order as on the "
         f"time axis of the same figure. A force that is read {1e3 * min(lags.values()):.1f} to "
-        f"{1e3 * max(lags.values()):.1f} ms late is enough to turn the sign, so the records were not "
-        "aligned to that.",
+        f"{1e3 * max(lags.values()):.1f} ms late is enough to change the sign, so the records were not "
+        "aligned to that accuracy.",
         steps=(
             step(
                 "Polygon in drawing order:",
@@ -131,8 +131,8 @@ def _model_sign() -> Finding:
         PAPER,
         statement="The model curves of Fig. 6 are those of the printed law",
         verdict=AGAINST_FIGURES if max(areas.values()) < 0.0 else HOLDS,
-        why="They too are run through the wrong way, which item 8.2 excludes for every choice of parameters. An "
-        "observer that was fed with the measured records inherits their misalignment.",
+        why="They too have the sign of an active element, which item 8.2 excludes for every choice of "
+        "parameters. An observer that is driven by the measured records inherits their misalignment.",
         steps=(step("Item 8.2 over a cycle:", equal(sp.Symbol("W"), sp.Symbol("∫ F_M²/(a·η) dt"))),),
         numbers={
             "fig6_model_loop_25_deg_mJ": (1e3 * areas[25], "mJ"),

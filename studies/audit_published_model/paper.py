@@ -20,6 +20,8 @@ KNOTS = np.array([0.0, 0.20, 1.06, 2.65, 9.04, 9.05]) * 1e-3  # m
 ELEMENTS, FORCE_SCALE = 2, 2.55
 FIG6_CAPTION_FREQUENCY = 4.0  # Hz
 TARGET_TORQUE, TARGET_ANGLE = 5.0, float(np.radians(53.0))  # N·m, rad; 2014
+POWER_LAW = 4.35, 2.09  # factor in N·m and power of the torque over the angle in rad through Fig. 8
+BEST_SHAPE = 3.62  # of the exponential of 2014 through Fig. 8
 GEARED_CONSTANT, CURRENT_LIMIT = 0.220, 20.0  # N·m/A, A
 
 F, F_M, F_STAR, DELTA, RATE, FORCE_RATE = sp.symbols("F F_M F* δ dδ/dt dF/dt", real=True)

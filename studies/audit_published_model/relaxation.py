@@ -83,7 +83,7 @@ def _misalignment() -> Finding:
         statement="411 Pa·s is equivalent to 0.27 ms of misalignment between force and angle",
         verdict=HOLDS if abs(shifts[0.5e-3] - 0.27) < 5e-3 else FAILS,
         why="It is, between the first and the third knot (0.20 to 1.06 mm); at 3.5 mm it is half of that. "
-        "The loops of Fig. 6 need a shift of 0.4 to 0.6 ms only to be turned round (item 8.4), so the "
+        "The loops of Fig. 6 need a shift of 0.4 to 0.6 ms only to change their sign (item 8.4), so the "
         "printed viscosity lies within the timing error of the records it was fitted to.",
         steps=(
             step(
@@ -163,9 +163,8 @@ def _sign_of_fig1() -> Finding:
         PAPER,
         statement="The loops of Fig. 1 are run through as those of a passive spring",
         verdict=OPEN,
-        why="In drawing order both are run through the wrong way, as those of Fig. 6; but they are means "
-        "over cycles and the figure has no time axis, so the order in which they were drawn need not be "
-        "that of time.",
+        why="In drawing order both have the sign of an active element, as those of Fig. 6; but they are "
+        "means over cycles and the figure has no time axis, so the drawing order need not be that of time.",
         steps=(
             step(
                 "Areas in drawing order in mJ per cycle: "
@@ -200,8 +199,8 @@ def _viscosity() -> Finding:
         NOTES,
         statement="A loop width like Fig. 1 needs η of 10–30 kPa·s",
         verdict=OPEN,
-        why="It holds if Fig. 1 was driven at 0.7 to 2 Hz: the viscosity goes with one over the frequency, "
-        "which is not printed. At 1 Hz it is 21 kPa·s, fifty times the printed number.",
+        why="It holds if Fig. 1 was driven at 0.7 to 2 Hz: the viscosity is proportional to the period, which "
+        "is not printed. At 1 Hz it is 21 kPa·s, fifty times the printed number.",
         steps=(step("Needed: " + ", ".join(f"{1e-3 * v:.1f} kPa·s at {f:g} Hz" for f, v in needed.items())),),
         numbers={"viscosity_for_fig1_at_1_Hz_kPa_s": (1e-3 * needed[1.0], "kPa·s")},
     )
@@ -240,8 +239,8 @@ def _size_of_loops() -> Finding:
         PAPER,
         statement="The loops are of 17 %",
         verdict=OPEN,
-        why="By energy the loops of the figures lose 8 to 13 % of what is put in. What the 17 % are a share of "
-        "is not in the notes.",
+        why="By energy the loops of the figures lose 8 to 13 % of what is put in. The notes do not state "
+        "what the 17 % are a share of.",
         steps=(step("Lost over put in: " + ", ".join(f"{v:.1f} % ({n})" for n, v in shares.items())),),
         numbers={
             "smallest_loss_of_the_figures_percent": (min(shares.values()), "%"),
@@ -288,7 +287,7 @@ def _prony() -> Finding:
         across="frequency, middle of the band = 1",
         up="tan δ",
         logarithmic=True,
-        words="Loss tangent over two decades: one relaxation time varies manifold, three stay near 0.17.",
+        words="Loss tangent over two decades: one relaxation time varies by far, three stay near 0.17.",
     )
     return Finding(
         "7.6",
