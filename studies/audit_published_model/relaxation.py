@@ -199,7 +199,7 @@ def _viscosity() -> Finding:
         NOTES,
         statement="A loop width like Fig. 1 needs η of 10–30 kPa·s",
         verdict=OPEN,
-        why="It holds if Fig. 1 was driven at 0.7 to 2 Hz: the viscosity is proportional to the period, which "
+        why="It holds if Fig. 1 was driven at 0.7 to 2 Hz: the viscosity grows with the period, which "
         "is not printed. At 1 Hz it is 21 kPa·s, fifty times the printed number.",
         steps=(step("Needed: " + ", ".join(f"{1e-3 * v:.1f} kPa·s at {f:g} Hz" for f, v in needed.items())),),
         numbers={"viscosity_for_fig1_at_1_Hz_kPa_s": (1e-3 * needed[1.0], "kPa·s")},
