@@ -13,17 +13,8 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 import nlsdesign as nls
-from nlsdesign.discrepancy import Verdict, predict
-from nlsdesign.identification import (
-    RecordSet,
-    Shots,
-    Weights,
-    coloured_sigma,
-    fit_by_simulation,
-    free_parameter,
-    predict_in_windows,
-)
-from nlsdesign.model import Assembly
+from nlsdesign.discrepancy import Verdict
+from nlsdesign.identification import Shots, Weights, coloured_sigma
 from nlsdesign.report import PublishedNumber, TableSection, comparison_table, verdict_sections
 
 from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
@@ -116,7 +107,7 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
         write_skipped("emps", out)
         return None
     steps = nls.progress.Steps()
-    published: Assembly = nls.models.positioning_drive(nls.load_deck("janot2019_positioning_drive"))
+    published = nls.models.positioning_drive(nls.load_deck("janot2019_positioning_drive"))
     bare = viscous_only(published)
     records = nls.load_records(folder, nls.flatten(bare), mapping=MAPPING)
     with steps.step("diagnosis"):
@@ -136,7 +127,7 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
     return results
 
 
-def viscous_only(published: Assembly) -> Assembly:
+def viscous_only(published: nls.Assembly) -> nls.Assembly:
     """Return the drive with mass and viscous friction alone, known to a factor of three."""
     bare = published
     for name in MISSING:
@@ -148,31 +139,32 @@ def viscous_only(published: Assembly) -> Assembly:
     )
 
 
-def refitted(verdict: Verdict, records: RecordSet) -> Assembly:
+def refitted(verdict: Verdict, records: nls.RecordSet) -> nls.Assembly:
     """Return the better model, fitted by simulation over one second on top of the balance of forces."""
     model = nls.flatten(verdict.actuator)
-    free = [free_parameter(model.variable(p.name)) for fit in verdict.fits for p in fit.parameters]
+    free = [nls.free_parameter(model.variable(p.name)) for fit in verdict.fits for p in fit.parameters]
     shots, train = Shots(SHORT, joined=False, phases=PHASES), records.of("fit")
-    alone = fit_by_simulation(model, train, free, shots=shots)
+    alone = nls.fit_by_simulation(model, train, free, shots=shots)
     weights = Weights(coloured_sigma(alone), known=verdict.fits)
-    both = fit_by_simulation(model, train, free, shots=shots, weights=weights)
+    both = nls.fit_by_simulation(model, train, free, shots=shots, weights=weights)
     return verdict.actuator.with_values(both.fit.values)
 
 
-def drive_error(drive: Assembly, records: RecordSet) -> DriveError:
+def drive_error(drive: nls.Assembly, records: nls.RecordSet) -> DriveError:
     """Return the errors of a drive on the held-out half."""
     model, (record,) = nls.flatten(drive), records.of("held_out")
     short, long = (
-        1e3 * predict_in_windows(model, record, length).rmse("carriage.position") for length in (SHORT, LONG)
+        1e3 * nls.predict_in_windows(model, record, length).rmse("carriage.position")
+        for length in (SHORT, LONG)
     )
-    unbalanced = predict(drive, records, record.name)["carriage.unbalanced"]
+    unbalanced = nls.predict(drive, records, record.name)["carriage.unbalanced"]
     force = model.values["carriage.force_constant"] * record.trace["carriage.voltage"]
     sections = butter(4, BANDWIDTH, fs=1.0 / record.step, output="sos")
     rest, whole = (sosfiltfilt(sections, signal)[EDGE:-EDGE] for signal in (unbalanced, force))
     return DriveError(short, long, float(100.0 * np.linalg.norm(rest) / np.linalg.norm(whole)))
 
 
-def fitted_numbers(drive: Assembly) -> dict[str, float]:
+def fitted_numbers(drive: nls.Assembly) -> dict[str, float]:
     """Return mass, friction and offset of a drive in SI."""
     values = nls.flatten(drive).values
     return {name: values[parameter] for name, (parameter, _) in FITTED.items()}

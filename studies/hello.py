@@ -44,5 +44,5 @@ def main(out: Path, fast: bool = False) -> Results:
     run = nls.simulate(model, time, inputs=drive, hold=True)
     estimate = nls.observe(nls.design_observer(model), run)["spring.torque"]
     error = float(np.sqrt(np.mean((estimate - run["spring.torque"])[500:] ** 2)))
-    nls.write_report(out / "report.html", nls.numbers_table("Design", design.values), title="Hello")
+    nls.write_report(out / "report.html", nls.report.numbers_table("Design", design.values), title="Hello")
     return Results(1e3 * design.rms, float(chart["observability.rank"][0]), 1e3 * error)

@@ -26,21 +26,9 @@ from nlsdesign.components import (
     generalised_maxwell,
     kelvin_voigt,
     maxwell,
-    standard_linear_solid,
 )
-from nlsdesign.identification import (
-    Agreement,
-    Record,
-    Shots,
-    agreement,
-    fit_by_simulation,
-    free_parameter,
-    noise_of,
-    predict_in_windows,
-)
-from nlsdesign.model import Assembly, FlatModel
+from nlsdesign.identification import Agreement, Shots, agreement, noise_of
 from nlsdesign.report import FigureSection, TableSection
-from nlsdesign.simulation import Trace
 
 from ._published import (
     FIG6_SAMPLE,
@@ -142,18 +130,18 @@ def laws() -> dict[str, Element]:
         "Hooke": LinearElastic(modulus=q(3.0, "MPa")),
         "Kelvin-Voigt": kelvin_voigt(modulus=3e6, viscosity=3e3),
         "Maxwell": maxwell(modulus=4e6, viscosity=1e6),
-        "standard linear solid": standard_linear_solid(3e6, **one_time),
+        "standard linear solid": nls.standard_linear_solid(3e6, **one_time),
         "Burgers": burgers(modulus=4e6, flow=1e7, late_modulus=1e7, late_viscosity=1e5),
-        "stiffening solid (printed)": standard_linear_solid(stiffening, **one_time),
-        "stiffening solid, rounded": standard_linear_solid(rounded, **one_time),
+        "stiffening solid (printed)": nls.standard_linear_solid(stiffening, **one_time),
+        "stiffening solid, rounded": nls.standard_linear_solid(rounded, **one_time),
         "stiffening, three times": generalised_maxwell(
             stiffening, moduli=(5e5, 5e5, 5e5), times=(0.01, 0.1, 1.0)
         ),
-        "Yeoh with one time": standard_linear_solid(yeoh, **one_time),
+        "Yeoh with one time": nls.standard_linear_solid(yeoh, **one_time),
     }
 
 
-def element(actuator: Assembly, law: Element) -> Assembly:
+def element(actuator: nls.Assembly, law: Element) -> nls.Assembly:
     """Return one rubber element of the actuator with another law, pulled by a grip."""
     size = {name: actuator.quantities()[f"spring.rubber.{name}"] for name in ("area", "rest_length")}
     piece = nls.specimen(area=size["area"], rest_length=size["rest_length"], law=law)
@@ -165,14 +153,16 @@ class Stretches:
     """Records of one element, to fit and to judge on, with the integration steps per sample."""
 
     name: str
-    train: Sequence[Record]
-    test: Sequence[Record]
+    train: Sequence[nls.Record]
+    test: Sequence[nls.Record]
     substeps: int
 
 
-def stretch_record(name: str, time: Array, extension: Array, force: Array) -> Record:
+def stretch_record(name: str, time: Array, extension: Array, force: Array) -> nls.Record:
     """Return a record of extension in m and force in N over time in s."""
-    return Record(name, Trace(time, {EXTENSION: extension, FORCE: force}, {EXTENSION: "m", FORCE: "N"}, name))
+    return nls.Record(
+        name, nls.Trace(time, {EXTENSION: extension, FORCE: force}, {EXTENSION: "m", FORCE: "N"}, name)
+    )
 
 
 def fig6_stretches() -> Stretches:
@@ -185,14 +175,14 @@ def fig6_stretches() -> Stretches:
     return Stretches("fig6", records[:1], records[1:], 2)
 
 
-def bench_stretches(actuator: Assembly) -> Stretches:
+def bench_stretches(actuator: nls.Assembly) -> Stretches:
     """Return the bench records as extension and force; the held-out ones to judge on."""
     rig = with_bench_sensors(actuator)
     model = nls.flatten(rig)
     extension = np.array([extension_at(model, angle) for angle in ANGLES])
     records = bench_records(rig)
 
-    def stretch(record: Record) -> Record:
+    def stretch(record: nls.Record) -> nls.Record:
         trace, rows = record.trace, slice(None, None, THINNING)
         path = np.interp(trace["motor_encoder.reading"], ANGLES, extension)
         return stretch_record(record.name, trace.time[rows], path[rows], trace["load_cell.reading"][rows])
@@ -201,7 +191,7 @@ def bench_stretches(actuator: Assembly) -> Stretches:
     return Stretches("bench", train, test, 4)
 
 
-def extension_at(model: FlatModel, angle: float) -> float:
+def extension_at(model: nls.FlatModel, angle: float) -> float:
     """Return the extension of the cable in m at an angle of the motor in rad."""
     state = model.start(model.states)
     state[[v.name for v in model.states].index("motor.angle")] = angle
@@ -211,31 +201,31 @@ def extension_at(model: FlatModel, angle: float) -> float:
 # --- fit and judgement ----------------------------------------------------------------------------
 
 
-def compare(law: str, model: FlatModel, records: Stretches) -> Comparison:
+def compare(law: str, model: nls.FlatModel, records: Stretches) -> Comparison:
     """Fit a model to the training records and judge it on both kinds."""
     fitted = fit(model, records)
     train, test = (judge(fitted, each, records.substeps) for each in (records.train, records.test))
     return Comparison(records.name, law, train, test)
 
 
-def fit(model: FlatModel, records: Stretches) -> FlatModel:
+def fit(model: nls.FlatModel, records: Stretches) -> nls.FlatModel:
     """Return the model fitted to the training records; nothing is known of its numbers but a start."""
     free = [
-        free_parameter(v, reach=100.0)
+        nls.free_parameter(v, reach=100.0)
         for v in model.parameters
         if v.name.rpartition(".")[2].partition("[")[0] in FITTED
     ]
     # The whole record from rest: a window longer than any record, that begins where the model does.
     shots = Shots(1e3, joined=False, substeps=records.substeps)
-    return model.with_values(fit_by_simulation(model, records.train, free, shots=shots).fit.values)
+    return model.with_values(nls.fit_by_simulation(model, records.train, free, shots=shots).fit.values)
 
 
-def judge(model: FlatModel, records: Sequence[Record], substeps: int) -> Judgement:
+def judge(model: nls.FlatModel, records: Sequence[nls.Record], substeps: int) -> Judgement:
     """Simulate whole records and compare with the measured force."""
     measured, simulated = [], []
     for record in records:
         length = record.trace.time[-1] - record.trace.time[0]
-        prediction = predict_in_windows(model, record, length, substeps=substeps)
+        prediction = nls.predict_in_windows(model, record, length, substeps=substeps)
         measured.append(record.trace[FORCE][: len(prediction.time)])
         simulated.append(measured[-1] + prediction.error[FORCE])
     noise = float(np.median([noise_of(force) for force in measured]))

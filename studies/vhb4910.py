@@ -15,9 +15,7 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.components import FlowingChains, NeoHooke
 from nlsdesign.deck import Deck
-from nlsdesign.discrepancy import Verdict, predict
-from nlsdesign.identification import Record, RecordSet
-from nlsdesign.model import Assembly
+from nlsdesign.discrepancy import Verdict
 from nlsdesign.report import TableSection, verdict_sections
 
 from ._measured import data_folder, named_effects, write_diagnosis, write_skipped
@@ -115,9 +113,9 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
     return results
 
 
-def elastic_strip(deck: Deck) -> Assembly:
+def elastic_strip(deck: Deck) -> nls.Assembly:
     """Return the strip of the deck with an elastic law alone, whose modulus is known to a factor of three."""
-    declared: Assembly = nls.models.elastomer_specimen(deck)
+    declared = nls.models.elastomer_specimen(deck)
     size = {name: declared.quantities()[f"strip.rubber.{name}"] for name in ("area", "rest_length")}
     modulus = nls.quantity(40.0, "kPa", source="assumed: an order of magnitude", spread=2.0)
     rubber = nls.specimen(
@@ -128,19 +126,19 @@ def elastic_strip(deck: Deck) -> Assembly:
     return declared.with_part("strip", rubber)
 
 
-def strip_error(strip: Assembly, records: RecordSet) -> StripError:
+def strip_error(strip: nls.Assembly, records: nls.RecordSet) -> StripError:
     """Return the errors of a strip on the tests of the fit and on the held-out test."""
 
-    def percent(tests: Sequence[Record]) -> float:
+    def percent(tests: Sequence[nls.Record]) -> float:
         measured = [test.trace[FORCE] for test in tests]
-        predicted = [predict(strip, replace(records, records=(t,)), t.name)[FORCE] for t in tests]
+        predicted = [nls.predict(strip, replace(records, records=(t,)), t.name)[FORCE] for t in tests]
         rest = np.concatenate(predicted) - np.concatenate(measured)
         return float(100.0 * np.linalg.norm(rest) / np.linalg.norm(np.concatenate(measured)))
 
     return StripError(percent(records.of("fit")), percent(records.of("held_out")))
 
 
-def relaxation_times(strip: Assembly) -> tuple[float, ...]:
+def relaxation_times(strip: nls.Assembly) -> tuple[float, ...]:
     """Return viscosity over shear modulus of each branch that flows, shortest first."""
     branches = [part for _, part in strip.walk() if isinstance(part, FlowingChains)]
     return tuple(sorted(b.viscosity.number / b.shear_modulus.number for b in branches))

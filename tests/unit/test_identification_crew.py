@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.parallel import shared_out
+from nlsdesign.parallel_map import shared_out
 
 ENDLESS = """
 import time
-from nlsdesign.parallel import shared_out
+from nlsdesign.parallel_map import shared_out
 
 def work(number):
     print("at work", flush=True)

@@ -18,7 +18,7 @@ from ...identification.estimation.parameters import free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
 from ...model import Assembly, Variable
-from ...parallel import shared_out
+from ...parallel_map import shared_out
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from .hypothesis import Hypothesis

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from ...errors import ConvergenceError
-from ...parallel import shared_out
+from ...parallel_map import shared_out
 from ..effects.candidate import Candidate, Effect
 from .comparison import Comparison
 from .excess import DECLARED, Excess, excesses, explained, total_excess
