@@ -1,4 +1,4 @@
-"""``nlsdesign parts``: what a deck can be made of."""
+"""``nlsdesign parts``: the components that a deck can name."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ..components import Body, Cam, Element, Gear, Part, Sensor
 from ..components.assembly.deck_reader import component_classes
 from ..components.core.part import ParameterInfo
 from ..errors import unknown_name
+from ..quantity import typeset_unit
 from .output import json_option, show_json, show_table
 
 _KINDS: dict[str, type[Part]] = {
@@ -43,12 +44,14 @@ def parts(name: str | None, as_json: bool) -> None:
         return
     click.echo(f"{name} ({_kind(known[name])})\n\n{inspect.getdoc(known[name])}\n")
     columns = ("name", "unit", "from", "to", "meaning")
-    numbers = [(n, i.unit, f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()]
+    numbers = [
+        (n, typeset_unit(i.unit), f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()
+    ]
     show_table("Numbers", columns, numbers)
 
 
 def _kind(part: type[Part]) -> str:
-    return next(word for word, base in _KINDS.items() if issubclass(part, base))
+    return next(kind for kind, base in _KINDS.items() if issubclass(part, base))
 
 
 def _law(part: type[Part]) -> str:
@@ -60,7 +63,7 @@ def _meaning(info: ParameterInfo) -> str:
 
 
 def _plain(infos: dict[str, ParameterInfo]) -> dict[str, dict[str, object]]:
-    # JSON knows no infinity.
+    # JSON has no infinity.
     return {
         n: {
             "unit": i.unit,

@@ -1,4 +1,4 @@
-"""``nlsdesign study``: list and run design studies, and hold their numbers against what they claim."""
+"""``nlsdesign study``: list and run design studies, and compare their numbers with the claimed ones."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ import click
 from ..errors import NlsError, unknown_name
 from ..locations import bundled, folder
 from ..progress import Steps
+from ..quantity import with_unit
 from .output import json_option, show_json, show_table
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A number that a study claims: value, unit, and how far off it may be.
+    """A number that a study claims, with unit and tolerance.
 
     Parameters
     ----------
@@ -37,15 +38,15 @@ class Claim:
     unit: str
     why: str
 
-    def holds(self, found: float) -> bool:
+    def holds(self, result: float) -> bool:
         """Tell whether a result agrees with the claim.
 
         Parameters
         ----------
-        found
+        result
             Result in the same unit.
         """
-        return abs(found - self.value) <= self.tolerance
+        return abs(result - self.value) <= self.tolerance
 
 
 def study_names() -> list[str]:
@@ -83,7 +84,7 @@ def load_study(name: str) -> Any:
 
 
 def claims(name: str) -> dict[str, Claim]:
-    """Return what a study claims in ``expected.toml``.
+    """Return the claims of a study in ``expected.toml``.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def list_studies() -> None:
 @click.option("--fast", is_flag=True, help="Coarser and shorter, for a first look.")
 @json_option
 def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
-    """Run a study; exit status 1 if one of its numbers is not the one that it claims."""
+    """Run a study; exit status 1 if a number differs from its claim."""
     module = load_study(name)
     target = out if out is not None else Path("out") / Path(name).stem
     target.mkdir(parents=True, exist_ok=True)
@@ -135,12 +136,12 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
         )
         click.echo(f"report: {target / 'report.html'}")
     for key in failed:
-        wanted = f"{expected[key].value:.4g} ± {expected[key].tolerance:.2g}"
-        click.echo(f"not as claimed: {key} = {results[key]:.4g}, expected {wanted}", err=True)
+        expectation = f"{expected[key].value:.4g} ± {expected[key].tolerance:.2g}"
+        click.echo(f"not as claimed: {key} = {results[key]:.4g}, expected {expectation}", err=True)
     sys.exit(1 if failed and not fast else 0)
 
 
 def _row(key: str, value: float, claim: Claim | None) -> tuple[str, str, str]:
-    unit = f" {claim.unit}" if claim and claim.unit != "1" else ""
-    told = f"{claim.value:.4g} ± {claim.tolerance:.2g}{unit}" if claim else ""
-    return key, f"{value:.4g}{unit}", told
+    unit = claim.unit if claim else "1"
+    claimed = with_unit(f"{claim.value:.4g} ± {claim.tolerance:.2g}", unit) if claim else ""
+    return key, with_unit(f"{value:.4g}", unit), claimed
