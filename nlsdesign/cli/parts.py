@@ -1,4 +1,4 @@
-"""``nlsdesign parts``: what a deck can be made of."""
+"""``nlsdesign parts``: the components that a deck can name."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import unknown_name
+from ..quantity import typeset_unit
 from .output import json_option, show_json, show_table
 
 if TYPE_CHECKING:
@@ -39,7 +40,9 @@ def parts(name: str | None, as_json: bool) -> None:
         return
     click.echo(f"{name} ({_kind(known[name])})\n\n{inspect.getdoc(known[name])}\n")
     columns = ("name", "unit", "from", "to", "meaning")
-    numbers = [(n, i.unit, f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()]
+    numbers = [
+        (n, typeset_unit(i.unit), f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()
+    ]
     show_table("Numbers", columns, numbers)
 
 
@@ -61,7 +64,7 @@ def _meaning(info: ParameterInfo) -> str:
 
 
 def _plain(infos: dict[str, ParameterInfo]) -> dict[str, dict[str, object]]:
-    # JSON knows no infinity.
+    # JSON has no infinity.
     return {
         n: {
             "unit": i.unit,

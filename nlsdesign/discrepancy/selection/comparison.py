@@ -18,7 +18,7 @@ from ...identification.estimation.parameters import free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
 from ...model import Assembly, Variable
-from ...parallel_map import shared_out
+from ...parallel import parallel_map
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from .hypothesis import Hypothesis
@@ -191,7 +191,7 @@ class Comparison:
         if not any(known is hypothesis for known, _ in self._known):
             fitted = [DrivenBlock(b, ()) for b in blocks_of(hypothesis.fitted, self.bench.records.signals)]
             seen = [e for b in fitted for e in self.bench.evidence(b, self.bench.records.records, {})]
-            found = tuple(shared_out(lambda k: _judged(seen[k]), len(seen)))
+            found = tuple(parallel_map(lambda k: _judged(seen[k]), len(seen)))
             told = tuple(
                 Judged(e.driven.block, e.record, e.floor, *pair) for e, pair in zip(seen, found, strict=True)
             )
@@ -215,7 +215,7 @@ class Comparison:
     ) -> Hypothesis:
         values, fits = dict(before.values), dict(before.fits)
         chi2, rows, worth = dict(before.chi2), dict(before.rows), dict(before.worth)
-        done = shared_out(lambda k: self._trials.settled(before, groups[k], new), len(groups))
+        done = parallel_map(lambda k: self._trials.settled(before, groups[k], new), len(groups))
         rough, gone = before.rough, before.astray
         for group, (best, told, quick) in zip(groups, done, strict=True):
             if isinstance(best, ConvergenceError):

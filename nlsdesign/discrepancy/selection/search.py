@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from ...errors import ConvergenceError
-from ...parallel_map import shared_out
+from ...parallel import parallel_map
 from ..effects.candidate import Candidate, Effect
 from .comparison import Comparison
 from .excess import DECLARED, Excess, excesses, explained, total_excess
@@ -205,7 +205,7 @@ class _Seeker:
                 return error  # no response anywhere near its starts, or too dear: it explains nothing
 
         found = {}
-        for number, one in zip(order, shared_out(fitted, len(tasks)), strict=True):
+        for number, one in zip(order, parallel_map(fitted, len(tasks)), strict=True):
             candidate = tasks[number][1]
             self._progress(f"trying {candidate.effect} at {candidate.location}")
             if isinstance(one, ConvergenceError):
