@@ -100,7 +100,15 @@ class EstimateDeviation(View):
     sample_time: float = 1e-3
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If an output or a state has another name in the model.
+        ValueRangeError
+            If a standard deviation of the measurement is not positive.
+        """
         outputs, states = {v.name for v in model.outputs}, {v.name for v in model.states}
         for name in (self.estimate, *self.measurement):
             if name not in outputs:

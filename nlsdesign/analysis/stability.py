@@ -32,7 +32,13 @@ class Stability(View):
     torque: str = "spring.torque"
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If the torque is no output of the model.
+        """
         if self.torque not in {v.name for v in model.outputs}:
             raise unknown_name("output", self.torque, (v.name for v in model.outputs))
         return (

@@ -125,6 +125,8 @@ def closed_form(
     ------
     InfeasibleError
         As :func:`energy_profile`.
+    ValueRangeError
+        If fewer than three angles are asked for.
     """
     if points < 3:
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")

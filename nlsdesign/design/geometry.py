@@ -120,6 +120,11 @@ class Contour:
         -------
         numpy.ndarray
             Shape (2, 2): contact point, then anchor.
+
+        Raises
+        ------
+        ValueRangeError
+            If the angle lies beyond the end of the contour.
         """
         if abs(angle) > self.angles[-1] * (1 + 1e-9) + 1e-12:
             raise ValueRangeError(

@@ -125,6 +125,11 @@ class ExponentialTorque(Target):
     shape
         c; negative for a softening curve. Zero would be a straight line: see :class:`PowerTorque`.
 
+    Raises
+    ------
+    ValueRangeError
+        If the shape is zero, which would be a straight line.
+
     Examples
     --------
     >>> from nlsdesign.quantity import degrees

@@ -135,7 +135,13 @@ class OwnNames(SwitchScope):
         return found
 
     def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state."""
+        """Declare a state.
+
+        Raises
+        ------
+        ArrangementError
+            If two equations claim the state.
+        """
         full = f"{self.path}.{name}"
         if full in self._ledger.states:
             raise ArrangementError(full, "two equations claim this state")

@@ -153,6 +153,11 @@ class Modes:
         With switches.
     span
         Whole time that is simulated, in s.
+
+    Raises
+    ------
+    ValueError
+        If the model has no switches.
     """
 
     def __init__(self, model: FlatModel, span: float) -> None:

@@ -102,6 +102,11 @@ class Trace:
         Signals that left the range in which their law is stated to hold.
     events
         What happened, in order of time.
+
+    Raises
+    ------
+    MeasurementError
+        If a signal has another number of samples than time.
     """
 
     time: Array
