@@ -9,7 +9,7 @@ import numpy as np
 
 import nlsdesign as nls
 
-from ._austin2015_bench import with_bench_sensors
+from ._published import with_bench_sensors
 
 HERE = Path(__file__).parent
 FORCE, SAMPLE = "rubber.force", 0.4e-3  # s; distance of the points of Fig. 6 on its time axis

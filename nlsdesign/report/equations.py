@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from .sections import Place, Section
+from .sections import PagePosition, Section
 
 if TYPE_CHECKING:
     from ..model.equations import Equations
@@ -28,7 +28,7 @@ class EquationsSection(Section):
     caption: str = ""
     template: ClassVar[str] = "equations.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the rows of the derivatives and of the definitions."""
         from .mathml import equation_rows
 

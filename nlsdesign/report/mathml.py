@@ -1,7 +1,7 @@
-"""Equations as MathML, which browsers typeset without any library, names in full.
+"""Equations as MathML, which browsers typeset without a library, with full names.
 
-Every text is escaped here (SymPy's own printer does not), products carry a visible dot because names have
-many letters, and a long sum is several formulas in a row, so that it wraps like words.
+Every text is escaped here (SymPy's printer does not escape), products carry a visible dot because names have
+several letters, and a long sum is a row of formulas, so that its lines wrap.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def formula(expression: Any) -> Html:
     Parameters
     ----------
     expression
-        Anything SymPy; what has no layout here stands as SymPy writes it.
+        Any SymPy expression; one without a layout here is printed as by SymPy.
     """
     return _math(_layout(expression))
 
