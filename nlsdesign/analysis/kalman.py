@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 def discrete_noise(a: Array, density: Array, sample_time: float) -> tuple[Array, Array]:
     """Return Φ = e^(AT) and the covariance ∫₀ᵀ e^(At)·W·e^(Aᵀt) dt of white noise over one sample.
 
-    Source: Van Loan, Computing integrals involving the matrix exponential, 1978.
+    Source: Van Loan 1978.
 
     Parameters
     ----------

@@ -3,8 +3,8 @@
 Between events the modes of all switches are held, so each step sees smooth equations only. For each switch
 the model gives a number that is not negative while its mode lasts; it is looked at in the middle and at the
 end of each step. Where one has become negative, the step is taken anew with shorter and shorter lengths until
-the moment is known. Source: Shampine and Thompson 2000, Event location for ordinary differential equations;
-for the laws that hold a rate, Pfeiffer and Glocker 1996, Multibody Dynamics with Unilateral Contacts.
+the moment is known. Source: Shampine and Thompson 2000;
+Pfeiffer and Glocker 1996 (laws that hold a rate).
 """
 
 from __future__ import annotations
