@@ -79,6 +79,8 @@ def load_study(name: str) -> ModuleType:
     ------
     UnknownNameError
         If there is no such study.
+    NlsError
+        If there is no such file, or it cannot be loaded as Python.
     """
     path = Path(name)
     if path.suffix != ".py":

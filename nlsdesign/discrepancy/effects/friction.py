@@ -146,7 +146,7 @@ def quadratic_drag(assembly: Assembly) -> Sequence[Candidate]:
                 edited,
                 unknowns,
                 "a torque against the motion that grows with the square of the speed",
-                "any text on fluids",
+                "Newton 1687, book II; Batchelor 1967",
             )
         )
     return found
@@ -204,7 +204,7 @@ def load_dependent_friction(assembly: Assembly) -> Sequence[Candidate]:
                 edited,
                 (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),),
                 "a torque against the motion in proportion to the load",
-                "Coulomb 1785; gear efficiency",
+                "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
             )
         )
     return found

@@ -213,6 +213,11 @@ class Bench:
         All records.
     blocks
         Of the declared model; they fix rows and noise floor.
+
+    Raises
+    ------
+    MeasurementError
+        If no record moves enough to say anything about a block.
     """
 
     def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
