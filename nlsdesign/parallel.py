@@ -18,7 +18,7 @@ _DEATH_SIGNAL = 1
 _work: Callable[[int], Any] | None = None
 
 
-def shared_out(work: Callable[[int], T], count: int) -> Iterator[T]:
+def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     """Yield ``work(0)`` to ``work(count - 1)``, in order.
 
     Processes are forked, so that they see everything that the work refers to without copying it; only results
