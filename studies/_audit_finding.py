@@ -52,15 +52,15 @@ class Finding:
     statement: str
     verdict: str
     why: str
-    steps: tuple[nls.CalculationStep, ...] = ()
+    steps: tuple[nls.report.CalculationStep, ...] = ()
     numbers: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     figures: Mapping[str, tuple[Any, str]] = field(default_factory=dict)
 
     def section(self) -> Any:
         """Return the finding as a section of the page."""
         shown = {_label(n, u): f"{nls.figures.compact(v, 4)} {u}" for n, (v, u) in self.numbers.items()}
-        parts = tuple(nls.FigureSection(t, f, caption=c) for t, (f, c) in self.figures.items())
-        return nls.CalculationSection(
+        parts = tuple(nls.report.FigureSection(t, f, caption=c) for t, (f, c) in self.figures.items())
+        return nls.report.CalculationSection(
             f"{self.key} {_title(self.statement)}",
             f"{self.statement} (Said by: {self.says}.)",
             self.verdict,
@@ -83,12 +83,12 @@ class Finding:
         }  # fmt: skip
 
 
-def step(words: str, formula: Any = None) -> nls.CalculationStep:
+def step(words: str, formula: Any = None) -> nls.report.CalculationStep:
     """Return a line of a calculation with its LaTeX."""
     if formula is None:
-        return nls.CalculationStep(words)
+        return nls.report.CalculationStep(words)
     names = {s: LATEX[s.name] for s in formula.free_symbols if s.name in LATEX}
-    return nls.CalculationStep(words, formula, sympy.latex(formula, symbol_names=names))
+    return nls.report.CalculationStep(words, formula, sympy.latex(formula, symbol_names=names))
 
 
 def equal(left: Any, right: Any) -> Any:

@@ -49,23 +49,25 @@ def write_page(chapters: Mapping[str, list[Finding]], out: Path) -> Path:
     """Write the self-contained page ``report.html``."""
     everything = [finding for found in chapters.values() for finding in found]
     sections: list[Any] = [
-        nls.NumbersSection(
-            "Verdicts", tuple(nls.KeyNumber(v, str(n)) for v, n in counts(everything).items())
+        nls.report.NumbersSection(
+            "Verdicts", tuple(nls.report.KeyNumber(v, str(n)) for v, n in counts(everything).items())
         ),
-        nls.TableSection("Statements", ("item", "statement", "verdict", "numbers"), tuple(table(everything))),
-        nls.TableSection("Symbols", ("symbol", "meaning"), SYMBOLS),
+        nls.report.TableSection(
+            "Statements", ("item", "statement", "verdict", "numbers"), tuple(table(everything))
+        ),
+        nls.report.TableSection("Symbols", ("symbol", "meaning"), SYMBOLS),
     ]
     for title, found in chapters.items():
-        sections.append(nls.Chapter(title))
+        sections.append(nls.report.Chapter(title))
         sections += [finding.section() for finding in found]
         if title == "The law of the rubber":
             sections.append(unit_table())
     sections += [
-        nls.Chapter("Beyond this audit"),
-        nls.TableSection(
+        nls.report.Chapter("Beyond this audit"),
+        nls.report.TableSection(
             "Statements that are tested elsewhere, or not at all", ("statement", "where"), ELSEWHERE
         ),
-        nls.FileSection(
+        nls.report.FileSection(
             "Written beside this page",
             {out / "audit.json": "all findings as data", out / "audit.txt": "the calculations as text"},
         ),

@@ -103,8 +103,10 @@ def findings() -> list[Finding]:
     ]
 
 
-def unit_table() -> nls.Section:
+def unit_table() -> nls.report.Section:
     """Return the table of all terms and their units."""
     shown = tuple((name, term, unit, "agrees" if same else "differs") for name, term, unit, same in rows())
     columns = ("equation", "term", "unit", "with the left side")
-    return nls.TableSection("Units, term by term", columns, shown, caption="Show every term", folded=True)
+    return nls.report.TableSection(
+        "Units, term by term", columns, shown, caption="Show every term", folded=True
+    )

@@ -31,7 +31,7 @@ def skipped(name: str, out: Path) -> dict[str, float]:
         f"Set NLSDESIGN_SHARED to the folder above measured/{name}, or call main(out, data=FOLDER)."
     )
     print(f"skipped: {why}")
-    nls.write_report(out / "report.html", nls.Chapter("Skipped", why), title=f"{name}: skipped")
+    nls.write_report(out / "report.html", nls.report.Chapter("Skipped", why), title=f"{name}: skipped")
     return {}
 
 

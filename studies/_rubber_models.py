@@ -9,7 +9,7 @@ import numpy as np
 
 import nlsdesign as nls
 
-from ._austin2015_bench import with_bench_sensors
+from ._published import with_bench_sensors
 
 HERE = Path(__file__).parent
 FORCE, SAMPLE = "rubber.force", 0.4e-3  # s; distance of the points of Fig. 6 on its time axis
@@ -21,18 +21,21 @@ EVERY = 4
 
 def laws() -> dict[str, Any]:
     """Return the laws by name; the first six are those that the paper compares or prints."""
-    stiffening = nls.StrainStiffening(modulus=(2e6, 1.5e6, 2e6, 2e6), knots=KNOTS)
-    rounded = nls.SmoothStrainStiffening(modulus=(2e6, 1.5e6, 2e6, 2e6), knots=KNOTS, width=0.01)
-    yeoh, one = nls.Yeoh(c1=0.5e6, c2=1e5, c3=1e4), {"modulus": 1e6, "viscosity": 2e4}
+    moduli, knots = nls.quantity((2e6, 1.5e6, 2e6, 2e6), "Pa"), nls.quantity(KNOTS, "1")
+    stiffening = nls.components.StrainStiffening(modulus=moduli, knots=knots)
+    width = nls.quantity(0.01, "1")
+    rounded = nls.components.SmoothStrainStiffening(modulus=moduli, knots=knots, width=width)
+    c1, c2, c3 = (nls.quantity(value, "Pa") for value in (0.5e6, 1e5, 1e4))
+    yeoh, one = nls.components.Yeoh(c1=c1, c2=c2, c3=c3), {"modulus": 1e6, "viscosity": 2e4}
     return {
-        "Hooke": nls.LinearElastic(modulus=3e6),
-        "Kelvin-Voigt": nls.kelvin_voigt(modulus=3e6, viscosity=3e3),
-        "Maxwell": nls.maxwell(modulus=4e6, viscosity=1e6),
+        "Hooke": nls.components.LinearElastic(modulus=nls.quantity(3e6, "Pa")),
+        "Kelvin-Voigt": nls.components.kelvin_voigt(modulus=3e6, viscosity=3e3),
+        "Maxwell": nls.components.maxwell(modulus=4e6, viscosity=1e6),
         "standard linear solid": nls.standard_linear_solid(3e6, **one),
-        "Burgers": nls.burgers(modulus=4e6, flow=1e7, late_modulus=1e7, late_viscosity=1e5),
+        "Burgers": nls.components.burgers(modulus=4e6, flow=1e7, late_modulus=1e7, late_viscosity=1e5),
         "stiffening solid (printed)": nls.standard_linear_solid(stiffening, **one),
         "stiffening solid, rounded": nls.standard_linear_solid(rounded, **one),
-        "stiffening, three times": nls.generalised_maxwell(
+        "stiffening, three times": nls.components.generalised_maxwell(
             stiffening, moduli=(5e5, 5e5, 5e5), times=(0.01, 0.1, 1.0)
         ),
         "Yeoh with one time": nls.standard_linear_solid(yeoh, **one),
@@ -43,7 +46,7 @@ def element(actuator: Any, law: Any) -> Any:
     """Return one rubber element of the actuator with another law, pulled by a grip."""
     rubber = actuator.element("spring.rubber")
     piece = nls.specimen(area=rubber.area, rest_length=rubber.rest_length, law=law)
-    return nls.assembly("element", grip=nls.DrivenPoint(), rubber=nls.tie(piece, "grip"))
+    return nls.assembly("element", grip=nls.components.DrivenPoint(), rubber=nls.tie(piece, "grip"))
 
 
 def record(name: str, time: Any, extension: Any, force: Any) -> Any:

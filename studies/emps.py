@@ -82,9 +82,9 @@ def refitted(verdict: Any, records: Any) -> Any:
     """Return the better model, fitted by simulation over one second on top of the balance of forces."""
     model = nls.flatten(verdict.actuator)
     free = [nls.free_parameter(model.variable(p.name)) for fit in verdict.fits for p in fit.parameters]
-    shots, seen = nls.Shots(WINDOWS["1s"], joined=False, phases=PHASES), records.of("fit")
+    shots, seen = nls.identification.Shots(WINDOWS["1s"], joined=False, phases=PHASES), records.of("fit")
     alone = nls.fit_by_simulation(model, seen, free, shots=shots)
-    weights = nls.Weights(nls.coloured_sigma(alone), known=verdict.fits)
+    weights = nls.identification.Weights(nls.identification.coloured_sigma(alone), known=verdict.fits)
     both = nls.fit_by_simulation(model, seen, free, shots=shots, weights=weights)
     return verdict.actuator.with_values(both.fit.values)
 
@@ -110,10 +110,10 @@ def pages(verdict: Any, found: dict[str, float], published: dict[str, float]) ->
         (key.replace("_", " "), f"{found['viscous_' + key]:.3g}", f"{found['better_' + key]:.3g}")
         for key in kept
     ]
-    numbers = [nls.PublishedNumber(n, published[p], found[n], UNITS[n]) for n, p in FITTED.items()]
+    numbers = [nls.report.PublishedNumber(n, published[p], found[n], UNITS[n]) for n, p in FITTED.items()]
     columns = ("error", "viscous friction alone", "with what was found")
     return [
         *nls.report.verdict_sections(verdict),
-        nls.TableSection("Second half", columns, tuple(rows)),
-        nls.comparison_table("Fitted on the first half, and published", numbers),
+        nls.report.TableSection("Second half", columns, tuple(rows)),
+        nls.report.comparison_table("Fitted on the first half, and published", numbers),
     ]

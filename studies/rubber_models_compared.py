@@ -61,7 +61,7 @@ def fit(model: Any, records: list[Any], substeps: int) -> Any:
         if v.name.rpartition(".")[2].partition("[")[0] in FITTED
     ]
     # The whole record from rest: a window longer than any record, that begins where the model does.
-    shots = nls.Shots(1e3, joined=False, substeps=substeps)
+    shots = nls.identification.Shots(1e3, joined=False, substeps=substeps)
     return model.with_values(nls.fit_by_simulation(model, records, free, shots=shots).fit.values)
 
 
@@ -73,7 +73,7 @@ def judged(model: Any, records: list[Any], substeps: int) -> tuple[Any, Any]:
     ]
     measured = [r.trace[FORCE][: len(p.time)] for r, p in zip(records, found, strict=True)]
     predicted = [m + p.error[FORCE] for m, p in zip(measured, found, strict=True)]
-    noise = float(np.median([nls.noise_of(m) for m in measured]))
+    noise = float(np.median([nls.identification.noise_of(m) for m in measured]))
     result = nls.agreement(np.concatenate(measured), np.concatenate(predicted), noise=noise)
     return result, (records[-1].trace["grip.position"][: len(predicted[-1])], predicted[-1])
 
@@ -84,6 +84,8 @@ def pages(columns: tuple[str, ...], rows: list[Any], curves: dict[str, Any]) -> 
     words = "Force of three models over the extension of a held-out record."
     figure = nls.figures.curves(shown, across="extension in mm", up="force in N", words=words)
     return [
-        nls.TableSection("All models", columns, tuple(rows)),
-        nls.FigureSection("A held-out bench record", figure, caption="Simulated, none has seen the record."),
+        nls.report.TableSection("All models", columns, tuple(rows)),
+        nls.report.FigureSection(
+            "A held-out bench record", figure, caption="Simulated, none has seen the record."
+        ),
     ]

@@ -56,7 +56,7 @@ def main(out: Path, fast: bool = False, steps: Any = None, data: Path | None = N
     rows = [(name.replace("_", " "), f"{value:.3g}") for name, value in found.items()]
     pages = [
         *nls.report.verdict_sections(verdict),
-        nls.TableSection("Numbers", ("what", "value"), tuple(rows)),
+        nls.report.TableSection("Numbers", ("what", "value"), tuple(rows)),
     ]
     nls.write_report(out / "report.html", *pages, title="VHB 4910: what is missing")
     return found
@@ -70,7 +70,7 @@ def elastic_strip(deck: Any) -> Any:
     rubber = nls.specimen(
         area=replace(size["area"], spread=0.0),
         rest_length=size["rest_length"],
-        elastic=nls.NeoHooke(shear_modulus=modulus),
+        elastic=nls.components.NeoHooke(shear_modulus=modulus),
     )
     return declared.with_part("strip", rubber)
 
@@ -87,5 +87,5 @@ def error(strip: Any, records: Any, role: str) -> float:
 
 def relaxation_times(strip: Any) -> list[float]:
     """Return viscosity over shear modulus of each branch that flows, shortest first."""
-    branches = [part for _, part in strip.walk() if isinstance(part, nls.FlowingChains)]
+    branches = [part for _, part in strip.walk() if isinstance(part, nls.components.FlowingChains)]
     return sorted(b.viscosity.number / b.shear_modulus.number for b in branches)

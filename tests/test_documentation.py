@@ -13,7 +13,6 @@ from tests import source
 PRODUCT = ("nlsdesign", "models", "studies")
 TEXTS = (*PRODUCT, "tests", "docs", "benchmarks", "requirements", ".ci")
 DOCUMENTS = ("architecture.md", "conventions.md", "claims.md", "known_gaps.md")
-MOST_LINES_IN_STUDY = 120
 
 # Put together here so that this file does not contain what it looks for.
 MACHINE = re.compile(r"(?<![\w.~*-])/(?:" + "|".join(["work", "root"]) + r")/|\.\./" + "shared")
@@ -96,11 +95,6 @@ def test_everything_public_is_typed(root: Path) -> None:
 
 def test_nothing_has_outgrown_its_shape(root: Path) -> None:
     expect_none(root, python_files(root, *PRODUCT), source.misshapen)
-
-
-def test_studies_stay_short(root: Path) -> None:
-    lengths = {file.name: len(file.read_text("utf-8").splitlines()) for file in python_files(root, "studies")}
-    assert not {name: length for name, length in lengths.items() if length >= MOST_LINES_IN_STUDY}
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)

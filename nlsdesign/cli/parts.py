@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import inspect
 import math
+from typing import TYPE_CHECKING
 
 import click
 
-from ..components import Body, Cam, Element, Gear, Part, Sensor
-from ..components.assembly.deck_reader import component_classes
-from ..components.core.part import ParameterInfo
 from ..errors import unknown_name
 from .output import json_option, show_json, show_table
 
-_KINDS: dict[str, type[Part]] = {
-    "element": Element,
-    "body": Body,
-    "gear": Gear,
-    "cam": Cam,
-    "sensor": Sensor,
-}
+if TYPE_CHECKING:
+    from ..components import Part
+    from ..components.core.part import ParameterInfo
 
 
 @click.command()
@@ -27,6 +21,8 @@ _KINDS: dict[str, type[Part]] = {
 @json_option
 def parts(name: str | None, as_json: bool) -> None:
     """List the parts that a deck can name, or show one: its law, source and numbers."""
+    from ..components.assembly.deck_reader import component_classes
+
     known = component_classes()
     if name is None:
         rows = sorted((_kind(c), n, _law(c)) for n, c in known.items())
@@ -48,7 +44,12 @@ def parts(name: str | None, as_json: bool) -> None:
 
 
 def _kind(part: type[Part]) -> str:
-    return next(word for word, base in _KINDS.items() if issubclass(part, base))
+    from ..components import Body, Cam, Element, Gear, Sensor
+
+    kinds: dict[str, type[Part]] = {
+        "element": Element, "body": Body, "gear": Gear, "cam": Cam, "sensor": Sensor,
+    }  # fmt: skip
+    return next(kind for kind, base in kinds.items() if issubclass(part, base))
 
 
 def _law(part: type[Part]) -> str:

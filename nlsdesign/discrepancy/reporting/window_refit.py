@@ -76,7 +76,7 @@ def window_gaps(
         runs = [predict_in_windows(m, record, length, wiring=wiring) for m in models]
         for signal in wiring.outputs:
             before, after = (rmse(run.error[signal]) for run in runs)
-            floor, unit = record.grain_of(signal).noise, record.trace.units[signal]
+            floor, unit = record.resolution_of(signal).noise, record.trace.units[signal]
             name = f"{signal} over {length:g} s"
             rows = len(runs[0].time)
             gaps.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))

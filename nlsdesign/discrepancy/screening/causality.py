@@ -58,7 +58,7 @@ def lagging_forces(assembly: Assembly, records: RecordSet) -> LaggingForces:
         extension = _extension(assembly, model, motion, records.signals)
         if extension is None:
             continue
-        noise = float(np.median([r.grain_of(signal).noise for r in records.records]))
+        noise = float(np.median([r.resolution_of(signal).noise for r in records.records]))
         paths = [(r, extension(r)) for r in records.records]
         loops = [
             (r, loop)

@@ -53,12 +53,12 @@ def estimate_noise(records: RecordSet) -> Noise:
     """
     level, rounded = {}, {}
     for column in records.columns:
-        grains = [r.grain_of(column.signal) for r in records.records]
-        white = float(np.median([g.noise for g in grains]))
+        resolutions = [r.resolution_of(column.signal) for r in records.records]
+        white = float(np.median([g.noise for g in resolutions]))
         # The count of a resampled signal is that of its samples before, as it weighs on the new clock.
-        kept = any(column.signal in r.grain for r in records.records)
+        kept = any(column.signal in r.resolution for r in records.records)
         declared = 0.0 if kept else column.quantum
-        quantum = declared or float(np.median([g.quantum for g in grains]))
+        quantum = declared or float(np.median([g.quantum for g in resolutions]))
         rounding = quantum / np.sqrt(12.0)
         level[column.signal] = max(white, rounding)
         rounded[column.signal] = white < 2.0 * rounding

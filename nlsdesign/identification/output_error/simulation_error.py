@@ -368,7 +368,7 @@ def _phases(record: Record, shots: Shots) -> list[Record]:
 
 def _noise(records: Sequence[Record], signal: str) -> float:
     rows = [r.trace[signal] for r in records]
-    grains = [r.grain_of(signal) for r in records]
-    white = float(np.median([g.noise for g in grains]))
-    rounding = float(np.median([g.quantum for g in grains])) / math.sqrt(12.0)
+    resolutions = [r.resolution_of(signal) for r in records]
+    white = float(np.median([g.noise for g in resolutions]))
+    rounding = float(np.median([g.quantum for g in resolutions])) / math.sqrt(12.0)
     return max(white, rounding) or float(np.std(np.concatenate(rows))) or 1.0

@@ -1,4 +1,4 @@
-"""The cam that the reader turns."""
+"""A cam that the reader turns with a slider."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 from ..figures import CamMotion, cam_picture, inline_svg
 from ..figures.cam_frames import MARKER
 from .html import Html
-from .sections import Place, Section
+from .sections import PagePosition, Section
 
 
 @dataclass(frozen=True, eq=False)
 class CamSection(Section):
-    """Cam, cable, rubber and contact point over the angle, with a slider; one frame where there is no script.
+    """Cam, cable, rubber and contact point over the angle, with a slider; a single frame without JavaScript.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ class CamSection(Section):
     start: float | None = None
     template: ClassVar[str] = "cam.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
-        """Return picture, frames and words."""
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return picture, frames and texts."""
         picture = cam_picture(self.motion, start=self.start)
         return {
             "key": place.key,

@@ -1,4 +1,4 @@
-"""Numbers as people write them."""
+"""Numbers as text for people: significant digits, powers of ten, superscripts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def root_mean_square(values: ArrayLike) -> float:
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return a number with a few significant digits as people write it.
+    """Return a number with the given number of significant digits, typeset.
 
     Parameters
     ----------
@@ -42,10 +42,10 @@ def significant(value: float, digits: int = 3) -> str:
         return "not a number" if math.isnan(value) else "∞" if value > 0 else "−∞"
     exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
     if not -4 <= exponent < 6:
-        shown = f"{value / 10.0**exponent:.{digits - 1}f}·10{superscript(exponent)}"
+        text = f"{value / 10.0**exponent:.{digits - 1}f}·10{superscript(exponent)}"
     else:
-        shown = f"{round(value, digits - 1 - exponent):.{max(0, digits - 1 - exponent)}f}"
-    return shown.replace("-", "−")
+        text = f"{round(value, digits - 1 - exponent):.{max(0, digits - 1 - exponent)}f}"
+    return text.replace("-", "−")
 
 
 def compact(value: float, digits: int = 4) -> str:
@@ -70,7 +70,7 @@ def compact(value: float, digits: int = 4) -> str:
 
 
 def superscript(number: int) -> str:
-    """Return an integer in raised digits.
+    """Return an integer in superscript digits.
 
     Parameters
     ----------
@@ -78,20 +78,3 @@ def superscript(number: int) -> str:
         Of either sign.
     """
     return str(number).translate(_SUPERSCRIPTS)
-
-
-def shown_unit(unit: str) -> str:
-    """Return a unit as it is printed: ``kg·m²`` for ``kg*m^2``, nothing for ``1``.
-
-    Parameters
-    ----------
-    unit
-        As in decks.
-    """
-    if unit == "1":
-        return ""
-    head, *powers = unit.replace("*", "·").split("^")
-    for part in powers:
-        digits = len(part) - len(part.lstrip("-0123456789"))
-        head += part[:digits].translate(_SUPERSCRIPTS) + part[digits:]
-    return head

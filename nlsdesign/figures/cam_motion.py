@@ -32,10 +32,10 @@ from .style import (
 Floats = NDArray[np.float64]
 
 _MM = 1e3
-_GAP = 3e-3
-"""Distance in m between guide and cable clamp where the rubber is longest: room to see both."""
+_CLEARANCE = 3e-3
+"""Smallest distance in m between guide and cable clamp, so that both can be seen."""
 _THICKNESS = 9e-3
-"""Height in m at which unstretched rubber is drawn; it thins as the square root of its stretch."""
+"""Drawn height in m of unstretched rubber; it falls with the square root of the stretch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,24 +91,24 @@ class CamMotion:
     def guide(self) -> float:
         """Distance in m from the centre at which the end of the free cable is drawn.
 
-        That is the anchor, or 2.5 times the cam where the anchor is too far away to show the cam.
+        That is the anchor, at most 2.5 times the largest radius of the cam.
         """
         return float(min(self.contour.anchor_distance, max(2.5 * float(np.max(self.contour.radii)), 1e-3)))
 
     @property
     def wall(self) -> float:
         """Distance in m from the centre at which the resting end of the rubber is drawn."""
-        return self.guide + _GAP + float(np.max(self.extensions)) + self._shown_length
+        return self.guide + _CLEARANCE + float(np.max(self.extensions)) + self._shown_length
 
     @property
     def warning(self) -> str:
-        """What is wrong with the lips in words; empty where they are convex."""
+        """Message where the lips are concave and cannot be made; empty where they are convex."""
         rho = self.contour.radii_of_curvature
         if float(np.min(rho)) >= 0.0:
             return ""
-        hollow = np.degrees(self.contour.angles[rho < 0.0])
+        concave = np.degrees(self.contour.angles[rho < 0.0])
         return (
-            f"The lips are hollow between {hollow[0]:.1f}° and {hollow[-1]:.1f}°: there the radius of "
+            f"The lips are concave between {concave[0]:.1f}° and {concave[-1]:.1f}°: there the radius of "
             f"curvature is negative (down to −{-_MM * float(np.min(rho)):.1f} mm) and the curve may cross "
             "itself. A cable cannot follow it, so this cam cannot be made as drawn; the torque is that of "
             "the law, not of such a cam."
@@ -122,7 +122,7 @@ class CamMotion:
         return lower, -lower
 
     def rubber(self, index: int) -> tuple[float, float]:
-        """Return length and height in m at which the rubber is drawn; what it stretches is to scale.
+        """Return length and height in m at which the rubber is drawn; its extension is to scale.
 
         Parameters
         ----------
@@ -135,11 +135,11 @@ class CamMotion:
 
     @property
     def _shown_length(self) -> float:
-        """Length in m of the rubber drawn at angle zero; long rubber is cut, lest the cam be tiny."""
+        """Length in m of the rubber drawn at angle zero; long rubber is cut off."""
         return min(self.rest_length + self.pretension, self.guide)
 
     def nearest(self, angle: float) -> int:
-        """Return the number of the sampled angle next to a wanted one.
+        """Return the number of the sampled angle that is nearest to an angle.
 
         Parameters
         ----------
@@ -253,17 +253,17 @@ def cam_positions(motion: CamMotion, *, angles: Sequence[float] | None = None) -
         In rad; by default zero, a third, two thirds and all of the range.
     """
     last = float(motion.angles[-1])
-    wanted = list(angles) if angles is not None else [0.0, last / 3, 2 * last / 3, last]
-    columns = min(2, len(wanted))
-    rows = (len(wanted) + 1) // 2
+    shown_angles = list(angles) if angles is not None else [0.0, last / 3, 2 * last / 3, last]
+    columns = min(2, len(shown_angles))
+    rows = (len(shown_angles) + 1) // 2
     tall = float(np.max(motion.contour.radii)) / motion.wall * WIDTH / columns
     figure, axes = panels(rows, columns, height=0.4 + (0.5 + tall) * rows, sharex=True, sharey=True)
-    for panel, angle in zip(axes, wanted, strict=False):
+    for panel, angle in zip(axes, shown_angles, strict=False):
         _draw(panel, motion, motion.nearest(angle))
-    for panel in axes[len(wanted) :]:
+    for panel in axes[len(shown_angles) :]:
         panel.set_visible(False)
     figure.supxlabel("distance from the centre in mm", fontsize=9)
-    shown = ", ".join(f"{np.degrees(a):.0f}°" for a in wanted)
+    shown = ", ".join(f"{np.degrees(a):.0f}°" for a in shown_angles)
     return described(
         figure,
         f"The cam at {shown}: the cable runs from the cam's centre over its lip to a guide on either side "

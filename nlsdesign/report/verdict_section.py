@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis, in words and with its evidence."""
+"""The verdict of a diagnosis with its evidence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
 from ..errors import unknown_name
-from .sections import Place, Section
+from .sections import PagePosition, Section
 
 VERDICTS = {
     "none": "nothing is missing",
@@ -19,14 +19,14 @@ VERDICTS = {
 
 @dataclass(frozen=True, eq=False)
 class VerdictSection(Section):
-    """A verdict, and below it whatever proves it: tables of candidates, figures of the gap.
+    """A verdict with its evidence: tables of candidates, figures of the errors.
 
     Parameters
     ----------
     verdict
         ``"none"``, ``"named"``, ``"unknown"`` or ``"data_suspect"``.
     words
-        What was found, in sentences.
+        The findings, in sentences.
     parts
         Sections with the evidence.
 
@@ -46,7 +46,7 @@ class VerdictSection(Section):
         if self.verdict not in VERDICTS:
             raise unknown_name("verdict", self.verdict, VERDICTS)
 
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the verdict and the contents of its parts."""
         parts = [
             {
