@@ -55,7 +55,9 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     "identification": (
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
-    "discrepancy": ({"blocks", "effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"}),
+    "discrepancy": (
+        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"},
+    ),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip
 

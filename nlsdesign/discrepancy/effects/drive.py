@@ -30,6 +30,7 @@ def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
             (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
             "torque that follows the current late, the more the faster the current changes",
             "Golub and Van Loan 2013 (Padé table)",
+            explains_lag=True,
         )
         for name, motor in _ideal_motors(assembly)
     ]

@@ -25,6 +25,7 @@ from ...components import (
 from ...components.core.element import ROTATION
 from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
+from ..fitting.strategies import Continuation
 from .candidate import SOURCE, Candidate, Unknown, free_name, wrapped
 from .sliding import sliding_friction
 
@@ -259,8 +260,8 @@ def backlash(assembly: Assembly) -> Sequence[Candidate]:
                 ),
                 "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
                 "Nordin and Gutman 2002",
-                # In slow motion what is behind the play has no inertia to speak of.
-                wrapped(assembly, name, "behind_play", _massless),
+                # In slow motion the inertia behind the backlash hardly shows.
+                Continuation(through=wrapped(assembly, name, "behind_play", _massless)),
             )
         )
     return found

@@ -45,6 +45,7 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
                 (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
                 "force that follows the motion late, the more the faster; as much in the torque balance",
                 "Golub and Van Loan 2013 (Padé table)",
+                explains_lag=True,
             )
         )
     return found
