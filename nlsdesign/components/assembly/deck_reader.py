@@ -1,4 +1,4 @@
-"""From the tables of a deck to parts; everything that is wrong on the way is collected."""
+"""Parts from the tables of a deck; all problems are collected, not only the first."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from .renamed import NUMBERS, renamed
 
 @functools.cache
 def _modules() -> tuple[ModuleType, ...]:
-    """Import every module of the inner rooms of ``components``: a law is found by being there, in no list."""
+    """Import every module of the inner rooms of ``components``: a law needs no entry in any list."""
     room = importlib.import_module(__name__.rsplit(".", 2)[0])
-    names = (found.name for found in pkgutil.walk_packages(room.__path__, room.__name__ + "."))
+    names = (module.name for module in pkgutil.walk_packages(room.__path__, room.__name__ + "."))
     return tuple(importlib.import_module(name) for name in names)
 
 
@@ -47,7 +47,7 @@ def component_classes() -> dict[str, type[Part]]:
 
 
 class Builder:
-    """Builds parts from tables and collects everything that is wrong on the way.
+    """Builds parts from tables and collects all problems.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Builder:
         self.classes = component_classes()
 
     def part(self, path: str, table: Mapping[str, Any]) -> Part | None:
-        """Return the part of a table with everything in it, ``None`` if anything is wrong with it.
+        """Return the part of a table with all parts inside, ``None`` if there is a problem in it.
 
         Parameters
         ----------
@@ -103,7 +103,8 @@ class Builder:
             A part inside, whose domain is that of the numbers; ``None`` where there is none.
         """
         names, keys = kind.parameter_infos(), self._keys(path, kind)
-        given, meant = {}, set()
+        given: dict[str, Quantity] = {}
+        intended: set[str | None] = set()
         for key, raw in table.items():
             full = f"{path}.{key}"
             if key in names:
@@ -115,28 +116,29 @@ class Builder:
                 valid = [*keys, *names]
                 new = NUMBERS.get(key)
                 near = new if new in names else nearest(key, valid)
-                meant.add(near)
+                intended.add(near)
                 step = f"fields are: {', '.join(valid)}"
                 rule = f"{kind.__name__} has no field '{key}'"
                 self._problem(full, rule, did_you_mean=near, next_step=step)
         stated = self._stated_domain(path, table, kind)
         domain = stated or _domain_of(kind, given, inner)
-        infos, found = kind.parameter_infos(domain), {}
+        infos = kind.parameter_infos(domain)
+        sound: dict[str, Quantity] = {}
         for key, number in given.items():
             try:
-                found[key] = infos[key].checked(key, number)
+                sound[key] = infos[key].checked(key, number)
             except NlsError as error:
                 self.problems.append(error.at(self.deck.place(f"{path}.{key}")))
         # What stands there misspelt, or is not sound, has been named already.
-        there = {*table, *meant}
+        there = {*table, *intended}
         self._missing(path, kind, kind, infos, there)
-        fields: dict[str, Any] = {name: q for name, q in found.items() if name in templates(kind)}
+        fields: dict[str, Any] = {name: q for name, q in sound.items() if name in templates(kind)}
         if stated:
             fields["domain"] = stated
         return fields | {
             name: reading
             for name, kinds in readings(kind).items()
-            if (reading := self._reading(path, kind, kinds, infos, (there, found))) is not None
+            if (reading := self._reading(path, kind, kinds, infos, (there, sound))) is not None
         }
 
     def _reading(
@@ -148,7 +150,7 @@ class Builder:
         numbers: tuple[set[str | None], Mapping[str, Quantity]],
     ) -> Reading | None:
         """Return the reading whose numbers a table has; where it has none the part takes its own."""
-        there, found = numbers
+        there, sound = numbers
         asked = {name for each in kinds for name in templates(each)} & there
         fitting = [each for each in kinds if asked <= set(templates(each))]
         if not fitting:
@@ -161,7 +163,7 @@ class Builder:
             return None
         best = min(fitting, key=lambda each: len(_needed(each) - asked))
         self._missing(path, kind, best, infos, there)
-        numbers_of_it = {name: q for name, q in found.items() if name in templates(best)}
+        numbers_of_it = {name: q for name, q in sound.items() if name in templates(best)}
         return best(**numbers_of_it) if _needed(best) <= set(numbers_of_it) else None
 
     def _missing(
@@ -205,9 +207,9 @@ class Builder:
             return None
         # A table of an unknown component may be a body.
         bodies = [n for n in self.deck.tables if issubclass(self.class_of(n) or Body, Body)]
-        strangers = [unknown_name("body", end, bodies) for end in ends if end not in bodies]
-        self.problems += [error.at(self.deck.place(f"{name}.between")) for error in strangers]
-        if strangers or not isinstance(element, Element):
+        unknown = [unknown_name("body", end, bodies) for end in ends if end not in bodies]
+        self.problems += [error.at(self.deck.place(f"{name}.between")) for error in unknown]
+        if unknown or not isinstance(element, Element):
             return None
         try:
             return Tie(element=element, between=tuple(ends))
@@ -238,11 +240,11 @@ class Builder:
     def _kind(self, path: str, table: Mapping[str, Any]) -> type[Part] | None:
         name = table.get("component")
         if name is None:
-            slip = nearest("component", [key for key in table if key not in ("between", "of")])
+            misspelt = nearest("component", [key for key in table if key not in ("between", "of")])
             self._problem(
-                f"{path}.{slip}" if slip else path,
-                "is not a field; the table has no component" if slip else "the table has no component",
-                did_you_mean="component" if slip else None,
+                f"{path}.{misspelt}" if misspelt else path,
+                "is not a field; the table has no component" if misspelt else "the table has no component",
+                did_you_mean="component" if misspelt else None,
                 next_step='write component = "..."',
             )
             return None

@@ -23,7 +23,7 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
         Parts.
     widths
         By the full name of the element: speed, angle, extension, strain or force over which it is rounded.
-        Others take the width that their law proposes.
+        Others use the default width of their law.
 
     Raises
     ------
@@ -36,14 +36,14 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
     >>> rub = tie(CoulombFriction(sliding_effort=0.05), "wheel")
     >>> rubbing = assembly("a", wheel=Inertia(inertia=1e-3), rub=rub)
     >>> smoothed(rubbing, {"rub": 0.01}).element("rub").title()
-    'CoulombFriction(sliding_effort = 0.05 N*m, creep_speed = 0.01 rad/s)'
+    'CoulombFriction(sliding_effort = 0.05 N·m, creep_speed = 0.01 rad/s)'
     """
     asked = dict(widths or {})
     sharp = {path: part for path, part in assembly.walk() if not _smooth(_law(part))}
     for name in asked:
         if name not in sharp:
             raise unknown_name("element that is not smooth", name, sharp)
-    # What lies deeper first: the smooth form of a wrapper takes along what is inside.
+    # Innermost parts first: the smooth form of a wrapper keeps the parts inside it.
     for path in sorted(sharp, key=lambda p: -p.count(".")):
         law = _law(assembly[path])
         if isinstance(law, Element):

@@ -107,7 +107,7 @@ self_heating = Effect(
             _pieces,
             _heating,
             "force that falls while the rubber is worked hard, and comes back at rest",
-            "first law; Medalia 1991",
+            "first law of thermodynamics; Medalia 1991",
             "self-heating",
         ),
     ),

@@ -16,6 +16,7 @@ from ...components import (
     Tie,
     TorqueRipple,
 )
+from ..fitting.strategies import Continuation
 from .candidate import Unknown, wrapped
 from .effect import Edit, Effect, Form
 from .friction import is_spring, number, tied
@@ -67,7 +68,7 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     # In slow motion the inertia behind the backlash hardly shows.
     rounded = Rounded(width=number(5e-4, "rad"))
     massless = wrapped(assembly, name, "behind_play", wrapping(Backlash, gap=gap, contact=rounded))
-    yield Edit(edited, unknowns, {"sketch": massless})
+    yield Edit(edited, unknowns, {"strategy": Continuation(through=massless)})
 
 
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
@@ -111,7 +112,7 @@ constant_force = Effect(
             sliding_bodies,
             _constant,
             "a force that is the same forward and backward, at any speed and place",
-            "Janot, Gautier and Brunot 2019",
+            "Janot et al. 2019",
             "constant force",
         ),
     ),

@@ -127,7 +127,7 @@ second_relaxation = Effect(
             _without_second,
             _second_relaxation,
             "force that creeps towards rest with a time constant of its own",
-            "Maxwell 1867; Prony series",
+            "Maxwell 1867; Wiechert 1893 (Prony series)",
         ),
         Form(
             _at_large_stretch,
