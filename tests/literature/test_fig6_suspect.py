@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from models import cam_rubber_actuator
-from nlsdesign.components import Assembly, DrivenPoint, tie
+from nlsdesign.components import TRANSLATION, Assembly, Driven, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import diagnose
-from nlsdesign.discrepancy.screening.causality import late_forces
+from nlsdesign.discrepancy.screening.causality import lagging_forces
 from nlsdesign.identification import RecordSet, load_records
 from nlsdesign.identification.statistics.loop_work import loop_of
 from nlsdesign.model import flatten
@@ -39,7 +39,7 @@ def points(degrees: int) -> np.ndarray:
 def element() -> Assembly:
     """One rubber element of the actuator between a driven grip and the bench."""
     rubber = cam_rubber_actuator(load_deck("austin2015_figure_consistent")).element("spring.rubber")
-    found = assembly("element", grip=DrivenPoint(), rubber=tie(rubber, "grip"))
+    found = assembly("element", grip=Driven(domain=TRANSLATION), rubber=tie(rubber, "grip"))
     measured = ("area", "rest_length", "knots")
     return found.with_values(
         {n: replace(q, spread=0.0) for n, q in found.quantities().items() if n.rpartition(".")[2] in measured}
@@ -71,7 +71,7 @@ def test_the_points_of_fig_6_are_suspect_and_the_reason_is_said(tmp_path: Path) 
 
 
 def test_the_same_points_drawn_the_other_way_are_not_suspect(tmp_path: Path) -> None:
-    found = late_forces(element(), written(tmp_path, order=-1))
+    found = lagging_forces(element(), written(tmp_path, order=-1))
     assert found.findings == ()
 
 

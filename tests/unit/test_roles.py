@@ -12,7 +12,9 @@ import pytest
 
 from nlsdesign.analysis import Stability, over_angle
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
+    Dashpot,
     Driven,
     Encoder,
     Fixed,
@@ -20,8 +22,7 @@ from nlsdesign.components import (
     Inertia,
     LinearElastic,
     Part,
-    TorsionDashpot,
-    TorsionSpring,
+    Spring,
     TwoSidedCam,
     specimen,
     through,
@@ -72,7 +73,7 @@ def one_motor() -> Assembly:
         pulley=Inertia(inertia=1e-3),
         finger=motor(),
         wall=Fixed(),
-        clip=tie(TorsionSpring(stiffness=1.0), "pulley", "finger"),
+        clip=tie(Spring(stiffness=1.0, domain=ROTATION), "pulley", "finger"),
         tendon=tie(cam_spring(), "finger", "wall"),
     )
 
@@ -92,8 +93,8 @@ def two_inertias() -> Assembly:
     """A drive of two inertias with a shaft between, without a motor."""
     return machine(
         rotor=Inertia(inertia=1e-3), arm=Inertia(inertia=5e-3),
-        shaft=tie(TorsionSpring(stiffness=20.0), "rotor", "arm"),
-        bearing=tie(TorsionDashpot(damping=1e-3), "arm"),
+        shaft=tie(Spring(stiffness=20.0, domain=ROTATION), "rotor", "arm"),
+        bearing=tie(Dashpot(damping=1e-3, domain=ROTATION), "arm"),
         dial=Encoder(of="rotor.angle", quantum=1e-4),
     )  # fmt: skip
 
@@ -149,7 +150,7 @@ def test_the_far_end_of_the_spring_is_the_load() -> None:
     model = flatten(
         machine(
             finger=motor(), palm=Driven(), thumb=Driven(), tendon=tie(cam_spring(), "finger", "palm"),
-            clip=tie(TorsionSpring(stiffness=1.0), "finger", "thumb"),
+            clip=tie(Spring(stiffness=1.0, domain=ROTATION), "finger", "thumb"),
         )
     )  # fmt: skip
     assert moved_load(model).name == "palm"
