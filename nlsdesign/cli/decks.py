@@ -8,8 +8,11 @@ from pathlib import Path
 import click
 
 from ..components.assembly.deck_writer import deck_problems, declare, write_deck
+from ..components.assembly.named_parts import Assembly
 from ..deck import deck_names, load_deck
+from ..errors import NlsError
 from ..locations import bundled
+from ..model import flatten
 from ..quantity import Quantity, sources
 from .output import json_option, show_json, show_table
 
@@ -33,7 +36,7 @@ def list_decks() -> None:
 def check(deck_name: str, as_json: bool) -> None:
     """Name every problem with line and column, and the share of numbers that are only assumed."""
     read = load_deck(deck_name)
-    problems = deck_problems(read)
+    problems = deck_problems(read) or _model_problems(declare(read))
     if problems:
         for problem in problems:
             click.echo(f"error: {problem}", err=True)
@@ -44,6 +47,15 @@ def check(deck_name: str, as_json: bool) -> None:
         return
     click.echo(f"{read.path.name}: no problem in {len(declare(read).quantities())} numbers, "
                f"{100 * shares['assumed']:.0f} % of them only assumed")  # fmt: skip
+
+
+def _model_problems(assembly: Assembly) -> list[NlsError]:
+    """Return what shows only when the equations are written, such as a sensor of a missing signal."""
+    try:
+        flatten(assembly)
+    except NlsError as error:
+        return [error]
+    return []
 
 
 @deck.command()

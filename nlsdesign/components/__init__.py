@@ -27,16 +27,15 @@ from .materials.thermal import ArrheniusShift, SelfHeating, WlfShift
 from .mechanics.backlash import Backlash, InertialBacklash, LooseCable, Play, Slack, Turned
 from .mechanics.bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
 from .mechanics.carriage import ConstantForce, LinearDrive, SlidingFriction
+from .mechanics.drive_chain import DriveDelay, DrivePart, DriveSaturation
 from .mechanics.dry_friction import DryFriction, DryLoadFriction, DryStribeckFriction
 from .mechanics.friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
 from .mechanics.gear import Gear, LossyGear
-from .mechanics.imperfect_motor import DelayedMotor, SaturatingMotor
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .mechanics.stops import EndStop, RigidStop, RoundedEndStop
-from .sensing.delayed_sensors import DelayedForceSensor, DriftingForceSensor, TransportDelay
-from .sensing.eccentric_encoder import EccentricEncoder
-from .sensing.sampled_sensors import SampleAndHold, SampledEncoder, Tachometer
+from .sensing.sampled_sensors import SampleAndHold, Tachometer
+from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .transmission.cable_guide import CableGuide
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
@@ -65,16 +64,17 @@ __all__ = [
     "CurrentDrivenMotor",
     "CurrentSensor",
     "Dashpot",
-    "DelayedForceSensor",
-    "DelayedMotor",
     "Domain",
-    "DriftingForceSensor",
+    "Drift",
+    "DriveDelay",
+    "DrivePart",
+    "DriveSaturation",
     "Driven",
     "DrivenPoint",
     "DryFriction",
     "DryLoadFriction",
     "DryStribeckFriction",
-    "EccentricEncoder",
+    "Eccentricity",
     "ElectricMotor",
     "Element",
     "Encoder",
@@ -113,8 +113,6 @@ __all__ = [
     "RigidStop",
     "RoundedEndStop",
     "SampleAndHold",
-    "SampledEncoder",
-    "SaturatingMotor",
     "SelfHeating",
     "Sensor",
     "Series",

@@ -16,6 +16,7 @@ from ..components.assembly.deck_writer import write_deck
 from ..identification.equation_error.evidence import Bench
 from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
+from ..model import flatten
 from ..writing import write_text
 from .blocks.tearing import blocks_of
 from .effects import ALL, Effect
@@ -72,7 +73,7 @@ def diagnose(
         If the declared model cannot be refitted.
     """
     progress("refitting the declared model")
-    bench = Bench(records, blocks_of(actuator, records.signals))
+    bench = Bench(records, blocks_of(flatten(actuator), records.signals))
     comparison = Comparison(bench, typical_sizes(actuator, records))
     base = comparison.base(actuator)
     findings = [*records.findings, *out_of_reach(actuator, records), *suspicions_of(comparison, base)]

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import casadi as ca
 
 from ..components.assembly.named_parts import Assembly
+from ..components.assembly.sensor_chains import source_problems
 from ..components.core.element import observed_effort
 from ..components.core.tie import Tie
 from ..components.mechanics.bodies import Body, Motion
@@ -86,6 +87,8 @@ def _write_mechanics(assembly: Assembly, ledger: Ledger) -> None:
 
 
 def _write_sensors(assembly: Assembly, ledger: Ledger) -> None:
+    for _, error in source_problems(assembly.parts):
+        raise error
     for name, part in assembly.sensors().items():
         known = ledger.named()
         if part.of not in known:

@@ -207,7 +207,9 @@ def test_a_motor_without_a_spring_has_the_effects_of_a_drive() -> None:
         "coulomb_friction": 1, "stribeck_friction": 1, "quadratic_drag": 1, "torque_ripple": 1,
         "drive_delay": 1, "torque_constant_saturation": 1, "angle_sensor_eccentricity": 2,
     }  # fmt: skip
-    once, on_motor = (c.assembly.sensors()["encoder"].order.number for c in angle_sensor_eccentricity(drive))
+    once, on_motor = (
+        c.assembly.quantities()["encoder_eccentricity.order"].number for c in angle_sensor_eccentricity(drive)
+    )
     assert (once, on_motor) == (1.0, 10.0)
 
 
@@ -220,10 +222,12 @@ def test_a_guide_stands_on_either_side_of_the_load_cell(rig: Assembly) -> None:
 def test_a_drifting_cell_is_read_without_its_drift(rig: Assembly) -> None:
     """The balance of the motor sees the force behind the reading: reading less drift so far, at 2 N/s."""
     (found,) = force_sensor_drift(rig)
-    drifting = found.assembly.with_values({"force_sensor.drift": 2.0})
+    drifting = found.assembly.with_values({"force_sensor_drift.drift": 2.0})
     signals = ["motor_encoder.reading", "current_sensor.reading", "force_sensor.reading"]
-    plain, edited = ({b.name: b.model for b in blocks_of(a, signals)}["motor"] for a in (rig, drifting))
-    assert [v.name for v in edited.states] == ["force_sensor.drifted"]
+    plain, edited = (
+        {b.name: b.model for b in blocks_of(flatten(a), signals)}["motor"] for a in (rig, drifting)
+    )
+    assert [v.name for v in edited.states] == ["force_sensor_drift.drifted"]
     assert edited.evaluate([0.0], [0.0] * len(edited.inputs)).keys() >= {"motor.unbalanced"}
     place = [v.name for v in plain.inputs].index("force_sensor.reading")
     given = [0.3 if v.name == "motor_encoder.reading" else 0.0 for v in plain.inputs]

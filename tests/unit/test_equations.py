@@ -12,10 +12,10 @@ import sympy
 from nlsdesign.components import (
     Assembly,
     CoulombFriction,
-    DelayedForceSensor,
     DrivenPoint,
     Encoder,
     Fixed,
+    ForceSensor,
     GearedMotor,
     LinearElastic,
     Pulley,
@@ -23,6 +23,7 @@ from nlsdesign.components import (
     Spring,
     StrainStiffening,
     TorsionDashpot,
+    TransportDelay,
     TwoSidedCam,
     ViscousMaterial,
     parallel,
@@ -58,7 +59,8 @@ def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
             parallel(oil=TorsionDashpot(damping=1e-3), rub=CoulombFriction(sliding_torque=0.02)), "motor"
         ),
         dial=Encoder(of="motor.angle", quantum=1e-3),
-        cell=DelayedForceSensor(of="spring.rope.rubber.force", delay=1e-3, gain=1.1, bias=2.0),
+        bus=TransportDelay(of="spring.rope.rubber.force", delay=1e-3),
+        cell=ForceSensor(of="bus.reading", gain=1.1, bias=2.0),
     )
 
 

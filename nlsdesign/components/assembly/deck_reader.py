@@ -17,7 +17,7 @@ from ...quantity import Quantity
 from ..core.element import Combination, Element
 from ..core.part import Part
 from ..core.tie import Tie
-from ..mechanics.bodies import Body
+from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
@@ -74,7 +74,7 @@ class Builder:
         if kind is None:
             return None
         fields = self.numbers(path, table, kind)
-        if inner and not issubclass(kind, Combination | Through):
+        if inner and not issubclass(kind, Combination | Through | GearedMotor):
             self._problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
         made = {key: child for key, child in children.items() if child is not None}
         if len(self.problems) > before or len(made) < len(children):
@@ -230,6 +230,8 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
         if "cam" not in children or len(behind) != 1:
             raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
         return {"cam": children["cam"], "behind": behind[0]}
+    if issubclass(kind, GearedMotor):
+        return {"chain": tuple(children.items())}
     if issubclass(kind, Gear):
         return {"between": tuple(table["between"])}
     return {"of": table["of"]} if issubclass(kind, Sensor) else {}

@@ -17,7 +17,7 @@ from ...identification.estimation.least_squares import declared_parameter, fit
 from ...identification.estimation.parameters import free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
-from ...model import Assembly, Variable
+from ...model import Assembly, Variable, flatten
 from ...parallel import shared_out
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
@@ -189,7 +189,8 @@ class Comparison:
             Fitted; the answer is remembered.
         """
         if not any(known is hypothesis for known, _ in self._known):
-            fitted = [DrivenBlock(b, ()) for b in blocks_of(hypothesis.fitted, self.bench.records.signals)]
+            model, signals = flatten(hypothesis.fitted), self.bench.records.signals
+            fitted = [DrivenBlock(b, ()) for b in blocks_of(model, signals)]
             seen = [e for b in fitted for e in self.bench.evidence(b, self.bench.records.records, {})]
             found = tuple(shared_out(lambda k: _judged(seen[k]), len(seen)))
             told = tuple(
@@ -200,7 +201,7 @@ class Comparison:
 
     def _driven(self, hypothesis: Hypothesis) -> list[DrivenBlock]:
         found = []
-        for block in blocks_of(hypothesis.assembly, self.bench.records.signals):
+        for block in blocks_of(flatten(hypothesis.assembly), self.bench.records.signals):
             spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
             found.append(DrivenBlock(block, list(dict.fromkeys([*spread, *own]))))

@@ -11,7 +11,7 @@ from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.estimation.least_squares import Fit, Parameter, declared_parameter, fit, predicted_cost
 from ...identification.statistics.residuals import effective_size
-from ...model import Variable
+from ...model import Variable, flatten
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Unknown
 from .hypothesis import Hypothesis
@@ -224,7 +224,7 @@ class Trials:
         sketch, names = before.added[-1].sketch if new else None, {b.block.name for b in group}
         if sketch is None:
             return []
-        blocks = [b for b in blocks_of(sketch, self._bench.records.signals) if b.name in names]
+        blocks = [b for b in blocks_of(flatten(sketch), self._bench.records.signals) if b.name in names]
         free = [p.name for p in choices[0]]
         driven = [DrivenBlock(b, [n for n in free if n in b.model.values]) for b in blocks]
         shared = {n for d in driven for n in d.free}
