@@ -77,7 +77,7 @@ def test_a_late_motor_that_saturates_is_both_in_any_order(order: tuple[str, str]
     # Behind the iron the wave has harmonics k, each with a phase error below (kωτ)⁵/720.
     amplitudes = 2.0 * np.abs(np.fft.rfft(expected[-401:-1])) / 400
     harmonics = np.arange(1, 20)
-    bound = amplitudes[2 * harmonics] @ np.minimum((harmonics * speed * delay) ** 5 / 720, 2.0)
+    bound = amplitudes[harmonics] @ np.minimum((harmonics * speed * delay) ** 5 / 720, 2.0)
     assert np.max(error) < 1.2 * bound + 1e-6
     at_once = TORQUE_PER_AMPERE * saturation * np.sin(np.arctan(6.0 * np.sin(speed * times) / saturation))
     assert np.max(np.abs(run["motor.drive_torque"] - at_once)[settled]) > 0.1
