@@ -1,4 +1,4 @@
-"""Through a chain of sensors every consumer sees the same state: blocks, screening, fits over windows, mapping."""
+"""Through a chain of sensors every consumer sees the same state: screening, fits over windows, mapping."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def bench_records(angle: str, size: float = 0.8) -> RecordSet:
 def test_sizes_are_those_of_the_angle_behind_the_chain(rig: Assembly, sensor: Sensor) -> None:
     direct = typical_sizes(rig, bench_records("motor_encoder.reading"))
     chained = typical_sizes(rig.with_part("log", sensor), bench_records("log.reading"))
-    assert direct["spring.cable.force"] > 100.0
+    assert direct["spring.cable.rubber.force"] > 100.0
     assert direct["motor.angle"] == pytest.approx(0.8, abs=1e-3)
     for name, size in direct.items():
         if name != "motor_encoder.reading":
@@ -144,15 +144,10 @@ def slide_records(position: str, late: float) -> RecordSet:
     return RecordSet(tuple(runs), columns)
 
 
+LOG = SampleAndHold(of="dial.reading", sample_rate=1e4)
 CHAINS = {
-    "latch": ({"log": SampleAndHold(of="body.position", sample_rate=1e4)}, 0.0),
-    "delay": (
-        {
-            "bus": TransportDelay(of="body.position", delay=0.04),
-            "log": SampleAndHold(of="bus.reading", sample_rate=1e4),
-        },
-        0.04,
-    ),
+    "two latches": ({"dial": SampleAndHold(of="body.position", sample_rate=1e4), "log": LOG}, 0.0),
+    "delay": ({"dial": TransportDelay(of="body.position", delay=0.04), "log": LOG}, 0.04),
 }
 
 
@@ -165,7 +160,7 @@ def test_a_window_begins_at_the_state_behind_the_chain(sensors: dict[str, Sensor
 
 
 def test_a_column_without_a_mapping_is_the_last_of_its_chain(tmp_path: Path, rig: Assembly) -> None:
-    """As after a diagnosis that has put a delay and a drift before the load cell, or with a latch behind it."""
+    """As after a diagnosis that has put a delay and a drift before the load cell."""
     write_records(tmp_path, make_records(ACTUATORS["arm"], {}, 5, only=("sine_15deg_5.0Hz",)))
     signals = load_records(tmp_path, flatten(rig)).signals
     others = {n: p for n, p in rig.parts if n != "force_sensor"}
