@@ -48,11 +48,11 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
     assembly
         As declared; load cells behind or before a delay are left out.
     """
-    found = []
+    candidates = []
     for name, sensor in _sensors_without(assembly, ForceSensor, TransportDelay).items():
         inserted = free_name(assembly, f"{name}_delay")
         delay = TransportDelay(of=sensor.of, delay=Quantity(1e-3, "s", SOURCE))
-        found.append(
+        candidates.append(
             Candidate(
                 "force_sensor_delay",
                 name,
@@ -62,7 +62,7 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
                 "Golub and Van Loan (Padé table)",
             )
         )
-    return found
+    return candidates
 
 
 def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
@@ -139,7 +139,7 @@ def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
     assembly
         As declared; encoders behind or before an eccentric disc are left out.
     """
-    found = []
+    candidates = []
     for name, sensor in _sensors_without(assembly, Encoder, Eccentricity).items():
         inserted = free_name(assembly, f"{name}_eccentricity")
         for order in _disc_orders(assembly, assembly.measured(sensor.of)[0]):
@@ -148,7 +148,7 @@ def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
             unknowns = (
                 Unknown(f"{inserted}.{part}", (0.0,), -largest, largest) for part in ("sine", "cosine")
             )
-            found.append(
+            candidates.append(
                 Candidate(
                     "angle_sensor_eccentricity",
                     name,
@@ -158,7 +158,7 @@ def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
                     "geometry; data sheets of encoders",
                 )
             )
-    return found
+    return candidates
 
 
 def _disc_orders(assembly: Assembly, measured: str) -> list[Quantity]:
@@ -179,11 +179,11 @@ def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
     assembly
         As declared; load cells behind or before a drift are left out.
     """
-    found = []
+    candidates = []
     for name, sensor in _sensors_without(assembly, ForceSensor, Drift).items():
         inserted = free_name(assembly, f"{name}_drift")
         drift = Drift(of=sensor.of, drift=Quantity(0.0, "N/s", SOURCE))
-        found.append(
+        candidates.append(
             Candidate(
                 "force_sensor_drift",
                 name,
@@ -193,4 +193,4 @@ def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
                 "data sheets of load cells",
             )
         )
-    return found
+    return candidates
