@@ -1,4 +1,4 @@
-"""Numbers with unit, source and spread; units are converted here and nowhere else."""
+"""Numbers with unit, source and spread; units are converted and typeset here and nowhere else."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ _ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "u": 1e-6, "n": 1e-9}
 _PREFIXED = {"g", "m", "s", "A", "N", "Pa", "J", "W", "V", "Hz", "rad", "Ohm", "Ω", "H", "K"}
 # Superscripts, and the Greek mu and the ohm sign that look like the micro sign and the Greek omega.
-_WRITTEN = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻\u03bc\u2126", "0123456789-\u00b5\u03a9")
+_TO_ASCII = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻\u03bc\u2126", "0123456789-\u00b5\u03a9")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
 
 
@@ -86,7 +87,7 @@ def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
         f"unit '{unit}'",
         f"'{token}' is not a known unit",
         did_you_mean=nearest(token, names),
-        next_step="write products and quotients of SI units, for instance 'N*m/rad', 'MPa', 'kg*m^2'",
+        next_step="write products and quotients of SI units, for instance 'N·m/rad' or 'N*m/rad', 'kg*m^2'",
     )
 
 
@@ -108,7 +109,7 @@ def parse_unit(text: str) -> Unit:
         If a symbol is not known.
     """
     factor, exponents = 1.0, [0] * len(BASE)
-    pieces = re.split(r"([*·/])", text.strip().translate(_WRITTEN).replace(" ", ""))
+    pieces = re.split(r"([*·/])", text.strip().translate(_TO_ASCII).replace(" ", ""))
     sign = 1
     for piece in pieces:
         if piece in ("*", "·"):
@@ -120,13 +121,61 @@ def parse_unit(text: str) -> Unit:
         match = _POWER.match(piece)
         if not match:
             raise UnitError(
-                f"unit '{text}'", f"'{piece}' cannot be read", next_step="write for instance 'N*m/rad'"
+                f"unit '{text}'",
+                f"'{piece}' cannot be read",
+                next_step="write for instance 'N·m/rad' or 'N*m/rad'",
             )
         power = sign * int(match["power"] or 1)
         one_factor, one = _atom(match["atom"], text)
         factor *= one_factor**power
         exponents = [total + power * each for total, each in zip(exponents, one, strict=True)]
     return Unit(text, factor, tuple(exponents))
+
+
+def typeset_unit(unit: str) -> str:
+    """Return a unit as it is typeset for people, an empty text for ``"1"``.
+
+    Machine formats (decks, CSV, FMI, JSON) keep the ASCII form; :func:`parse_unit` reads both.
+
+    Parameters
+    ----------
+    unit
+        As in decks.
+
+    Examples
+    --------
+    >>> typeset_unit("N*m/rad"), typeset_unit("kg*m^2"), typeset_unit("m*s^-2"), typeset_unit("mOhm")
+    ('N·m/rad', 'kg·m²', 'm·s⁻²', 'mΩ')
+    """
+    if unit == "1":
+        return ""
+    pieces = re.split(r"([*·/])", unit.translate(_TO_ASCII).replace(" ", ""))
+    return "".join("·" if piece == "*" else _typeset_power(piece) for piece in pieces)
+
+
+def _typeset_power(piece: str) -> str:
+    match = _POWER.match(piece)
+    if match is None:
+        return piece
+    return match["atom"].replace("Ohm", "Ω") + (match["power"] or "").translate(_SUPERSCRIPTS)
+
+
+def with_unit(number: str, unit: str) -> str:
+    """Return a number that is text already with its unit, typeset for people.
+
+    Parameters
+    ----------
+    number
+        For instance ``"0.05"``.
+    unit
+        As in decks; ``"1"`` adds nothing.
+
+    Examples
+    --------
+    >>> with_unit("0.05", "N*m"), with_unit("3", "1")
+    ('0.05 N·m', '3')
+    """
+    return f"{number} {typeset_unit(unit)}".rstrip()
 
 
 def _plain(value: float | Iterable[float]) -> float | tuple[float, ...]:
@@ -150,6 +199,11 @@ class Quantity:
         Citation, data-sheet page, bench file with date, or "assumed" with a reason.
     spread
         One-sided relative spread; 0.06 means ± 6 %.
+
+    Raises
+    ------
+    ValueRangeError
+        If the row is empty, a value is not finite, or the spread is negative.
     """
 
     value: float | tuple[float, ...]
@@ -162,9 +216,9 @@ class Quantity:
         object.__setattr__(self, "_parsed", parse_unit(self.unit))
         object.__setattr__(self, "value", _plain(self.value))
         if not self.values:
-            raise ValueRangeError(f"() {self.unit}", "a row of numbers needs at least one")
+            raise ValueRangeError(with_unit("()", self.unit), "a row of numbers needs at least one")
         if not all(math.isfinite(item) for item in self.values):
-            raise ValueRangeError(f"{self.value} {self.unit}", "a quantity must be finite")
+            raise ValueRangeError(with_unit(str(self.value), self.unit), "a quantity must be finite")
         if not self.spread >= 0.0:
             raise ValueRangeError(f"spread {self.spread}", "a relative spread is a number >= 0, 0.06 for 6 %")
 
@@ -183,7 +237,7 @@ class Quantity:
             If the quantity is a row of numbers.
         """
         if isinstance(self.value, tuple):
-            raise ValueRangeError(f"{self.value} {self.unit}", "one number was expected, not a row")
+            raise ValueRangeError(with_unit(str(self.value), self.unit), "one number was expected, not a row")
         return self.value
 
     @property
@@ -205,7 +259,7 @@ class Quantity:
         value
             New value(s) in SI.
         source
-            New source. Without it the copy says so, and of what number the old source spoke.
+            New source. Without one the copy says that it was changed, and from which number and source.
 
         Examples
         --------
@@ -214,11 +268,12 @@ class Quantity:
         """
         new = replace(self, value=value)
         if source is None:
-            source = self.source if new.value == self.value else changed_source(self._told(), self.source)
+            source = self.source if new.value == self.value else changed_source(self._brief(), self.source)
         return replace(new, source=source)
 
-    def _told(self) -> str:
-        return str(self) if len(self.values) <= 4 else f"{len(self.values)} numbers in {self.unit}"
+    def _brief(self) -> str:
+        count = len(self.values)
+        return str(self) if count <= 4 else f"{count} numbers in {typeset_unit(self.unit)}"
 
     def __str__(self) -> str:
         shown = self.shown
@@ -227,7 +282,7 @@ class Quantity:
             if isinstance(shown, tuple)
             else f"{shown:.6g}"
         )
-        return f"{text} {self.unit}" if self.unit != "1" else text
+        return with_unit(text, self.unit)
 
 
 def changed_source(old: str, source: str) -> str:
@@ -236,9 +291,9 @@ def changed_source(old: str, source: str) -> str:
     Parameters
     ----------
     old
-        The number as it was, with unit.
+        The number before the change, with unit.
     source
-        Of that number. The first number that had a source is remembered, however often it is changed.
+        Source of that number. After several changes it is still the first number with a source.
     """
     known = source != NOT_STATED and not source.startswith(_CHANGED)
     return f"{_CHANGED} {old}: {source}" if known else source
@@ -268,6 +323,32 @@ def quantity(
     factor, plain = parse_unit(unit).factor, _plain(value)
     converted = tuple(item * factor for item in plain) if isinstance(plain, tuple) else plain * factor
     return Quantity(converted, unit, source, spread)
+
+
+def significant(values: Iterable[float], digits: int = 9) -> tuple[float, ...]:
+    """Return numbers rounded to significant digits of the largest of them, zero and all.
+
+    What a spline, a solver or a fit gives differs in its last digits from one processor to the next; a number
+    that is written down is rounded to what it means, so that everybody writes the same.
+
+    Parameters
+    ----------
+    values
+        Numbers of one row, in one unit.
+    digits
+        How many digits of the largest magnitude stay.
+
+    Examples
+    --------
+    >>> significant([0.0123456789012, 1.2e-19], 6)
+    (0.0123457, 0.0)
+    """
+    row = [float(v) for v in values]
+    largest = max((abs(v) for v in row if math.isfinite(v)), default=0.0)
+    if largest == 0.0:
+        return tuple(row)
+    places = digits - 1 - math.floor(math.log10(largest))
+    return tuple(round(v, places) + 0.0 for v in row)
 
 
 def degrees(value: float) -> float:

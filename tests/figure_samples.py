@@ -58,7 +58,7 @@ def loop(lag: float) -> tuple[np.ndarray, np.ndarray]:
     return 0.7 * np.sin(phase), 2.0 * np.sin(phase + lag)
 
 
-def closed_loop() -> figures.ClosedLoop:
+def closed_loop() -> figures.ClosedLoopRun:
     signals = {
         "reference": np.interp(TIME + 0.01, TIME, torque()),
         "plant.spring.torque": torque(),
@@ -125,5 +125,12 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
     ),
     "gap_bars": lambda: figures.gap_bars(RECORDS, unit="N"),
     "held_out_series": lambda: figures.held_out_series(held_out()),
+    "binned_errors": lambda: figures.binned_errors(
+        (TIME[::200], torque()[::200]),
+        (TIME[::200], 0.1 * torque()[::200]),
+        across="motor.angle in rad",
+        unit="N*m",
+        name="block load",
+    ),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
 }

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ..components.assembly.deck_writer import deck_problems, declare, write_deck
-from ..components.assembly.named_parts import Assembly
 from ..deck import deck_names, load_deck
 from ..errors import NlsError
 from ..locations import bundled
-from ..model import flatten
-from ..quantity import Quantity, sources
+from ..quantity import Quantity, sources, with_unit
 from .output import json_option, show_json, show_table
+
+if TYPE_CHECKING:
+    from ..components.assembly.named_parts import Assembly
 
 _file = click.Path(path_type=Path, dir_okay=False, exists=True)
 
@@ -35,6 +36,8 @@ def list_decks() -> None:
 @json_option
 def check(deck_name: str, as_json: bool) -> None:
     """Name every problem with line and column, and the share of numbers that are only assumed."""
+    from ..components.assembly.deck_writer import deck_problems, declare
+
     read = load_deck(deck_name)
     problems = deck_problems(read) or _model_problems(declare(read))
     if problems:
@@ -51,6 +54,8 @@ def check(deck_name: str, as_json: bool) -> None:
 
 def _model_problems(assembly: Assembly) -> list[NlsError]:
     """Return what shows only when the equations are written, such as a sensor of a missing signal."""
+    from ..model import flatten
+
     try:
         flatten(assembly)
     except NlsError as error:
@@ -63,6 +68,8 @@ def _model_problems(assembly: Assembly) -> list[NlsError]:
 @json_option
 def show(deck_name: str, as_json: bool) -> None:
     """Draw the parts and list the numbers."""
+    from ..components.assembly.deck_writer import declare
+
     assembly = declare(load_deck(deck_name))
     numbers = assembly.quantities()
     if as_json:
@@ -86,10 +93,12 @@ def show(deck_name: str, as_json: bool) -> None:
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
 def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
+    from ..components.assembly.deck_writer import write_deck
+
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
     write_deck(assembly, out)
     click.echo(f"written: {out}, {len(assembly.quantities())} numbers; next: nlsdesign diagnose --deck {out}")
 
 
 def _short(given: Quantity) -> str:
-    return str(given) if len(given.values) < 8 else f"{len(given.values)} numbers in {given.unit}"
+    return str(given) if len(given.values) < 8 else with_unit(f"{len(given.values)} numbers in", given.unit)

@@ -2,13 +2,21 @@
 
 from matplotlib.figure import Figure
 
-from .cam import CamMotion, cam_motion, cam_motion_of, cam_positions
+from .before_after import (
+    CandidateShare,
+    HeldOut,
+    RecordError,
+    binned_errors,
+    candidate_shares,
+    gap_bars,
+    held_out_series,
+)
 from .cam_frames import CamPicture, cam_picture, torque_curve
+from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
-from .gap import CandidateShare, HeldOut, RecordError, candidate_shares, gap_bars, held_out_series
-from .numbers import compact, shown_unit, significant
+from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
-from .over_time import ClosedLoop, closed_loop, closed_loop_of, observer_error, over_time
+from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
@@ -17,11 +25,12 @@ __all__ = [
     "CamMotion",
     "CamPicture",
     "CandidateShare",
-    "ClosedLoop",
+    "ClosedLoopRun",
     "Figure",
     "HeldOut",
     "RecordError",
     "alternative_text",
+    "binned_errors",
     "cam_motion",
     "cam_motion_of",
     "cam_picture",
@@ -41,7 +50,6 @@ __all__ = [
     "observer_error",
     "observer_stability",
     "over_time",
-    "shown_unit",
     "significant",
     "stability_over_angle",
     "styled",

@@ -1,4 +1,4 @@
-"""The moving picture of a cam: what changes from angle to angle, ready to be put into an SVG."""
+"""The moving picture of a cam: one frame per angle, as lengths and paths for an SVG."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from .cam import CamMotion
-from .numbers import significant
+from .cam_motion import CamMotion
+from .number_text import significant
 from .style import BLUE, VERMILLION, described, panels, styled
 
 Floats = NDArray[np.float64]
 
 _MM = 1e3
-_MOST_POINTS = 24
-"""Points of the cable along the lip and of a lip itself: more cannot be seen."""
+_POINTS = 24
+"""Half the number of points above which a lip or the cable along it is drawn with fewer points."""
 MARKER = "now"
 """Identifier of the marker in the torque curve."""
 
@@ -73,7 +73,7 @@ def cam_picture(motion: CamMotion, *, start: float | None = None) -> CamPicture:
     tallest = max(float(np.max(motion.contour.radii)), 6.5e-3)
     lower, upper = motion.halves
     return CamPicture(
-        halves=(_path(_fewer(lower) * _MM) + " Z", _path(_fewer(upper) * _MM) + " Z"),
+        halves=(_path(_reduced(lower) * _MM) + " Z", _path(_reduced(upper) * _MM) + " Z"),
         width=motion.wall * _MM + 2.0,
         height=tallest * _MM + 1.5,
         wall=motion.wall * _MM,
@@ -113,8 +113,8 @@ def torque_curve(motion: CamMotion, *, at: int) -> Figure:
 def _places(curve: Figure, motion: CamMotion) -> Floats:
     """Return where the marker stands at each angle, in points of the SVG, y downwards."""
     curve.draw_without_rendering()
-    found = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
-    places: Floats = found * [1.0, -1.0] * 72.0 / curve.dpi
+    pixels = curve.axes[0].transData.transform(np.column_stack([np.degrees(motion.angles), motion.torques]))
+    places: Floats = pixels * [1.0, -1.0] * 72.0 / curve.dpi
     return places
 
 
@@ -125,7 +125,7 @@ def _frame(motion: CamMotion, index: int, shift: Floats) -> dict[str, Any]:
     foot = contact - along * float(contact @ along)
     length, height = motion.rubber(index)
     clamp = np.array([motion.wall - length, guide[1]])
-    whole = np.vstack([_fewer(wrapped), contact, guide, clamp])
+    whole = np.vstack([_reduced(wrapped), contact, guide, clamp])
     return {
         "angle": round(float(np.degrees(motion.angles[index])), 1),
         "cable": _path(whole * _MM),
@@ -143,11 +143,11 @@ def _frame(motion: CamMotion, index: int, shift: Floats) -> dict[str, Any]:
     }
 
 
-def _fewer(points: Floats) -> Floats:
-    """Return at most a few dozen of the points, first and last among them."""
-    if len(points) <= 2 * _MOST_POINTS + 1:
+def _reduced(points: Floats) -> Floats:
+    """Return at most 96 of the points, including the first and the last."""
+    if len(points) <= 2 * _POINTS + 1:
         return points
-    kept = np.unique(np.round(np.linspace(0, len(points) - 1, 4 * _MOST_POINTS)).astype(int))
+    kept = np.unique(np.round(np.linspace(0, len(points) - 1, 4 * _POINTS)).astype(int))
     result: Floats = points[kept]
     return result
 

@@ -1,4 +1,4 @@
-"""Curves over any quantity, one panel or several: for calculations that have no figure of their own."""
+"""Curves over any quantity, for calculations that have no figure of their own."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def curves(
     lines
         Abscissa and ordinate by label, each of shape (n,); fewer than 40 points are drawn as points too.
     across, up
-        What stands on the axes, with units.
+        Labels of the axes, with units.
     words
-        What the figure shows, for those who cannot see it.
+        Alternative text: what the figure shows.
     logarithmic
         Whether the abscissa is logarithmic.
 

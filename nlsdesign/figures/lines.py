@@ -1,4 +1,4 @@
-"""Lines with no more points than a figure can show."""
+"""Lines reduced to the points that a figure can show."""
 
 from __future__ import annotations
 

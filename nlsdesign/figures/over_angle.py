@@ -1,4 +1,4 @@
-"""What is known of a model over its angle: observability, best estimate, stability, stiffness."""
+"""Results over the angle: observability, estimation error, stability, stiffness."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..analysis import Chart
 from ..observer import ErrorStability
-from .numbers import significant
+from .number_text import significant
 from .style import DASHES, INK, MUTED, described, legend, log_axis, look, panels, styled
 
 
@@ -31,13 +31,13 @@ def observability_over_angle(charts: Mapping[str, Chart]) -> Figure:
     deviations = {label: chart for label, chart in charts.items() if "deviation.best" in _columns(chart)}
     count = 3 if deviations else 2
     figure, axes = panels(count, height=1.5 + 1.4 * count, sharex=True, height_ratios=[1, 1.7, 1.7][:count])
-    said = []
+    summaries = []
     for number, (label, chart) in enumerate(charts.items()):
         degrees = np.degrees(chart.at)
         color, dash, _ = look(number)
         rank = chart["observability.rank"]
         axes[0].step(degrees, rank, where="mid", label=label, color=color, linestyle=dash)
-        said.append(_condition(axes[1], chart, number, label))
+        summaries.append(_condition(axes[1], chart, number, label))
     axes[0].set_ylabel("rank")
     axes[0].yaxis.set_major_locator(MaxNLocator(integer=True))
     axes[0].margins(y=0.25)
@@ -49,12 +49,12 @@ def observability_over_angle(charts: Mapping[str, Chart]) -> Figure:
     if deviations:
         _deviations(axes[2], deviations)
     axes[-1].set_xlabel("angle in degrees")
-    return described(figure, f"Observability over the angle. {' '.join(said)}")
+    return described(figure, f"Observability over the angle. {' '.join(summaries)}")
 
 
 @styled
 def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
-    """Draw the slowest decay at rest, and the stiffness slow and fast.
+    """Draw the slowest decay at rest, and the relaxed and the instantaneous stiffness.
 
     Parameters
     ----------
@@ -62,19 +62,19 @@ def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
         By label, each with the columns of ``Stability``.
     """
     figure, (left, right) = panels(1, 2, height=3.2)
-    said = []
+    summaries = []
     for number, (label, chart) in enumerate(charts.items()):
         degrees, decay = np.degrees(chart.at), chart["decay"]
         tone, own, _ = look(number)
         left.plot(degrees, decay, color=tone, linestyle=own, label=label)
-        for name, dash, what in (
-            ("stiffness.fast", "-", "sudden"),
-            ("stiffness.slow", DASHES[1], "all relaxed"),
+        for name, dash, state in (
+            ("stiffness.fast", "-", "instantaneous"),
+            ("stiffness.slow", DASHES[1], "relaxed"),
         ):
-            shown = f"{label}, {what}" if len(charts) > 1 else what
+            shown = f"{label}, {state}" if len(charts) > 1 else state
             right.plot(degrees, chart[name], color=tone, linestyle=dash, label=shown)
         worst = int(np.argmax(decay))
-        said.append(
+        summaries.append(
             f"{label}: slowest eigenvalue {significant(float(decay[worst]))} 1/s at {degrees[worst]:.0f}°."
         )
     left.axhline(0.0, color=INK.light, linewidth=0.9, linestyle=(0, (4, 2)))
@@ -87,15 +87,15 @@ def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
     if len(charts) > 1:
         left.legend(loc="best")
     right.legend(loc="best")
-    return described(figure, f"Stability and stiffness over the angle. {' '.join(said)}")
+    return described(figure, f"Stability and stiffness over the angle. {' '.join(summaries)}")
 
 
 @styled
 def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: float) -> Figure:
     """Draw how fast the error of each observer decays at each angle.
 
-    The decay is −ln(spectral radius)/T: below zero the error would grow. Whether it is proved for a moving
-    angle, or checked at frozen angles only, stands in the legend.
+    The decay is −ln(spectral radius)/T: below zero the error would grow. The legend states whether it is
+    proved for a moving angle or checked at frozen angles only.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: flo
         T in s.
     """
     figure, (axes,) = panels(height=3.0)
-    said = []
+    summaries = []
     for number, (label, check) in enumerate(checks.items()):
         color, dash, _ = look(number)
         decay = -np.log(check.radius) / sample_time
@@ -115,7 +115,7 @@ def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: flo
         axes.plot(np.degrees(check.angles), decay, color=color, linestyle=dash, label=f"{label} ({known})")
         at = int(np.argmin(decay))
         where = f"{np.degrees(check.angles[at]):.0f}°"
-        said.append(f"{label}: slowest {significant(float(decay[at]))} 1/s at {where}, {known}.")
+        summaries.append(f"{label}: slowest {significant(float(decay[at]))} 1/s at {where}, {known}.")
     if all(np.all(check.radius < 1.0) for check in checks.values()):
         log_axis(axes)
     else:
@@ -124,7 +124,7 @@ def observer_stability(checks: Mapping[str, ErrorStability], *, sample_time: flo
     axes.set_ylabel("decay in 1/s")
     axes.set_xlabel("angle in degrees")
     legend(axes, columns=2)
-    return described(figure, f"Decay of the observers' error over the angle. {' '.join(said)}")
+    return described(figure, f"Decay of the observers' error over the angle. {' '.join(summaries)}")
 
 
 def _columns(chart: Chart) -> set[str]:
@@ -136,14 +136,16 @@ def _condition(axes: Axes, chart: Chart, number: int, label: str) -> str:
     finite = np.isfinite(condition)
     tone, dash, _ = look(number)
     axes.plot(degrees, np.where(finite, condition, np.nan), label=label, color=tone, linestyle=dash)
-    lost = degrees[~finite]
-    height = np.full(len(lost), 0.97 - 0.07 * number)
+    unobservable = degrees[~finite]
+    height = np.full(len(unobservable), 0.97 - 0.07 * number)
     crosses: Any = {"linestyle": "none", "marker": "x", "markersize": 5, "markeredgewidth": 1.6}
-    axes.plot(lost, height, transform=axes.get_xaxis_transform(), color=tone, **crosses)
+    axes.plot(unobservable, height, transform=axes.get_xaxis_transform(), color=tone, **crosses)
     best = f"best condition number {significant(float(np.min(condition)), 2)}"
-    if not len(lost):
+    if not len(unobservable):
         return f"{label}: observable everywhere, {best}."
-    where = ", ".join(f"{angle:.1f}°" for angle in lost[:5]) + (" and others" if len(lost) > 5 else "")
+    where = ", ".join(f"{angle:.1f}°" for angle in unobservable[:5]) + (
+        " and others" if len(unobservable) > 5 else ""
+    )
     return f"{label}: not observable at {where}; {best}."
 
 
@@ -157,7 +159,7 @@ def _deviations(axes: Axes, charts: Mapping[str, Chart]) -> None:
             degrees, alone, color=MUTED.light, linestyle=DASHES[1], label=f"{prefix}model alone", **points
         )
         axes.plot(degrees, best, color=tone, label=f"{prefix}best use of the measurement", **points)
-    axes.set_ylabel("deviation in mN·m")
+    axes.set_ylabel("standard deviation in mN·m")
     axes.set_title("Standard deviation of the torque estimate")
     axes.set_ylim(bottom=0.0)
     legend(axes, columns=2)

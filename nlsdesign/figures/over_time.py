@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..errors import ValueRangeError
+from ..quantity import typeset_unit
 from ..simulation import Trace
 from .lines import thinned
-from .numbers import root_mean_square, significant
+from .number_text import root_mean_square, significant
 from .style import DASHES, INK, MUTED, ORANGE, SERIES, described, legend, log_axis, look, panels, styled
 
 Floats = NDArray[np.float64]
@@ -35,12 +36,12 @@ def observer_error(time: Floats, true: Floats, estimates: Mapping[str, Floats]) 
     _same_length(time, {"true torque": true, **estimates})
     figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.5, 1])
     upper.plot(*thinned(time, true), color=INK.light, linewidth=2.4, alpha=0.45, label="true")
-    said = []
+    summaries = []
     for number, (label, values) in enumerate(estimates.items()):
         tone, dash, _ = look(number)
         error = values - true
         rms = f"{significant(1e3 * root_mean_square(error))} mN·m"
-        said.append(f"{label} {rms}")
+        summaries.append(f"{label} {rms}")
         upper.plot(*thinned(time, values), color=tone, linestyle=dash, label=label, linewidth=1.3)
         lower.plot(
             *thinned(time, 1e3 * error),
@@ -51,12 +52,12 @@ def observer_error(time: Floats, true: Floats, estimates: Mapping[str, Floats]) 
         )
     lower.axhline(0.0, color=MUTED.light, linewidth=0.8)
     _finish(upper, "torque in N·m", "Torque of the spring")
-    _finish(lower, "error in mN·m", "Estimate minus truth")
+    _finish(lower, "error in mN·m", "Estimated minus true torque")
     lower.set_xlabel("time in s")
     return described(
         figure,
         f"True and estimated torque over {significant(float(time[-1] - time[0]))} s, and the error. "
-        f"Root mean square error: {'; '.join(said)}.",
+        f"Root mean square error: {'; '.join(summaries)}.",
     )
 
 
@@ -71,9 +72,10 @@ def over_time(time: Floats, curves: Mapping[str, Floats], *, quantity: str, unit
     curves
         Signals by name.
     quantity, unit
-        What they are, for the axis and the words.
+        Quantity and unit, for the axis and the alternative text.
     """
     _same_length(time, curves)
+    unit = typeset_unit(unit) or "1"
     figure, (axes,) = panels(1, height=2.8)
     for number, (label, values) in enumerate(curves.items()):
         tone, dash, _ = look(number)
@@ -84,13 +86,14 @@ def over_time(time: Floats, curves: Mapping[str, Floats], *, quantity: str, unit
         f"{n} from {significant(float(v.min()))} to {significant(float(v.max()))}" for n, v in curves.items()
     )
     return described(
-        figure, f"{quantity} over {significant(float(time[-1] - time[0]))} s in {unit}: {sizes}."
+        figure,
+        f"{quantity} over {significant(float(time[-1] - time[0]))} s in {unit}: {sizes}.",
     )
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedLoop:
-    """What a closed loop did; arrays of shape (n,), in SI.
+class ClosedLoopRun:
+    """Signals of a closed loop over time; arrays of shape (n,), in SI.
 
     Parameters
     ----------
@@ -120,7 +123,7 @@ def closed_loop_of(
     estimated: str,
     current: str,
     current_limit: float = float("inf"),
-) -> ClosedLoop:
+) -> ClosedLoopRun:
     """Return the closed loop that a simulation or co-simulation ran.
 
     Parameters
@@ -137,23 +140,23 @@ def closed_loop_of(
     UnknownNameError
         If the trace has no such signal.
     """
-    return ClosedLoop(
+    return ClosedLoopRun(
         trace.time, trace[desired], trace[true], trace[estimated], trace[current], current_limit
     )
 
 
 @styled
 def closed_loop(
-    run: ClosedLoop, *, differences: Mapping[str, Floats] | None = None, bound: float | None = None
+    run: ClosedLoopRun, *, differences: Mapping[str, Floats] | None = None, bound: float | None = None
 ) -> Figure:
-    """Draw desired, true and estimated torque, the current, and the distance to another simulation.
+    """Draw desired, true and estimated torque, the current, and the differences to another simulation.
 
     Parameters
     ----------
     run
         The closed loop.
     differences
-        By label: difference of a signal to the same one in another simulation, shape (n,), relative or in SI.
+        By label: difference of a signal between two simulations, shape (n,), relative or in SI.
     bound
         Stated bound of the differences.
     """
@@ -193,7 +196,7 @@ def _differences(axes: Axes, time: Floats, differences: Mapping[str, Floats], bo
     for number, (label, values) in enumerate(differences.items()):
         tone, dash, _ = look(number)
         size = np.abs(values)
-        # Exact agreement has no place on a logarithmic axis.
+        # Zero has no place on a logarithmic axis.
         x, y = thinned(time, np.where(size > 0.0, size, np.nan))
         largest = f"{significant(float(np.max(size)), 2)} at most"
         axes.plot(x, y, color=tone, linestyle=dash, linewidth=1.0, label=f"{label}: {largest}")

@@ -1,9 +1,9 @@
-"""One look for all figures: colours, sizes, and where the words stand.
+"""One style for all figures: colours, sizes, legends and alternative texts.
 
-Colours are those of Okabe and Ito (Color Universal Design, 2008), purple and orange darkened until they stand
-out 3:1 from white. Each has a twin for dark pages. A figure is drawn once, in the light colours; inline in a
-report each of them becomes a CSS variable (see :mod:`nlsdesign.figures.svg`), so one rendering serves light,
-dark and print: half the bytes of two renderings, and the two cannot disagree. Colour never carries meaning
+Colours are those of Okabe and Ito (Color Universal Design, 2008), purple and orange darkened to a
+contrast of 3:1 with white. Each has a second value for dark pages. A figure is drawn once,
+in the light colours; inline in a report each of them becomes a CSS variable (see
+:mod:`nlsdesign.figures.svg`), so one rendering serves light, dark and print. Colour never carries meaning
 alone: lines differ in dashes, points in shape.
 """
 
@@ -21,7 +21,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from .numbers import superscript
+from .number_text import superscript
 
 P = ParamSpec("P")
 
@@ -137,7 +137,7 @@ def look(number: int) -> Look:
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Let a function draw in the style of the house, whatever the user's own settings of matplotlib are.
+    """Let a function draw in the common style, independent of the user's settings of matplotlib.
 
     Parameters
     ----------
@@ -169,14 +169,14 @@ def panels(
     **options
         For ``Figure.subplots``, for instance ``sharex=True`` or ``height_ratios``.
     """
-    # A dot is a point: the layout of the SVG is then the layout that was asked for.
+    # At 72 dots per inch a dot is a point, so the SVG has the requested layout.
     figure = Figure(figsize=(width, height), dpi=72)
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     return figure, list(axes.flat)
 
 
 def legend(axes: Axes, *, columns: int = 4) -> None:
-    """Put the legend above a panel, where it covers no data; nothing if there is nothing to explain.
+    """Put the legend above a panel, where it covers no data; none without labelled lines.
 
     It stands beside the title where both fit into one line, else below it.
 
@@ -239,7 +239,7 @@ def _short(axis: Axis) -> bool:
 
 
 def described(figure: Figure, text: str) -> Figure:
-    """Attach the words that stand for a figure where it cannot be seen.
+    """Attach the alternative text of a figure, for readers who cannot see it.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def described(figure: Figure, text: str) -> Figure:
 
 
 def alternative_text(figure: Figure) -> str:
-    """Return the words attached by :func:`described`, or an empty text.
+    """Return the text attached by :func:`described`, or an empty text.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d+")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
-_POINTED = re.compile(r"#([\w-]+)")
+_REFERENCE = re.compile(r"#([\w-]+)")
 _GEOMETRY = ("d", "x", "y", "points", "width", "height")
 SUFFIXES = (".svg", ".png")
 
@@ -52,19 +52,19 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
     figure
         Any figure.
     key
-        Word that no other figure of the page uses.
+        Identifier that no other figure of the page uses.
     alternative
-        Words for those who cannot see it; those attached to the figure by default.
+        Alternative text; by default the one attached to the figure.
     """
     stream = io.StringIO()
     with mpl.rc_context(STYLE):
         figure.savefig(stream, format="svg", metadata={"Date": None})
     root = ET.fromstring(stream.getvalue())
-    _drop(root)
-    kept = {name for element in root.iter() for name in _pointed_at(element)}
+    _remove_global(root)
+    kept = {name for element in root.iter() for name in _references(element)}
     kept |= {str(artist.get_gid()) for artist in figure.findobj() if artist.get_gid()}
     for element in root.iter():
-        _mend(element, key, kept)
+        _adapt(element, key, kept)
     for name in ("width", "height", "version"):
         root.attrib.pop(name, None)
     root.set("role", "img")
@@ -110,20 +110,20 @@ def _content(figure: Figure, suffix: str) -> bytes:
     return stream.getvalue()
 
 
-def _drop(root: ET.Element) -> None:
-    """Remove what would act on the whole page (a style for ``*``) or says nothing there (metadata)."""
+def _remove_global(root: ET.Element) -> None:
+    """Remove the style for ``*``, which would act on the whole page, and the metadata."""
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
                 parent.remove(child)
 
 
-def _pointed_at(element: ET.Element) -> set[str]:
+def _references(element: ET.Element) -> set[str]:
     links = [element.get(_LINK, ""), element.get("clip-path", ""), element.get("style", "")]
-    return {name for text in links for name in _POINTED.findall(text)}
+    return {name for text in links for name in _REFERENCE.findall(text)}
 
 
-def _mend(element: ET.Element, key: str, kept: set[str]) -> None:
+def _adapt(element: ET.Element, key: str, kept: set[str]) -> None:
     name = element.get("id")
     if name is not None:
         del element.attrib["id"]
@@ -137,7 +137,7 @@ def _mend(element: ET.Element, key: str, kept: set[str]) -> None:
         style = element.get("style", "").replace("url(#", f"url(#{key}-")
         element.set("style", _COLOUR.sub(lambda m: _VARIABLES.get(m[0].lower(), m[0]), style))
     for attribute in ("fill", "stroke"):
-        # Attributes know no variables, styles do.
+        # CSS variables work in styles, not in attributes.
         if element.get(attribute, "").lower() in _VARIABLES:
             colour = _VARIABLES[element.attrib.pop(attribute).lower()]
             element.set("style", f"{attribute}: {colour}; {element.get('style', '')}")

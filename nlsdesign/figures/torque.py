@@ -13,7 +13,7 @@ from ..design import Target
 from ..errors import ValueRangeError
 from ..identification.statistics.metrics import Agreement
 from .lines import thinned
-from .numbers import root_mean_square, significant
+from .number_text import root_mean_square, significant
 from .style import BLUE, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled
 
 Floats = NDArray[np.float64]
@@ -23,12 +23,12 @@ Curve = tuple[Floats, Floats]
 
 @styled
 def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figure:
-    """Draw designs against the target with its tolerance band; below, how far they are off.
+    """Draw designs against the target with its tolerance band; below, their errors.
 
     Parameters
     ----------
     target
-        Torque curve that is wanted.
+        Required torque curve.
     designs
         By label.
     """
@@ -45,12 +45,12 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
         degrees, target.torque(grid), color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target"
     )
     lower.axhline(0.0, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)))
-    found = []
+    summaries = []
     for number, (label, (angle, torque)) in enumerate(designs.items()):
         tone, dash, _ = look(number)
         error = torque - target.torque(np.clip(angle, 0.0, target.last_angle))
         rms = root_mean_square(error)
-        found.append(f"{label} {significant(1e3 * rms, 2)} mN·m")
+        summaries.append(f"{label} {significant(1e3 * rms, 2)} mN·m")
         upper.plot(np.degrees(angle), torque, color=tone, linestyle=dash, label=label)
         lower.plot(
             np.degrees(angle),
@@ -65,7 +65,7 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
     return described(
         figure,
         f"Torque over the angle up to {degrees[-1]:.0f}° and {target.largest:.1f} N·m, designs against "
-        f"target, with the error below. Root mean square error: {'; '.join(found)}.",
+        f"target, with the error below. Root mean square error: {'; '.join(summaries)}.",
     )
 
 
@@ -80,27 +80,27 @@ def torque_against_measured(
     models, measured
         By label. Angles of a model ascend; each model is compared with each measurement.
     notes
-        What the legend says behind the label of a model, for instance its error in the paper's metric.
+        Text behind the label of a model in the legend, for instance its error in the metric of a paper.
     """
-    _need("measured points", measured)
+    _require("measured points", measured)
     figure, (upper, lower) = panels(2, height=4.8, sharex=True, height_ratios=[2.2, 1])
     lower.axhline(0.0, color=MUTED.light, linewidth=0.8)
-    said = []
+    descriptions = []
     for number, (label, (angle, torque)) in enumerate(models.items()):
         tone, dash, _ = look(number)
         note = (notes or {}).get(label, "")
-        said.append(f"{label} ({note})" if note else label)
+        descriptions.append(f"{label} ({note})" if note else label)
         upper.plot(*thinned(np.degrees(angle), torque), color=tone, linestyle=dash, label=": ".join(
             part for part in (label, note) if part))  # fmt: skip
-        for place, (at, points) in enumerate(measured.values()):
-            marker = look(place).marker
+        for position, (at, points) in enumerate(measured.values()):
+            marker = look(position).marker
             inside = (at >= angle[0]) & (at <= angle[-1])
             error = np.interp(at[inside], angle, torque) - points[inside]
             lower.plot(
                 np.degrees(at[inside]), error, color=tone, linestyle=dash, linewidth=0.8, marker=marker
             )
-    for place, (label, (at, points)) in enumerate(measured.items()):
-        marker = look(place).marker
+    for position, (label, (at, points)) in enumerate(measured.items()):
+        marker = look(position).marker
         upper.plot(np.degrees(at), points, color=INK.light, linestyle="none", marker=marker, label=label,
                    markerfacecolor="none", markeredgewidth=1.2, markersize=5.5)  # fmt: skip
     _label(upper, "torque in N·m", "Torque of the spring", columns=2)
@@ -110,7 +110,7 @@ def torque_against_measured(
     upper.margins(x=0.02)
     return described(
         figure,
-        f"Torque over the angle: {' and '.join(measured)} against {' and '.join(said)}, and the gap.",
+        f"Torque over the angle: {' and '.join(measured)} against {' and '.join(descriptions)}; error below.",
     )
 
 
@@ -118,28 +118,28 @@ def torque_against_measured(
 def torque_loops(loops: Mapping[str, tuple[Curve, Curve]]) -> Figure:
     """Draw measured and simulated loops of torque over angle, one panel each.
 
-    The area of a loop is the energy lost per cycle; it stands in the title of its panel.
+    The area of a loop is the energy lost per cycle; the title of the panel states it.
 
     Parameters
     ----------
     loops
-        By title: measured, then simulated loop, in the order in which they were run through.
+        By title: measured, then simulated loop, samples in the order of time.
     """
-    _need("loops", loops)
+    _require("loops", loops)
     figure, axes = panels(1, len(loops), height=3.5, sharey=True)
-    words = []
+    energies = []
     for panel, (title, (measured, model)) in zip(axes, loops.items(), strict=True):
         panel.plot(*_degrees(measured), color=INK.light, linewidth=1.1, label="measured")
         panel.plot(*_degrees(model), color=BLUE.light, linestyle=DASHES[1], label="model")
         areas = [significant(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
-        words.append(f"{title}: {areas[0]} mJ measured, {areas[1]} mJ in the model")
+        energies.append(f"{title}: {areas[0]} mJ measured, {areas[1]} mJ in the model")
         panel.set_title(f"{title}, lost per cycle: {areas[0]} mJ measured, {areas[1]} mJ model", fontsize=8.5)
         panel.set_xlabel("angle in degrees")
         panel.margins(x=0.03)
     axes[0].set_ylabel("torque in N·m")
     axes[0].legend(loc="upper left")
     return described(
-        figure, f"Loops of torque over angle, measured and simulated. Energy lost: {'; '.join(words)}."
+        figure, f"Loops of torque over angle, measured and simulated. Energy lost: {'; '.join(energies)}."
     )
 
 
@@ -159,7 +159,7 @@ def metric_note(agreement: Agreement, unit: str = "N·m") -> str:
 def loop_area(angle: Floats, torque: Floats) -> float:
     """Return ∮τ dθ of a loop that is closed by a straight line, in J.
 
-    Positive where the loop is run through as a passive spring does it: the torque leads the angle.
+    Positive for a passive spring: the torque leads the angle.
 
     Parameters
     ----------
@@ -180,6 +180,6 @@ def _label(axes: Axes, ordinate: str, title: str, *, columns: int = 4) -> None:
     legend(axes, columns=columns)
 
 
-def _need(what: str, given: Mapping[str, object]) -> None:
+def _require(what: str, given: Mapping[str, object]) -> None:
     if not given:
         raise ValueRangeError(what, "there are none to draw", next_step="leave this figure out")

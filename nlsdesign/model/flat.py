@@ -15,7 +15,8 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
-from .structure import MovingBody, ReadingNames, SpringNames
+from .readings import ReadingNames
+from .structure import MovingBody, SpringNames, Structure
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -185,6 +186,24 @@ class FlatModel:
         """
         return np.array([v.start for v in of], dtype=float)
 
+    @property
+    def structure(self) -> Structure:
+        """Bodies, springs and readings together."""
+        return Structure(self.bodies, self.springs, self.readings)
+
+    def with_structure(self, structure: Structure) -> FlatModel:
+        """Return a copy made of other bodies, springs and readings; what has no variables here is left out.
+
+        Parameters
+        ----------
+        structure
+            Of this model or of one that it came from.
+        """
+        groups = (self.states, self.inputs, self.outputs, self.signals)
+        names = {v.name for group in groups for v in group}
+        kept = structure.within(names, {v.name for v in self.inputs})
+        return replace(self, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
+
     def variable(self, name: str) -> Variable:
         """Return the variable of that name.
 
@@ -267,8 +286,8 @@ class FlatModel:
         """
         at = {v.name: float(state[i]) for i, v in enumerate(self.states)}
         at |= {v.name: float(inputs[i]) for i, v in enumerate(self.inputs)}
-        found = [table.look_up(at[table.argument]) for table in self.tables]
-        return np.concatenate(found) if found else np.zeros(0)
+        columns = [table.look_up(at[table.argument]) for table in self.tables]
+        return np.concatenate(columns) if columns else np.zeros(0)
 
     def symbolic_equations(self) -> Equations:
         """Return the equations as SymPy expressions, which print, and give LaTeX by ``latex()``.

@@ -5,17 +5,39 @@ Consumers ask here which variable is the speed of a body or the lever arm of a c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import Domain
-from ..components.core.part import walk
+from ..components.core.element import MATERIAL, Domain, Element
+from ..components.core.part import Part, walk
 from ..components.core.tie import Tie
-from ..components.mechanics.bodies import Body, Free
-from ..components.sensing.sensors import Sensor
-from ..components.transmission.cam_drive import Through
-from ..symbolic import Expression
+from ..components.mechanics.bodies import Body, Free, GearedMotor
+from ..components.mechanics.motor import ElectricMotor
+from ..components.transmission.cam_drive import Specimen, Through
+from .gear_train import trains
+from .readings import ReadingNames
+
+
+@dataclass(frozen=True)
+class MotorNames:
+    """The names around a motor.
+
+    Parameters
+    ----------
+    command
+        Input: current, or wanted voltage. ``None`` where it is held at zero.
+    inertia, torque_constant, current_limit
+        Parameters.
+    gear_ratio
+        Parameter; ``None`` for a motor without a gear of its own.
+    """
+
+    command: str | None
+    inertia: str
+    torque_constant: str
+    current_limit: str
+    gear_ratio: str | None
 
 
 @dataclass(frozen=True)
@@ -35,6 +57,10 @@ class MovingBody:
         that turns, seen from this body. ``None`` where the motion is prescribed.
     drives
         Names of the inputs that act on the body from outside, such as a current or a torque.
+    geared
+        Names of the bodies that move with it through rigid gears.
+    motor
+        The motor in it; ``None`` for a body without one.
     """
 
     name: str
@@ -43,6 +69,8 @@ class MovingBody:
     rate: str
     inertia: str | None
     drives: tuple[str, ...]
+    geared: tuple[str, ...] = ()
+    motor: MotorNames | None = None
 
     @property
     def prescribed(self) -> bool:
@@ -51,8 +79,29 @@ class MovingBody:
 
 
 @dataclass(frozen=True)
+class SpecimenNames:
+    """The names around one piece of material.
+
+    Parameters
+    ----------
+    name
+        Path of the piece.
+    area, rest_length
+        Parameters.
+    strain, force
+        Signals.
+    """
+
+    name: str
+    area: str
+    rest_length: str
+    strain: str
+    force: str
+
+
+@dataclass(frozen=True)
 class CamNames:
-    """The names around one cam.
+    """The names around one cam and what stands behind it.
 
     Parameters
     ----------
@@ -60,28 +109,43 @@ class CamNames:
         Path of the cam.
     drive
         Path of the part that holds cam and element.
-    angle, lever_arm
-        Signals: angle of the cam, lever arm at that angle.
+    angle, torque, lever_arm
+        Signals: angle and torque of the drive, lever arm at that angle.
     element
         Path of what is stretched.
     extension, force
         Signals of what is stretched.
     pretension, elements
         Parameters: extension at angle zero, number of equal elements.
-    last_angle
-        Parameter that says where the contour ends; ``None`` for a cam that has no end.
+    control_values
+        Parameters that shape the lever arm; none for a wheel.
+    anchor_distance, last_angle
+        Parameters: distance of the anchor from the centre, where the contour ends; ``None`` for a cam
+        without.
+    numbers
+        Parameters of the drive and the element that are single numbers.
+    states
+        Inner states of the element.
+    specimens
+        The pieces of material in it.
     """
 
     name: str
     drive: str
     angle: str
+    torque: str
     lever_arm: str
     element: str
     extension: str
     force: str
     pretension: str
     elements: str
+    control_values: tuple[str, ...]
+    anchor_distance: str | None
     last_angle: str | None
+    numbers: tuple[str, ...]
+    states: tuple[str, ...]
+    specimens: tuple[SpecimenNames, ...]
 
 
 @dataclass(frozen=True)
@@ -100,6 +164,10 @@ class SpringNames:
         Names of the bodies at its ends, one or two.
     cams
         The cams in it, in written order.
+    parameters
+        All numbers in it.
+    states
+        All states in it.
     """
 
     name: str
@@ -108,86 +176,8 @@ class SpringNames:
     effort: str
     between: tuple[str, ...]
     cams: tuple[CamNames, ...]
-
-
-@dataclass(frozen=True)
-class ReadingNames:
-    """What a measured signal shows, through which chain of sensors.
-
-    Parameters
-    ----------
-    signal
-        Name of the reading; of a signal that is measured without a sensor, its own.
-    measured
-        Name of the state, input or signal that it shows.
-    sensors
-        Names of the sensors between, the one that gives the reading first.
-    laws
-        The sensors themselves, in the same order.
-    """
-
-    signal: str
-    measured: str
-    sensors: tuple[str, ...] = ()
-    laws: tuple[Sensor, ...] = ()
-
-    @property
-    def delays(self) -> tuple[str, ...]:
-        """Names of the parameters whose sum says by how many seconds the reading is late."""
-        pairs = zip(self.sensors, self.laws, strict=True)
-        return tuple(f"{name}.{law.late_by}" for name, law in pairs if law.late_by)
-
-    @property
-    def shows_value(self) -> bool:
-        """Whether what is measured can be inferred from the reading."""
-        return all(law.shows_value for law in self.laws)
-
-    def inferred(self, reading: Expression, known: Mapping[str, Expression]) -> Expression:
-        """Return the value behind a reading: the inverse of each sensor, the last one first.
-
-        Parameters
-        ----------
-        reading
-            What the last sensor gave, later by the sum of the ``delays``.
-        known
-            Parameters and states of the model by full name.
-
-        Raises
-        ------
-        ArrangementError
-            If a sensor does not show the value, see ``shows_value``.
-        """
-        for name, law in zip(self.sensors, self.laws, strict=True):
-            reading = law.infer(_NumbersOf(name, known), reading)
-        return reading
-
-
-class _NumbersOf:
-    """The parameters and states of one sensor among those of a model."""
-
-    def __init__(self, sensor: str, known: Mapping[str, Expression]) -> None:
-        self._sensor, self._known = sensor, known
-
-    def parameter(self, name: str) -> Expression:
-        """Return one of its numbers."""
-        return self._known[f"{self._sensor}.{name}"]
-
-    def memory(self, name: str) -> Expression:
-        """Return one of its states."""
-        return self._known[f"{self._sensor}.{name}"]
-
-
-def reading_of(readings: Sequence[ReadingNames], signal: str) -> ReadingNames:
-    """Return what a signal shows; one that is not the reading of a sensor shows itself.
-
-    Parameters
-    ----------
-    readings
-        Of a flat model.
-    signal
-        Full name.
-    """
-    return next((r for r in readings if r.signal == signal), ReadingNames(signal, signal))
+    parameters: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
 
 
 def body_moved_by(bodies: Sequence[MovingBody], motion: str) -> MovingBody | None:
@@ -203,6 +193,22 @@ def body_moved_by(bodies: Sequence[MovingBody], motion: str) -> MovingBody | Non
     return next((body for body in bodies if body.motion == motion), None)
 
 
+def motions_of_efforts(assembly: Assembly) -> dict[str, str]:
+    """Return the motion that does work with each force and torque, by name of the effort.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    pieces = ((path, part.element if isinstance(part, Tie) else part) for path, part in assembly.walk())
+    return {
+        f"{path}.{piece.domain.effort}": f"{path}.{piece.domain.motion}"
+        for path, piece in pieces
+        if isinstance(piece, Element) and piece.domain != MATERIAL
+    }
+
+
 def top_part(name: str) -> str:
     """Return the part of the assembly to which a hierarchical name belongs: names begin with it.
 
@@ -214,85 +220,241 @@ def top_part(name: str) -> str:
     return name.partition(".")[0]
 
 
-def moving_bodies(
-    assembly: Assembly, states: Sequence[str], inputs: Sequence[str], signals: Sequence[str]
-) -> tuple[MovingBody, ...]:
+@dataclass(frozen=True)
+class Owners:
+    """Which part declared a variable: path of the part by name of the variable, in order of declaration.
+
+    Parameters
+    ----------
+    parameters, states, inputs, signals
+        Of the whole model.
+    """
+
+    parameters: Mapping[str, str]
+    states: Mapping[str, str]
+    inputs: Mapping[str, str]
+    signals: Mapping[str, str]
+
+    def keeping(self, states: Collection[str], inputs: Collection[str]) -> Owners:
+        """Return a copy with these states and inputs only.
+
+        Parameters
+        ----------
+        states, inputs
+            Names.
+        """
+        return replace(
+            self,
+            states={name: path for name, path in self.states.items() if name in states},
+            inputs={name: path for name, path in self.inputs.items() if name in inputs},
+        )
+
+
+def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
     """Return the bodies that have a motion of their own, in written order.
 
     Parameters
     ----------
     assembly
         As declared.
-    states, inputs, signals
-        Names in its model.
+    owners
+        Of the variables of its model.
     """
+    geared = {lead: tuple(w.name for w in train.wheels())[1:] for lead, train in trains(assembly).items()}
     bodies = []
     for name, part in assembly.parts:
         if not isinstance(part, Body):
             continue
         motion, rate = (f"{name}.{own}" for own in part.motion_names)
-        if motion not in states and motion not in inputs:
+        if motion not in owners.states and motion not in owners.inputs:
             continue  # a body at rest, or one that a gear leads
-        drives = tuple(n for n in inputs if n.startswith(f"{name}.") and n not in (motion, rate))
-        inertia = None
-        if isinstance(part, Free):
-            train = f"{name}.train_inertia"
-            inertia = train if train in signals else f"{name}.{part.inertia_name}"
-        bodies.append(MovingBody(name, part.domain, motion, rate, inertia, drives if inertia else ()))
+        if not isinstance(part, Free):
+            bodies.append(MovingBody(name, part.domain, motion, rate, None, ()))
+            continue
+        drives = tuple(_declared_by([name], owners.inputs))
+        inertia = f"{name}.{'train_inertia' if name in geared else part.inertia_name}"
+        motor = _motor(name, part, drives) if isinstance(part, GearedMotor | ElectricMotor) else None
+        bodies.append(
+            MovingBody(name, part.domain, motion, rate, inertia, drives, geared.get(name, ()), motor)
+        )
     return tuple(bodies)
 
 
-def springs_of(assembly: Assembly) -> tuple[SpringNames, ...]:
+def _motor(name: str, part: GearedMotor | ElectricMotor, drives: Iterable[str]) -> MotorNames:
+    return MotorNames(
+        command=next(iter(drives), None),
+        inertia=f"{name}.{part.inertia_name}",
+        torque_constant=f"{name}.torque_constant",
+        current_limit=f"{name}.current_limit",
+        gear_ratio=f"{name}.gear_ratio" if isinstance(part, GearedMotor) else None,
+    )
+
+
+def _declared_by(paths: Collection[str], owned: Mapping[str, str]) -> Iterator[str]:
+    return (name for name, path in owned.items() if path in paths)
+
+
+def springs_of(assembly: Assembly, owners: Owners) -> tuple[SpringNames, ...]:
     """Return the ties that restore, in written order.
 
     Parameters
     ----------
     assembly
         As declared.
+    owners
+        Of the variables of its model.
     """
-    return tuple(
-        SpringNames(
-            name,
-            part.element.domain,
-            f"{name}.{part.element.domain.motion}",
-            f"{name}.{part.element.domain.effort}",
-            part.between,
-            tuple(_cam(path, p) for path, p in walk(part.element, name) if isinstance(p, Through)),
+    springs = []
+    for name, part in assembly.parts:
+        if not isinstance(part, Tie) or not part.element.restores:
+            continue
+        inside, domain = [path for path, _ in walk(part, name)], part.element.domain
+        drives = [(path, p) for path, p in walk(part.element, name) if isinstance(p, Through)]
+        springs.append(
+            SpringNames(
+                name=name,
+                domain=domain,
+                motion=f"{name}.{domain.motion}",
+                effort=f"{name}.{domain.effort}",
+                between=part.between,
+                cams=tuple(_cam(path, drive, owners) for path, drive in drives),
+                parameters=tuple(_declared_by(inside, owners.parameters)),
+                states=tuple(_declared_by(inside, owners.states)),
+            )
         )
-        for name, part in assembly.parts
-        if isinstance(part, Tie) and part.element.restores
-    )
+    return tuple(springs)
 
 
-def _cam(path: str, part: Through) -> CamNames:
-    element, cam = f"{path}.{part.behind[0]}", f"{path}.cam"
-    inner = part.behind[1].domain
-    end = f"{cam}.last_angle" if "last_angle" in part.cam.parameters() else None
+def _cam(path: str, part: Through, owners: Owners) -> CamNames:
+    (own, behind), cam = part.behind, f"{path}.cam"
+    element, inner, of_cam = f"{path}.{own}", behind.domain, part.cam.parameters()
+    pieces = dict(walk(behind, element))
     return CamNames(
         name=cam,
         drive=path,
         angle=f"{path}.{part.domain.motion}",
+        torque=f"{path}.{part.domain.effort}",
         lever_arm=f"{cam}.lever_arm_now",
         element=element,
         extension=f"{element}.{inner.motion}",
         force=f"{element}.{inner.effort}",
         pretension=f"{path}.pretension",
         elements=f"{cam}.elements",
-        last_angle=end,
+        control_values=tuple(number_names(cam, part.cam, "lever_arm")) if "lever_arm" in of_cam else (),
+        anchor_distance=f"{cam}.anchor_distance" if "anchor_distance" in of_cam else None,
+        last_angle=f"{cam}.last_angle" if "last_angle" in of_cam else None,
+        numbers=tuple(_single_numbers({path: part, **pieces})),
+        states=tuple(_declared_by(pieces, owners.states)),
+        specimens=tuple(_specimen(name, p) for name, p in pieces.items() if isinstance(p, Specimen)),
     )
 
 
-def readings_of(assembly: Assembly) -> tuple[ReadingNames, ...]:
-    """Return what each sensor of an assembly shows, through which chain of sensors.
+def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:
+    for path, part in parts.items():
+        for field, given in part.parameters().items():
+            if not isinstance(given.value, tuple):
+                yield from number_names(path, part, field)
+
+
+def _specimen(path: str, part: Specimen) -> SpecimenNames:
+    return SpecimenNames(
+        name=path,
+        area=f"{path}.area",
+        rest_length=f"{path}.rest_length",
+        strain=f"{path}.strain",
+        force=f"{path}.{part.domain.effort}",
+    )
+
+
+def number_names(path: str, part: Part, field: str) -> list[str]:
+    """Return the names that one field of a part has in the model: one, or one for each item of a row.
 
     Parameters
     ----------
-    assembly
-        As declared.
+    path
+        Of the part.
+    part
+        Holds the field.
+    field
+        Name of the field.
     """
-    sensors, readings = assembly.sensors(), []
-    for name in sensors:
-        measured, chain = assembly.measured(f"{name}.reading")
-        laws = tuple(sensors[each] for each in chain)
-        readings.append(ReadingNames(f"{name}.reading", measured, chain, laws))
-    return tuple(readings)
+    given, name = part.parameters()[field], f"{path}.{field}"
+    if not isinstance(given.value, tuple):
+        return [name]
+    return [f"{name}[{number}]" for number in range(1, len(given.values) + 1)]
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Bodies, springs and readings of a model.
+
+    Parameters
+    ----------
+    bodies, springs, readings
+        In written order.
+    """
+
+    bodies: tuple[MovingBody, ...]
+    springs: tuple[SpringNames, ...]
+    readings: tuple[ReadingNames, ...]
+
+    def within(self, names: Collection[str], inputs: Collection[str]) -> Structure:
+        """Return what is left where a model has these variables only.
+
+        A body stays while it has motion and rate, a spring while it has motion and effort, a reading while
+        it has its signal. Of inputs and inner states those stay that there are.
+
+        Parameters
+        ----------
+        names
+            Of all variables.
+        inputs
+            Names of the inputs.
+        """
+        return Structure(
+            tuple(
+                _with_drives(body, inputs) for body in self.bodies if {body.motion, body.rate} <= set(names)
+            ),
+            tuple(
+                _with_states(spring, names)
+                for spring in self.springs
+                if {spring.motion, spring.effort} <= set(names)
+            ),
+            tuple(reading for reading in self.readings if reading.signal in names),
+        )
+
+    def with_state(self, old: str, new: str) -> Structure:
+        """Return what there is where another inner state of a spring stands in the place of one.
+
+        Parameters
+        ----------
+        old, new
+            Names.
+        """
+
+        def exchanged(states: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(new if state == old else state for state in states)
+
+        springs = (
+            replace(
+                spring,
+                states=exchanged(spring.states),
+                cams=tuple(replace(cam, states=exchanged(cam.states)) for cam in spring.cams),
+            )
+            for spring in self.springs
+        )
+        return replace(self, springs=tuple(springs))
+
+
+def _with_drives(body: MovingBody, inputs: Collection[str]) -> MovingBody:
+    motor = body.motor
+    if motor and motor.command not in inputs:
+        motor = replace(motor, command=None)
+    return replace(body, drives=tuple(name for name in body.drives if name in inputs), motor=motor)
+
+
+def _with_states(spring: SpringNames, names: Collection[str]) -> SpringNames:
+    cams = (
+        replace(cam, states=tuple(state for state in cam.states if state in names)) for cam in spring.cams
+    )
+    return replace(spring, states=tuple(state for state in spring.states if state in names), cams=tuple(cams))

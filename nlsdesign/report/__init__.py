@@ -1,9 +1,9 @@
 """Reports: sections composed into one self-contained file of HTML."""
 
 from .calculation import OUTCOMES, CalculationSection, CalculationStep
-from .cam import CamSection
+from .cam_section import CamSection
 from .diagnosis import verdict_sections
-from .mathml import EquationsSection
+from .equations import EquationsSection
 from .page import report_text, write_report
 from .sections import (
     Chapter,
@@ -16,7 +16,7 @@ from .sections import (
     TextSection,
 )
 from .tables import PublishedNumber, comparison_table, numbers_table, range_table
-from .verdict import VerdictSection
+from .verdict_section import VerdictSection
 
 __all__ = [
     "OUTCOMES",

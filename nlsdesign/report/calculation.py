@@ -9,8 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..errors import unknown_name
 from .html import Html
-from .mathml import formula
-from .sections import Place, Section
+from .sections import PagePosition, Section
 
 OUTCOMES = {
     "holds": "none",
@@ -18,10 +17,9 @@ OUTCOMES = {
     "cannot be decided": "named",
     "contradicts the figures": "data_suspect",
 }
-"""The verdicts that a statement can get, each with the colour of its card."""
+"""Possible verdicts on a statement, each with the style of its card."""
 
-
-# Symbols of a calculation are letters with an index, a star or a rate; those of a model are whole names.
+# Symbols of a calculation are letters with an index, a star or a rate; those of a model are full names.
 _RATE = re.compile(r"<mi>d([^</]{1,6})/d([^</]{1,2})</mi>")
 _INDEX = re.compile(r"<mi>([^<_]{1,2})_([^<_*]{1,4})</mi>")
 _STAR = re.compile(r"<mi>([^<*]{1,2})\*</mi>")
@@ -35,7 +33,7 @@ class CalculationStep(NamedTuple):
     words
         What is done.
     formula
-        SymPy equation or expression, or nothing.
+        SymPy equation or expression; ``None`` without one.
     latex
         The same formula as LaTeX.
     """
@@ -56,7 +54,7 @@ class CalculationSection(Section):
     verdict
         One of ``OUTCOMES``.
     steps
-        The calculation in the order of thought.
+        The calculation, step by step.
     why
         What follows from it.
     numbers
@@ -83,8 +81,8 @@ class CalculationSection(Section):
         if self.verdict not in OUTCOMES:
             raise unknown_name("verdict", self.verdict, OUTCOMES)
 
-    def content(self, place: Place) -> Mapping[str, Any]:
-        """Return words, formulas and evidence."""
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return texts, formulas and evidence."""
         steps = [
             {"words": s.words, "formula": "" if s.formula is None else typeset(s.formula), "latex": s.latex}
             for s in self.steps
@@ -101,7 +99,7 @@ class CalculationSection(Section):
 
 
 def typeset(expression: Any) -> Html:
-    """Return a SymPy expression as MathML, with ``F_M``, ``F*`` and ``dF/dt`` as they are written by hand.
+    """Return a SymPy expression as MathML; ``F_M``, ``F*`` and ``dF/dt`` get index, superscript and fraction.
 
     Parameters
     ----------
@@ -114,6 +112,8 @@ def typeset(expression: Any) -> Html:
     >>> typeset(sympy.Symbol("F_M"))
     "<math displaystyle='true'><mrow><msub><mi>F</mi><mi>M</mi></msub></mrow></math>"
     """
+    from .mathml import formula  # here, because it loads SymPy
+
     rate = r"<mfrac><mrow><mi>d</mi><mi>\1</mi></mrow><mrow><mi>d</mi><mi>\2</mi></mrow></mfrac>"
     text = _RATE.sub(rate, formula(expression))
     text = _STAR.sub(r"<msup><mi>\1</mi><mo>*</mo></msup>", text)

@@ -1,4 +1,4 @@
-"""Text that is HTML already, and how plain text becomes it."""
+"""HTML from plain text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Html(str):
     __slots__ = ()
 
     def __html__(self) -> str:
-        """Return the text as it is: this is what tells templates not to escape it."""
+        """Return the text unchanged, so that templates do not escape it."""
         return str(self)
 
 

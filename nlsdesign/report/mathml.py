@@ -1,23 +1,21 @@
-"""Equations as MathML, which browsers typeset without any library, names in full.
+"""Equations as MathML, which browsers typeset without a library, with full names.
 
-Every text is escaped here (SymPy's own printer does not), products carry a visible dot because names have
-many letters, and a long sum is several formulas in a row, so that it wraps like words.
+Every text is escaped here (SymPy's printer does not escape), products carry a visible dot because names have
+several letters, and a long sum is a row of formulas, so that its lines wrap.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from html import escape
-from typing import Any, ClassVar
+from typing import Any
 
 import sympy
 from sympy.core.function import AppliedUndef
 
 from ..model.equations import Equations
 from .html import Html
-from .sections import Place, Section
 
 _INDEXED = re.compile(r"^(?P<name>.+)\[(?P<index>\d+)\]$")
 _RELATIONS = {"==": "=", "!=": "≠", "<=": "≤", ">=": "≥"}
@@ -25,28 +23,17 @@ _FUNCTIONS = {"Max": "max", "Min": "min", "log": "ln", "sign": "sgn"}
 _FENCES = {"Abs": ("|", "|"), "floor": ("⌊", "⌋"), "ceiling": ("⌈", "⌉")}
 
 
-@dataclass(frozen=True, eq=False)
-class EquationsSection(Section):
-    """The equations of a flat model.
+def equation_rows(equations: Equations) -> tuple[list[list[Html]], list[list[Html]]]:
+    """Return the derivatives (or next states) and the definitions, each in pieces between which it may break.
 
     Parameters
     ----------
     equations
-        From :func:`nlsdesign.model.equations.equations`.
-    caption
-        What they describe.
+        Of a flat model.
     """
-
-    equations: Equations
-    caption: str = ""
-    template: ClassVar[str] = "equations.html"
-
-    def content(self, place: Place) -> Mapping[str, Any]:
-        """Return the rows of the derivatives and of the definitions."""
-        left = _next if self.equations.discrete else _derivative
-        states = [_row(left(name), e) for name, e in self.equations.derivatives.items()]
-        signals = [_row(_name(name), e) for name, e in self.equations.definitions.items()]
-        return {"states": states, "signals": signals, "caption": self.caption}
+    left = _next if equations.discrete else _derivative
+    states = [_row(left(name), e) for name, e in equations.derivatives.items()]
+    return states, [_row(_name(name), e) for name, e in equations.definitions.items()]
 
 
 def formula(expression: Any) -> Html:
@@ -55,7 +42,7 @@ def formula(expression: Any) -> Html:
     Parameters
     ----------
     expression
-        Anything SymPy; what has no layout here stands as SymPy writes it.
+        Any SymPy expression; one without a layout here is printed as by SymPy.
     """
     return _math(_layout(expression))
 

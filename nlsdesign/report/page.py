@@ -1,4 +1,4 @@
-"""The report as one file of HTML that needs nothing else: no network, no font, no library."""
+"""The report as one self-contained HTML file: no network, no font, no library."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..figures.style import TONES
 from ..locations import version
 from ..writing import write_text
 from .html import Html, prose, words
-from .sections import Chapter, Place, Section
+from .sections import Chapter, PagePosition, Section
 
 _PAGE_TONES = {
     "page": ("#f4f6f8", "#0e1217"),
@@ -37,7 +37,7 @@ def write_report(
     path
         File to write, ending in ``.html``.
     *sections
-        In the order of reading. Sections that follow a :class:`Chapter` belong to it.
+        In reading order. Sections that follow a :class:`Chapter` belong to it.
     title
         Heading of the page.
     abstract
@@ -107,7 +107,7 @@ def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:
         raise ValueRangeError("report", "has no section", next_step="give write_report at least one")
     entries, inside = [], False
     for number, section in enumerate(sections, start=1):
-        place = Place(f"s{number}", folder)
+        place = PagePosition(f"s{number}", folder)
         chapter = isinstance(section, Chapter)
         inside = inside or chapter
         entries.append(
@@ -137,5 +137,5 @@ def _source(name: str) -> str:
     environment = _environment()
     loader = environment.loader
     if loader is None:
-        raise ExportError(f"template '{name}'", "has no place to come from")
+        raise ExportError(f"template '{name}'", "has no loader")
     return loader.get_source(environment, name)[0]

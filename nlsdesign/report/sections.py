@@ -1,4 +1,4 @@
-"""What a report is made of: chapters, words, figures, tables, key numbers and lists of files."""
+"""Sections of a report: chapters, texts, figures, tables, key numbers and lists of files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from ..errors import ExportError, ValueRangeError
 from ..figures import Figure, alternative_text, inline_svg
-from ..figures.numbers import compact, significant
+from ..figures.number_text import compact, significant
 from .html import Html
 
 Cell = str | int | float
@@ -22,13 +22,13 @@ _NUMBER = re.compile(r"^[−-]?\d[\d.]*(·10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?(
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a section stands.
+class PagePosition:
+    """Position of a section on the page.
 
     Parameters
     ----------
     key
-        Word that no other section of the page uses; identifiers start with it.
+        Identifier that no other section of the page uses; identifiers inside start with it.
     folder
         Folder of the report, for relative links.
     """
@@ -36,7 +36,7 @@ class Place:
     key: str
     folder: Path
 
-    def inner(self, number: int) -> Place:
+    def inner(self, number: int) -> PagePosition:
         """Return the place of a section inside this one.
 
         Parameters
@@ -44,7 +44,7 @@ class Place:
         number
             Its number there.
         """
-        return Place(f"{self.key}-{number}", self.folder)
+        return PagePosition(f"{self.key}-{number}", self.folder)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,19 +61,19 @@ class Section(ABC):
     template: ClassVar[str]
 
     @abstractmethod
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return what the template of the section shows.
 
         Parameters
         ----------
         place
-            Where the section stands.
+            Position of the section.
         """
 
 
 @dataclass(frozen=True, eq=False)
 class Chapter(Section):
-    """A heading above the sections that follow it, with a few words.
+    """A heading above the sections that follow it, with a short text.
 
     Parameters
     ----------
@@ -84,29 +84,29 @@ class Chapter(Section):
     text: str = ""
     template: ClassVar[str] = "chapter.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
-        """Return the words."""
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return the text."""
         return {"text": self.text}
 
 
 @dataclass(frozen=True, eq=False)
 class TextSection(Section):
-    """Words, and text whose columns matter, such as the drawing of an assembly.
+    """Text, and text in a fixed-width font such as the drawing of an assembly.
 
     Parameters
     ----------
     text
         Paragraphs, separated by empty lines; names between backticks.
     drawing
-        Shown letter by letter in a font of fixed width.
+        Shown as it stands, in a fixed-width font.
     """
 
     text: str = ""
     drawing: str = ""
     template: ClassVar[str] = "text.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
-        """Return words and drawing."""
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return text and drawing."""
         return {"text": self.text, "drawing": self.drawing}
 
 
@@ -123,12 +123,12 @@ class FigureSection(Section):
     means, assumed
         What it means, and what was assumed.
     alternative
-        Words for those who cannot see it; by default those that come with the figure.
+        Alternative text; by default the one attached to the figure.
 
     Raises
     ------
     ValueRangeError
-        If there are no such words.
+        If there is no alternative text.
     """
 
     figure: Figure
@@ -142,12 +142,12 @@ class FigureSection(Section):
     def __post_init__(self) -> None:
         if not (self.alternative or alternative_text(self.figure)):
             raise ValueRangeError(
-                f"figure '{self.title}'", "has no words for those who cannot see it",
+                f"figure '{self.title}'", "has no alternative text for readers who cannot see it",
                 next_step="give alternative=\"...\", or draw it with nlsdesign.figures",
             )  # fmt: skip
 
-    def content(self, place: Place) -> Mapping[str, Any]:
-        """Return the figure as inline SVG, and its words."""
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
+        """Return the figure as inline SVG, and its texts."""
         svg = Html(inline_svg(self.figure, place.key, alternative=self.alternative))
         return {"svg": svg, "caption": self.caption, "means": self.means, "assumed": self.assumed}
 
@@ -161,11 +161,11 @@ class TableSection(Section):
     columns
         Headings.
     rows
-        Texts and numbers; numbers are shown with four digits. A column of numbers stands right.
+        Texts and numbers; numbers are shown with four digits. Columns of numbers are aligned to the right.
     caption
         What it shows.
     marked
-        Numbers of rows that stand out.
+        Numbers of the highlighted rows.
     folded
         Whether it is closed until the reader opens it; for long tables.
 
@@ -191,7 +191,7 @@ class TableSection(Section):
                     f"has {len(row)} cells for {len(self.columns)} columns",
                 )
 
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the cells as text, each with whether it is a number."""
         texts = [[_shown(cell) for cell in row] for row in self.rows]
         right = [_is_numeric([row[i] for row in texts]) for i in range(len(self.columns))]
@@ -215,7 +215,7 @@ def _is_numeric(texts: list[str]) -> bool:
 
 @dataclass(frozen=True)
 class KeyNumber:
-    """One number that a reader should take home.
+    """One number that summarises a result.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ class KeyNumber:
     value
         Number with unit, as text.
     note
-        What it is to be compared with, or where it holds.
+        Value for comparison, or the condition under which it holds.
     """
 
     label: str
@@ -245,7 +245,7 @@ class NumbersSection(Section):
     numbers: tuple[KeyNumber, ...]
     template: ClassVar[str] = "numbers.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the numbers."""
         return {"numbers": self.numbers}
 
@@ -267,13 +267,13 @@ class FileSection(Section):
     caption: str = ""
     template: ClassVar[str] = "files.html"
 
-    def content(self, place: Place) -> Mapping[str, Any]:
+    def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return name, link, size and description of each file.
 
         Raises
         ------
         ExportError
-            If a file does not exist: a report has no dead links.
+            If a file does not exist.
         """
         rows = []
         for path, what in self.files.items():
@@ -281,9 +281,9 @@ class FileSection(Section):
                 raise ExportError(
                     f"file '{path}' of the report", "does not exist", next_step="write it before the report"
                 )
-            shown = Path(os.path.relpath(path, place.folder)).as_posix() + ("/" if path.is_dir() else "")
+            relative = Path(os.path.relpath(path, place.folder)).as_posix() + ("/" if path.is_dir() else "")
             size = "" if path.is_dir() else _size(path.stat().st_size)
-            rows.append({"name": shown, "link": quote(shown), "size": size, "what": what})
+            rows.append({"name": relative, "link": quote(relative), "size": size, "what": what})
         return {"rows": rows, "caption": self.caption}
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..figures.numbers import compact, shown_unit, significant
-from ..quantity import Quantity, sources
+from ..figures.number_text import compact, significant
+from ..quantity import Quantity, sources, typeset_unit
 from ..simulation import Trace
 from .sections import TableSection
 
@@ -14,7 +14,7 @@ _LONGEST_ROW = 8
 
 
 def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool = False) -> TableSection:
-    """Return the table of numbers with unit, spread and source; those that are only assumed stand out.
+    """Return the table of numbers with unit, spread and source; those that are only assumed are highlighted.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
         Whether it is closed until the reader opens it.
     """
     rows = tuple(
-        (name, _value(q), shown_unit(q.unit), f"± {100 * q.spread:g} %" if q.spread else "", q.source)
+        (name, _value(q), typeset_unit(q.unit), f"± {100 * q.spread:g} %" if q.spread else "", q.source)
         for name, q in numbers.items()
     )
     share = sources(numbers)["assumed"]
@@ -50,20 +50,20 @@ def _value(q: Quantity) -> str:
 
 @dataclass(frozen=True)
 class PublishedNumber:
-    """A number of the paper beside the same number found here.
+    """A published number beside the same number computed here.
 
     Parameters
     ----------
     what
         Name of the number.
     paper
-        As published; None where the paper has none.
+        As published; ``None`` if it is not published.
     here
-        As found by this project.
+        As computed by this project.
     unit
         Of both.
     remark
-        How they are to be read together.
+        Remark on the comparison.
     """
 
     what: str
@@ -74,7 +74,7 @@ class PublishedNumber:
 
 
 def range_table(title: str, traces: Mapping[str, Trace]) -> TableSection:
-    """Return the table of laws that were used beyond their stated range; it says so if there is none.
+    """Return the table of laws that were used beyond their stated range; the caption tells if there are none.
 
     Parameters
     ----------
@@ -84,29 +84,29 @@ def range_table(title: str, traces: Mapping[str, Trace]) -> TableSection:
         Results by their label in the report.
     """
     rows = tuple(
-        (label, w.name, f"{w.minimum:g} to {w.maximum:g}", shown_unit(w.unit), compact(w.furthest, 4),
+        (label, w.name, f"{w.minimum:g} to {w.maximum:g}", typeset_unit(w.unit), compact(w.furthest, 4),
          compact(w.time, 4))
         for label, trace in traces.items()
         for w in trace.warnings
     )  # fmt: skip
     columns = ("result", "signal", "range", "unit", "reaches", "first at s")
     caption = (
-        "Laws that were used beyond the range in which they are stated to hold."
+        "Laws that were used beyond their stated range."
         if rows
-        else ("Every law was used within the range in which it is stated to hold.")
+        else "Every law was used within its stated range."
     )
     return TableSection(title, columns, rows, caption=caption, marked=frozenset(range(len(rows))))
 
 
 def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: str = "") -> TableSection:
-    """Return a table of published numbers beside those found here.
+    """Return a table of published numbers beside those computed here.
 
     Parameters
     ----------
     title
         Heading.
     rows
-        In the order of reading.
+        In reading order.
     caption
         What is compared.
     """
@@ -115,7 +115,7 @@ def comparison_table(title: str, rows: Sequence[PublishedNumber], *, caption: st
             row.what,
             "–" if row.paper is None else significant(row.paper),
             significant(row.here),
-            shown_unit(row.unit),
+            typeset_unit(row.unit),
             row.remark,
         )
         for row in rows

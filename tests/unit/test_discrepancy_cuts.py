@@ -100,7 +100,7 @@ def test_the_balance_of_a_geared_train_is_in_torque_at_its_leading_body(rig: Ass
     record = simulated(declared.with_values({"drum.inertia": 5e-3}))
     assert flatten(declared).evaluate([0.0] * 3)["drum.train_inertia"] == pytest.approx(4e-3 + 625 * 2e-5)
     (motor,) = (b for b in blocks_of(flatten(declared), SIGNALS) if b.target is None)
-    driven = DrivenBlock(motor, [])
+    driven = DrivenBlock(motor, [], records=[record])
     output = driven.respond(driven.samples(record, {}), {}).output
     seen = smoothing(len(TIME), motor.width, 5) @ output
     assert motor.name == "drum"
@@ -128,13 +128,13 @@ def test_two_delays_on_one_line_that_are_both_free_cannot_be_told_apart(rig: Ass
     signals = ("motor_encoder.reading", "current_sensor.reading", "log.reading")
     motor = blocks_of(flatten(late), signals)[1]
     with pytest.raises(MeasurementError, match=r"'log.reading'.*log.delay and by bus.delay, both free"):
-        DrivenBlock(motor, ["log.delay", "bus.delay"])
-    assert DrivenBlock(motor, ["bus.delay"]).needs_new_samples
+        DrivenBlock(motor, ["log.delay", "bus.delay"], records=[])
+    assert DrivenBlock(motor, ["bus.delay"], records=[]).needs_new_samples
 
 
 def remaining(block: Block, record: Record) -> float:
     """Root mean square of what a block leaves over of a record, filtered."""
-    driven = DrivenBlock(block, [])
+    driven = DrivenBlock(block, [], records=[record])
     output = driven.respond(driven.samples(record, {}), {}).output
     error = (record.trace[block.target] if block.target else 0.0) - output
     return float(np.sqrt(np.mean((smoothing(len(TIME), block.width, 5) @ error) ** 2)))
@@ -144,7 +144,7 @@ def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
     record = simulated(rig.with_values({"motor.inertia": 0.012}))
     found = {}
     for block in blocks_of(flatten(rig), SIGNALS):
-        driven = DrivenBlock(block, [])
+        driven = DrivenBlock(block, [], records=[record])
         output = driven.respond(driven.samples(record, {}), {}).output
         error = (record.trace[block.target] if block.target else 0.0) - output
         found[block.name] = float(np.std(smoothing(len(TIME), block.width, 5) @ error))

@@ -13,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib import pyplot
+from matplotlib.colors import to_hex
 
 from nlsdesign import figures
 from nlsdesign.design import contour_from_curvature
@@ -217,16 +218,10 @@ def test_numbers_as_people_write_them(value: float, digits: int, shown: str) -> 
     assert figures.significant(value, digits) == shown
 
 
-def test_numbers_without_zeros_at_their_end_and_units_as_they_are_printed() -> None:
+def test_numbers_without_zeros_at_their_end() -> None:
     assert [figures.compact(v) for v in (0.25, 12.0, 1200.0, 2e-9, -0.02)] == [
         "0.25", "12", "1200", "2·10⁻⁹", "−0.02",
     ]  # fmt: skip
-    assert [figures.shown_unit(u) for u in ("1", "N*m/rad", "kg*m^2", "m^-1/s")] == [
-        "",
-        "N·m/rad",
-        "kg·m²",
-        "m⁻¹/s",
-    ]
 
 
 # --- cam ------------------------------------------------------------------------------------------
@@ -293,7 +288,7 @@ def test_a_cam_that_cannot_be_made_says_so() -> None:
         nodes, np.where(nodes < 0.25, -2e-3, 9e-3), first_slope=8e-3, anchor_distance=25e-3
     )
     warning = figures.cam_motion(hollow, lambda e: 9e3 * e, rest_length=12.5e-3).warning
-    assert "hollow between 0.0° and" in warning
+    assert "concave between 0.0° and" in warning
     assert "down to −2.0 mm" in warning
 
 
@@ -346,6 +341,23 @@ def test_bars_are_as_high_as_the_errors_and_held_out_records_stand_right() -> No
     assert [bar.get_height() for bar in axes.containers[1]] == [0.15, 0.11, 0.13]
     floors = [segment[0][1] for segment in axes.collections[0].get_segments()]
     assert floors == [0.09, 0.08, 0.085]
+
+
+def test_before_and_after_have_the_same_colours_in_every_figure() -> None:
+    bars, series, binned = (drawn(n).axes[0] for n in ("gap_bars", "held_out_series", "binned_errors"))
+    before, after = "#d55e00", "#0072b2"
+    shown = [to_hex(container.patches[0].get_facecolor()) for container in bars.containers]
+    assert shown == [before, after]
+    for axes in (series, binned):
+        lines = {line.get_label(): line.get_color() for line in axes.lines}
+        assert (lines["before"], lines["after"]) == (before, after)
+
+
+def test_errors_in_bins_have_units_for_people() -> None:
+    axes = drawn("binned_errors").axes[0]
+    assert axes.get_xlabel() == "motor.angle in rad"
+    assert axes.get_ylabel() == "mean error in N·m"
+    assert "N·m rms before" in figures.alternative_text(drawn("binned_errors"))
 
 
 def test_candidates_are_ordered_by_what_they_explain() -> None:

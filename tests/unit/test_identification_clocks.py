@@ -40,7 +40,7 @@ def test_a_lower_rate_is_that_of_scipy() -> None:
     found = on_one_clock([Channel("noise", np.arange(4000) * 1e-3, values)], 200.0)
     inside = slice(15, -15)  # where neither sees an end
     np.testing.assert_allclose(found.values["noise"][inside], resample_poly(values, 1, 5)[inside], atol=1e-10)
-    assert found.words == ("noise 1000 -> 200 Hz behind an anti-alias filter",)
+    assert found.changes == ("noise 1000 -> 200 Hz with an anti-alias filter",)
 
 
 @pytest.mark.parametrize(("frequency", "kept"), [(5.0, True), (60.0, True), (150.0, False), (420.0, False)])
@@ -65,14 +65,14 @@ def test_a_higher_rate_goes_through_the_samples_and_nothing_is_extrapolated() ->
     expected = np.sin(2 * np.pi * 2.0 * found.time + 0.3)
     np.testing.assert_allclose(found.values["sine"][inside], expected[inside], atol=1e-5)
     np.testing.assert_allclose(found.values["sine"][::10], slow.values[: len(found.time[::10])], atol=1e-12)
-    assert found.words[0] == "sine 100 -> 1000 Hz by cubic spline"
-    assert any(word.startswith("first 0.203 s left out") for word in found.words)
+    assert found.changes[0] == "sine 100 -> 1000 Hz by cubic spline"
+    assert any(word.startswith("first 0.203 s left out") for word in found.changes)
 
 
 def test_the_same_clock_changes_nothing_and_says_nothing() -> None:
     given = sine(2.0, 0.002)
     found = on_one_clock([given], 500.0)
-    assert found.words == ()
+    assert found.changes == ()
     assert np.array_equal(found.values["sine"], given.values)
 
 
@@ -84,14 +84,16 @@ def test_the_noise_of_a_resampled_record_is_still_known() -> None:
     record = Record("a", Trace(time, {"cell.reading": noise}, units, "a"))
     for rate in (250.0, 4000.0):
         other = resampled(record, rate)
-        assert other.grain_of("cell.reading").noise == pytest.approx(0.02 * np.sqrt(rate / 1000.0), rel=0.05)
+        assert other.resolution_of("cell.reading").noise == pytest.approx(
+            0.02 * np.sqrt(rate / 1000.0), rel=0.05
+        )
         # Gaussian of 20 ms: σ·√(Δt / (2·√π·width)) for white noise of this σ.
         width = 0.02
         seen = gaussian_filter1d(other.trace["cell.reading"], width * rate)
-        expected = other.grain_of("cell.reading").noise / np.sqrt(2.0 * np.sqrt(np.pi) * width * rate)
+        expected = other.resolution_of("cell.reading").noise / np.sqrt(2.0 * np.sqrt(np.pi) * width * rate)
         assert np.std(seen) == pytest.approx(expected, rel=0.15)
     # Sampled up, the samples themselves would say that there is hardly any.
-    assert noise_of(other.trace["cell.reading"]) < 0.1 * other.grain_of("cell.reading").noise
+    assert noise_of(other.trace["cell.reading"]) < 0.1 * other.resolution_of("cell.reading").noise
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, float("nan"), float("inf")])
@@ -216,9 +218,9 @@ def test_records_are_put_on_the_clock_that_the_mapping_asks_for(tmp_path: Path, 
     records = load_records(tmp_path, model)  # type: ignore[arg-type]
     first = records.records[0]
     assert first.step == pytest.approx(0.008)
-    assert "'theta_deg' 500 -> 125 Hz behind an anti-alias filter" in first.source
+    assert "'theta_deg' 500 -> 125 Hz with an anti-alias filter" in first.source
     # A count of 0.1 degrees and a noise of 0.01 N·m, at a quarter of the rate.
-    assert first.grain_of("encoder.reading").quantum == pytest.approx(np.radians(0.1) / 2.0, rel=1e-3)
+    assert first.resolution_of("encoder.reading").quantum == pytest.approx(np.radians(0.1) / 2.0, rel=1e-3)
     level = estimate_noise(records).level
     assert level["cell.reading"] == pytest.approx(0.005, rel=0.15)
 

@@ -27,7 +27,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import refit
-from nlsdesign.discrepancy.screening.causality import late_forces
+from nlsdesign.discrepancy.screening.causality import lagging_forces
 from nlsdesign.discrepancy.screening.other_rig import out_of_reach
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.identification import Column, Record, RecordSet, load_records
@@ -108,15 +108,15 @@ def pulled_records(position: str, force: str, lag: float) -> RecordSet:
 
 def test_a_force_that_lags_is_seen_through_a_latch_and_excused_by_a_declared_delay() -> None:
     cell = {"cell": ForceSensor(of="strip.force")}
-    plain = late_forces(pulled(**cell), pulled_records("grip.position", "cell.reading", 0.03))
-    latched = late_forces(
+    plain = lagging_forces(pulled(**cell), pulled_records("grip.position", "cell.reading", 0.03))
+    latched = lagging_forces(
         pulled(dial=SampleAndHold(of="grip.position", sample_rate=1e3), **cell),
         pulled_records("dial.reading", "cell.reading", 0.03),
     )
     assert len(plain.findings) == 1
     assert [f.text for f in latched.findings] == [f.text for f in plain.findings]
     late = pulled(bus=TransportDelay(of="strip.force", delay=0.03), cell=ForceSensor(of="bus.reading"))
-    assert late_forces(late, pulled_records("grip.position", "cell.reading", 0.03)).findings == ()
+    assert lagging_forces(late, pulled_records("grip.position", "cell.reading", 0.03)).findings == ()
 
 
 def slide(**sensors: Sensor) -> Assembly:

@@ -14,7 +14,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlsdesign.errors import UnitError, ValueRangeError
-from nlsdesign.quantity import Quantity, convert, degrees, parse_unit, quantity, same_dimension, sources
+from nlsdesign.quantity import (
+    Quantity,
+    convert,
+    degrees,
+    parse_unit,
+    quantity,
+    same_dimension,
+    significant,
+    sources,
+    typeset_unit,
+    with_unit,
+)
 
 KG, M, S, A, K, RAD = range(6)
 
@@ -81,6 +92,35 @@ def test_letters_that_look_the_same_mean_the_same(alike: str, plain: str) -> Non
     """The Greek mu and the ohm sign are other characters than the micro sign and the Greek omega."""
     assert parse_unit(alike).factor == parse_unit(plain).factor
     assert parse_unit(alike).exponents == parse_unit(plain).exponents
+
+
+TYPESET = {
+    "1": "",
+    "N*m": "N·m",
+    "N*m*s^2/rad^2": "N·m·s²/rad²",
+    "kg*m2": "kg·m²",
+    "1/s": "1/s",
+    "m*s^-2": "m·s⁻²",
+    " N * m / rad": "N·m/rad",
+    "mOhm": "mΩ",
+    "kg·m²": "kg·m²",
+    "%": "%",
+    "°": "°",
+}
+
+
+@pytest.mark.parametrize("unit", TYPESET)
+def test_a_unit_is_typeset_for_people(unit: str) -> None:
+    assert typeset_unit(unit) == TYPESET[unit]
+    assert with_unit("7", unit) == f"7 {TYPESET[unit]}".strip()
+
+
+@pytest.mark.parametrize("unit", sorted(set(EXPECTED) - {"1"}))
+def test_a_typeset_unit_reads_back_as_the_same(unit: str) -> None:
+    shown = typeset_unit(unit)
+    assert not set("*^ ") & set(shown)
+    assert parse_unit(shown).factor == parse_unit(unit).factor
+    assert parse_unit(shown).exponents == parse_unit(unit).exponents
 
 
 @pytest.mark.parametrize(
@@ -212,4 +252,17 @@ def test_quantities_pickle_and_print() -> None:
     assert pickle.loads(pickle.dumps(given)) == given
     assert str(given) == "(1, 2) MPa"
     assert str(quantity(0.5, "1")) == "0.5"
+    assert str(quantity(0.5, "N*m/rad")) == "0.5 N·m/rad"
     assert degrees(180.0) == pytest.approx(math.pi, rel=1e-15)
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-16, -5e-15])
+def test_what_is_written_does_not_depend_on_the_last_digits(noise: float) -> None:
+    row = [0.016396776846523842, 0.0115, 1e-19]
+    assert significant([v * (1.0 + noise) + noise * 1e-3 for v in row]) == (0.0163967768, 0.0115, 0.0)
+
+
+def test_significant_digits_count_from_the_largest_number_of_a_row() -> None:
+    assert significant([123456.0, -1.26], 6) == (123456.0, -1.0)
+    assert significant([0.0, 0.0]) == (0.0, 0.0)
+    assert significant([math.inf, 1.23456], 3) == (math.inf, 1.23)

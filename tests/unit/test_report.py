@@ -11,9 +11,11 @@ import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import matplotlib.figure
+import numpy as np
 import pytest
 import sympy
 
@@ -295,7 +297,7 @@ def test_plain_text_becomes_paragraphs_and_code() -> None:
 
 def test_a_figure_without_words_is_refused() -> None:
     bare = matplotlib.figure.Figure()
-    with pytest.raises(ValueRangeError, match=r"figure 'Bare'.*has no words"):
+    with pytest.raises(ValueRangeError, match=r"figure 'Bare'.*has no alternative text"):
         report.FigureSection("Bare", bare, caption="What is seen.")
     assert report.FigureSection("Bare", bare, caption="What is seen.", alternative="An empty figure.")
 
@@ -418,7 +420,7 @@ def test_a_power_keeps_the_brackets_of_its_base() -> None:
 def test_a_long_sum_wraps_and_an_unknown_function_names_a_row_once() -> None:
     arguments = sympy.symbols("motor.angle lever_arm[1] lever_arm[2]", real=True)
     given = report.mathml.Equations({"x": A + B - C}, {"h": sympy.Function("f")(*arguments)}, True)
-    content = report.EquationsSection("E", given).content(report.sections.Place("s1", Path()))
+    content = report.EquationsSection("E", given).content(report.sections.PagePosition("s1", Path()))
     plain = [
         [re.sub(r"<[^>]*>", "", piece) for piece in row] for row in (*content["states"], *content["signals"])
     ]
@@ -473,3 +475,24 @@ def test_a_folder_that_is_a_file_is_named(tmp_path: Path) -> None:
 def test_a_missing_folder_is_made(tmp_path: Path) -> None:
     path = report.write_report(tmp_path / "a" / "b.html", report.TextSection("One", "x"), title="t")
     assert path.is_file()
+
+
+def test_a_report_on_a_diagnosis_has_units_on_every_axis() -> None:
+    wheel = assembly("wheel", load=Inertia(inertia=1e-3), spring=tie(TorsionSpring(stiffness=2.0), "load"))
+    bins = SimpleNamespace(centre=np.linspace(0.0, 1.0, 5), mean=np.linspace(0.1, 0.2, 5))
+    time = np.linspace(0.0, 1.0, 50)
+    diagnosis = SimpleNamespace(
+        verdict="named", block="load", where=("load",), effects=(), runners_up=(), next_steps=(),
+        declared=wheel, rows=list, words=lambda: "Named.",
+        gaps=[SimpleNamespace(block="load", record="a", role="held_out", before=2.0, after=1.0,
+                              noise_floor=0.5, unit="N*m")],
+        course=SimpleNamespace(record="a", time=time, measured=time, before=time, after=time,
+                               quantity="torque", unit="N*m", noise=0.1),
+        shapes={"over load.angle": (bins, bins), "over time": (bins, bins)},
+    )  # fmt: skip
+    sections = report.verdict_sections(diagnosis)  # type: ignore[arg-type]
+    drawn = [part.figure for part in sections[1].parts if isinstance(part, report.FigureSection)]  # type: ignore[attr-defined]
+    labels = [axes.get_xlabel() for figure in drawn for axes in figure.axes[-1:]]
+    assert labels == ["", "time in s", "load.angle in rad", "time in s"]
+    for figure in drawn:
+        assert [axes.get_ylabel().endswith(" in N·m") for axes in figure.axes] == [True] * len(figure.axes)

@@ -1,4 +1,4 @@
-"""The spring–dashpot circuit of an element: what lies in series, what in parallel; as lines of text."""
+"""The spring–dashpot circuit of an element (series and parallel), as lines of text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GLYPHS = {
     "box": "─▭─",
     "around": "─◇─",
 }
-"""How one element looks in a line of text, by the name of its picture."""
+"""Text symbol of an element, by the name of its picture."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def circuit_of(element: Element, label: str) -> Circuit:
         return Row(tuple(circuit_of(member, f"{label}.{name}") for name, member in inside))
     items = tuple(circuit_of(member, name) for name, member in inside)
     together = items[0] if len(items) == 1 else Stack(items)
-    # A parallel or a specimen is its members; other combinations do something to them.
+    # A parallel or a specimen is no more than its members; other combinations act on them and are drawn.
     return together if element.picture == "none" else Row((Leaf(label, element.picture), together))
 
 

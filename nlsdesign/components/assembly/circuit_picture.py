@@ -1,4 +1,4 @@
-"""The circuits of an assembly as a small picture (SVG), for notebooks; drawn without any library."""
+"""The circuits of an assembly as a small picture (SVG), for notebooks; without a plotting library."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _PICTURES = {
     "around": "M0 0h36M36 0l12 -10 12 10 -12 10zM60 0h36",
 }
 _STYLE = "fill:none;stroke:currentColor;stroke-width:1.5;stroke-linejoin:round"
-_WORDS = "font:11px system-ui,sans-serif;fill:currentColor"
+_TEXT_STYLE = "font:11px system-ui,sans-serif;fill:currentColor"
 
 
 class Size(NamedTuple):
-    """Columns and rows that a circuit takes."""
+    """Columns and rows that a circuit occupies."""
 
     columns: int
     rows: int
@@ -52,12 +52,12 @@ def size_of(circuit: Circuit) -> Size:
 
 
 def assembly_svg(name: str, parts: Sequence[tuple[str, Part]]) -> str:
-    """Return all bodies, ties, gears and sensors as one picture, a line each, circuits drawn out.
+    """Return all bodies, ties, gears and sensors as one picture, one line each, with their circuits.
 
     Parameters
     ----------
     name
-        Of the assembly, for those who cannot see it.
+        Of the assembly; the label for screen readers.
     parts
         Pairs of name and part.
     """
@@ -95,7 +95,7 @@ def _tie(circuit: Circuit, size: Size, ends: tuple[str, ...], top: float) -> Ite
 
 
 def _drawn(circuit: Circuit, left: float, wire: float, width: float) -> Iterator[str]:
-    """Draw a circuit from left to right; what is wider than it is filled with wire."""
+    """Draw a circuit from left to right; surplus width is filled with wire."""
     if isinstance(circuit, Leaf):
         yield _line(_PICTURES[circuit.picture], f' transform="translate({left:.0f} {wire:.0f})"')
         yield _line(f"M{left + CELL:.0f} {wire:.0f}H{left + width:.0f}")
@@ -127,5 +127,5 @@ def _line(path: str, placed: str = "") -> str:
     return f'<path{placed} style="{_STYLE}" d="{path}"/>'
 
 
-def _text(x: float, y: float, words: str, anchor: str) -> str:
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" style="{_WORDS}">{escape(words)}</text>'
+def _text(x: float, y: float, text: str, anchor: str) -> str:
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" style="{_TEXT_STYLE}">{escape(text)}</text>'

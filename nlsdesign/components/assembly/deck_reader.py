@@ -1,4 +1,4 @@
-"""From the tables of a deck to parts; everything that is wrong on the way is collected."""
+"""Parts from the tables of a deck; all problems are collected, not only the first."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from ..transmission.cam_drive import Through
 
 @functools.cache
 def _modules() -> tuple[ModuleType, ...]:
-    """Import every module of the inner rooms of ``components``: a law is found by being there, in no list."""
+    """Import every module of the inner rooms of ``components``: a law needs no entry in any list."""
     room = importlib.import_module(__name__.rsplit(".", 2)[0])
-    names = (found.name for found in pkgutil.walk_packages(room.__path__, room.__name__ + "."))
+    names = (module.name for module in pkgutil.walk_packages(room.__path__, room.__name__ + "."))
     return tuple(importlib.import_module(name) for name in names)
 
 
@@ -44,7 +44,7 @@ def component_classes() -> dict[str, type[Part]]:
 
 
 class Builder:
-    """Builds parts from tables and collects everything that is wrong on the way.
+    """Builds parts from tables and collects all problems.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Builder:
         self.classes = component_classes()
 
     def part(self, path: str, table: Mapping[str, Any]) -> Part | None:
-        """Return the part of a table with everything in it, ``None`` if anything is wrong with it.
+        """Return the part of a table with all parts inside, ``None`` if there is a problem in it.
 
         Parameters
         ----------
@@ -76,11 +76,11 @@ class Builder:
         fields = self.numbers(path, table, kind)
         if inner and not issubclass(kind, Combination | Through | GearedMotor):
             self._problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
-        made = {key: child for key, child in children.items() if child is not None}
-        if len(self.problems) > before or len(made) < len(children):
+        complete = {key: child for key, child in children.items() if child is not None}
+        if len(self.problems) > before or len(complete) < len(children):
             return None
         try:
-            return kind(**fields, **_structure(kind, table, made))
+            return kind(**fields, **_structure(kind, table, complete))
         except NlsError as error:
             self.problems.append(error.at(self.deck.place(path)))
             return None
@@ -95,8 +95,8 @@ class Builder:
         kind
             The component.
         """
-        infos, found = kind.parameter_infos(), {}
-        meant: set[str | None] = set()
+        infos, quantities = kind.parameter_infos(), {}
+        intended: set[str | None] = set()
         keys = self._keys(path, kind)
         for key, raw in table.items():
             full = f"{path}.{key}"
@@ -107,7 +107,7 @@ class Builder:
                     self.problems.append(error)
                     continue
                 try:
-                    found[key] = infos[key].checked(key, given)
+                    quantities[key] = infos[key].checked(key, given)
                 except NlsError as error:
                     self.problems.append(error.at(self.deck.place(full)))
             elif key not in keys and not _is_part(raw):
@@ -115,17 +115,17 @@ class Builder:
                     f"{kind.__name__} has no field '{key}'",
                     f"fields are: {', '.join([*keys, *infos])}",
                 )
-                meant.add(nearest(key, [*keys, *infos]))
+                intended.add(nearest(key, [*keys, *infos]))
                 self._problem(full, rule, did_you_mean=nearest(key, [*keys, *infos]), next_step=step)
         for field in dataclasses.fields(kind):
-            # What stands there misspelt has been named already.
-            missing = field.name in infos and field.name not in table and field.name not in meant
+            # A misspelt field has been reported already.
+            missing = field.name in infos and field.name not in table and field.name not in intended
             if missing and field.default is dataclasses.MISSING:
                 step = (
                     f'add {field.name} = {{value = ..., unit = "{infos[field.name].unit}", source = "..."}}'
                 )
                 self._problem(path, f"{kind.__name__} needs '{field.name}'", next_step=step)
-        return found
+        return quantities
 
     def tied(self, name: str, element: Part | None, table: Mapping[str, Any]) -> Tie | None:
         """Return an element of the top level with the bodies at its ends.
@@ -145,9 +145,9 @@ class Builder:
             return None
         # A table of an unknown component may be a body.
         bodies = [n for n in self.deck.tables if issubclass(self.class_of(n) or Body, Body)]
-        strangers = [unknown_name("body", end, bodies) for end in ends if end not in bodies]
-        self.problems += [error.at(self.deck.place(f"{name}.between")) for error in strangers]
-        if strangers or not isinstance(element, Element):
+        unknown = [unknown_name("body", end, bodies) for end in ends if end not in bodies]
+        self.problems += [error.at(self.deck.place(f"{name}.between")) for error in unknown]
+        if unknown or not isinstance(element, Element):
             return None
         try:
             return Tie(element=element, between=tuple(ends))
@@ -178,11 +178,11 @@ class Builder:
     def _kind(self, path: str, table: Mapping[str, Any]) -> type[Part] | None:
         name = table.get("component")
         if name is None:
-            slip = nearest("component", [key for key in table if key not in ("between", "of")])
+            misspelt = nearest("component", [key for key in table if key not in ("between", "of")])
             self._problem(
-                f"{path}.{slip}" if slip else path,
-                "is not a field; the table has no component" if slip else "the table has no component",
-                did_you_mean="component" if slip else None,
+                f"{path}.{misspelt}" if misspelt else path,
+                "is not a field; the table has no component" if misspelt else "the table has no component",
+                did_you_mean="component" if misspelt else None,
                 next_step='write component = "..."',
             )
             return None

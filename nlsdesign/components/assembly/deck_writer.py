@@ -1,4 +1,4 @@
-"""Decks to assemblies and back. A deck declares everything: parts, ties, numbers."""
+"""Assemblies from decks and decks from assemblies; a deck declares parts, ties and numbers."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ def declare(deck: Deck) -> Assembly:
     NlsError
         The first problem; ``deck_problems`` gives all.
     """
-    found, problems = _declared(deck)
-    if found is None:
+    declared, problems = _declared(deck)
+    if declared is None:
         raise problems[0]
-    return found
+    return declared
 
 
 def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
@@ -65,15 +65,15 @@ def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
         part = builder.part(name, table)
         is_tied = issubclass(builder.class_of(name) or Part, Element)
         parts[name] = builder.tied(name, part, table) if is_tied else part
-    sound = tuple((name, part) for name, part in parts.items() if part is not None)
-    unsure = [name for name, part in parts.items() if part is None]
-    for name, error in (*arrangement_problems(sound, unsure), *source_problems(sound, unsure)):
+    complete = tuple((name, part) for name, part in parts.items() if part is not None)
+    unreadable = [name for name, part in parts.items() if part is None]
+    for name, error in (*arrangement_problems(complete, unreadable), *source_problems(complete, unreadable)):
         field = next((f for f in (f"{name}.between", f"{name}.of") if f in deck.places), name)
         builder.problems.append(error.at(deck.place(field)))
     if builder.problems:
         return None, builder.problems
     try:
-        return Assembly(deck.name, sound, deck.description), []
+        return Assembly(deck.name, complete, deck.description), []
     except NlsError as error:
         return None, [error.at(deck.place("deck"))]
 
@@ -155,7 +155,7 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
     Raises
     ------
     NlsError
-        If the table is missing or is another component, or a number is missing, too much or not sound.
+        If the table is missing or is another component, or a number is missing, unknown or not valid.
     """
     table: Any = deck.tables
     for step in path.split("."):
@@ -166,10 +166,10 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
             deck.place(path), rule, next_step="use declare(deck), which takes any deck as it stands"
         )
     builder = Builder(deck)
-    found = builder.numbers(path, table, kind)
+    quantities = builder.numbers(path, table, kind)
     if builder.problems:
         raise builder.problems[0]
-    return found
+    return quantities
 
 
 def require_same_numbers(assembly: Assembly, deck: Deck) -> Assembly:

@@ -113,7 +113,7 @@ class Assembly:
         return replace(self, parts=tuple(parts.items()))
 
     def with_part(self, path: str, new: Part) -> Assembly:
-        """Return a copy in which a part is added, or another one stands in its place.
+        """Return a copy in which a part is added or replaced.
 
         Parameters
         ----------
@@ -146,10 +146,10 @@ class Assembly:
             For instance ``"spring"`` or ``"spring.rubber"``.
         """
         part = self[path]
-        found = part.element if isinstance(part, Tie) else part
-        if not isinstance(found, Element):
-            raise ArrangementError(f"part '{path}'", f"is a {type(found).__name__}, not an element")
-        return found
+        element = part.element if isinstance(part, Tie) else part
+        if not isinstance(element, Element):
+            raise ArrangementError(f"part '{path}'", f"is a {type(element).__name__}, not an element")
+        return element
 
     def without_part(self, name: str) -> Assembly:
         """Return a copy without a part at the top.
@@ -168,12 +168,12 @@ class Assembly:
 
     def _repr_html_(self) -> str:
         """Return the circuits as a picture and the parts with their numbers, for notebooks."""
-        told = f"<details><summary>parts and numbers</summary><pre>{escape(str(self))}</pre></details>"
+        details = f"<details><summary>parts and numbers</summary><pre>{escape(str(self))}</pre></details>"
         title = f"<p><b>{escape(self.name)}</b> {escape(self.description)}</p>"
-        return f"<div>{title}{assembly_svg(self.name, self.parts)}{told}</div>"
+        return f"<div>{title}{assembly_svg(self.name, self.parts)}{details}</div>"
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
-        """Return text and picture; a notebook takes the richest that it can show."""
+        """Return text and picture; a notebook chooses the richest form that it can show."""
         return {"text/plain": str(self), "text/html": self._repr_html_()}
 
 
@@ -184,21 +184,21 @@ def _with_inner(root: Part, path: str, new: Part) -> Part:
 
 
 def arrangement_problems(
-    parts: Sequence[tuple[str, Part]], unsure: Sequence[str] = ()
+    parts: Sequence[tuple[str, Part]], unreadable: Sequence[str] = ()
 ) -> Iterator[tuple[str, NlsError]]:
-    """Yield what is wrong with the way in which parts are put together, with the name of the part.
+    """Yield the problems of an arrangement of parts, each with the name of the part.
 
     Parameters
     ----------
     parts
         Pairs of name and part.
-    unsure
-        Names of parts that are there but could not be read; nothing is said of what is tied to them.
+    unreadable
+        Names of parts that are declared but could not be read; ties to them are not judged.
     """
     bodies = {name: part for name, part in parts if isinstance(part, Body)}
     for name, part in parts:
         if isinstance(part, Tie):
-            if not set(unsure) & set(part.between):
+            if not set(unreadable) & set(part.between):
                 yield from ((name, error) for error in _tie_problems(name, part, bodies))
         elif not isinstance(part, Body | Sensor | Gear):
             yield (
@@ -209,7 +209,7 @@ def arrangement_problems(
                     next_step="tie an element to bodies with tie(element, 'motor', 'load')",
                 ),
             )
-    yield from gear_problems(parts, unsure)
+    yield from gear_problems(parts, unreadable)
     yield from chain_problems(parts)
 
 

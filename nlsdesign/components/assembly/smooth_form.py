@@ -14,18 +14,18 @@ from .named_parts import Assembly
 
 @runtime_checkable
 class Sharp(Protocol):
-    """A law that is not smooth and knows one that is."""
+    """A law that is not smooth and has a smooth form."""
 
     def smooth(self, width: float = ...) -> Element:
-        """Return the smooth form; how smooth it is and by how much it differs stands in its description."""
+        """Return the smooth form; its description states the width and the largest difference."""
         ...
 
 
 def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> Assembly:
     """Return an assembly in which every law that is not smooth has its smooth form.
 
-    Dry friction creeps with a hyperbolic tangent instead of sticking, stops, play, slack and knots are
-    rounded; each law says by how much it then differs.
+    Dry friction becomes a hyperbolic tangent, which creeps instead of sticking; stops, backlash, slack and
+    breakpoints are rounded. Each law states by how much its smooth form differs.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
         Parts.
     widths
         By the full name of the element: speed, angle, extension, strain or force over which it is rounded.
-        Others take the width that their law proposes.
+        Others use the default width of their law.
 
     Raises
     ------
@@ -46,18 +46,18 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
     >>> rub = tie(DryFriction(sliding_torque=0.05), "wheel")
     >>> rubbing = assembly("a", wheel=Inertia(inertia=1e-3), rub=rub)
     >>> smoothed(rubbing, {"rub": 0.01}).element("rub").title()
-    'CoulombFriction(sliding_torque = 0.05 N*m, creep_speed = 0.01 rad/s)'
+    'CoulombFriction(sliding_torque = 0.05 N·m, creep_speed = 0.01 rad/s)'
     """
-    asked = dict(widths or {})
+    widths = dict(widths or {})
     sharp = {path: part for path, part in assembly.walk() if isinstance(_law(part), Sharp)}
-    for name in asked:
+    for name in widths:
         if name not in sharp:
             raise unknown_name("element that is not smooth", name, sharp)
-    # What lies deeper first: the smooth form of a wrapper takes along what is inside.
+    # Innermost parts first: the smooth form of a wrapper keeps the parts inside it.
     for path in sorted(sharp, key=lambda p: -p.count(".")):
         law = _law(assembly[path])
         if isinstance(law, Sharp):
-            smooth = law.smooth(asked[path]) if path in asked else law.smooth()
+            smooth = law.smooth(widths[path]) if path in widths else law.smooth()
             assembly = assembly.with_part(path, smooth)
     return assembly
 

@@ -11,7 +11,7 @@ def delayed(scope: Scope, value: Expression, unit: str) -> Expression:
 
     e^(−sτ) ≈ (1 − sτ/2 + s²τ²/12)/(1 + sτ/2 + s²τ²/12). The gain is 1 at every frequency, the phase error
     lies below (ωτ)⁵/720: 4e-5 rad at ωτ = 0.5. The states are a, which rests at the value, and b = τ·ȧ; the
-    delayed value is v − b. Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
+    delayed value is v − b. Source: Golub and Van Loan 2013 (Padé table of the exponential).
 
     Parameters
     ----------

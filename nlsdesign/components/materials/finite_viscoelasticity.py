@@ -26,7 +26,7 @@ class FlowingChains(Element):
     Examples
     --------
     >>> FlowingChains(shear_modulus=0.1e6, viscosity=0.3e6).title()
-    'FlowingChains(shear_modulus = 100000 Pa, viscosity = 300000 Pa*s)'
+    'FlowingChains(shear_modulus = 100000 Pa, viscosity = 300000 Pa·s)'
     """
 
     shear_modulus: Quantity = parameter("Pa", "shear modulus µ of the chains", minimum=1.0, maximum=1e12)

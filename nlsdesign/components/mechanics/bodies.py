@@ -135,6 +135,11 @@ class GearedMotor(Free):
     chain
         Pairs of name and part of the drive between current and torque; none for an ideal drive.
 
+    Raises
+    ------
+    ArrangementError
+        If a part does not lie between current and torque, or a name is taken.
+
     Examples
     --------
     >>> from nlsdesign.components import DriveDelay, DriveSaturation

@@ -36,7 +36,7 @@ class DriveDelay(DrivePart):
     """A torque that follows the current by a transport delay τ: I'(t) = I(t − τ).
 
     In (2,2) Padé approximation, see :func:`~nlsdesign.components.core.delay.delayed`.
-    Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
+    Source: Golub and Van Loan 2013 (Padé table of the exponential).
 
     Examples
     --------
@@ -56,8 +56,8 @@ class DriveSaturation(DrivePart):
     """Iron that saturates: I' = I/√(1 + (I/I_s)²).
 
     At I = I_s the torque is 71 % of the ideal one; the torque constant is that of small currents. C∞. Valid
-    for slow changes, without hysteresis of the iron. Source: Froelich's curve of magnetisation in its smooth
-    form; e.g. Hanselman 2003 on saturation.
+    for slow changes, without hysteresis of the iron.
+    Source: Hanselman 2003 (saturation, Froelich's curve of magnetisation in its smooth form).
 
     Examples
     --------

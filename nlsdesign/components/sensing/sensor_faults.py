@@ -23,7 +23,7 @@ class TransportDelay(Sensor):
 
     In the flat model as its (2,2) Padé approximation, see :func:`~nlsdesign.components.core.delay.delayed`.
     In records the delay is exact, by lines between samples; before the first sample the value stood still.
-    Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
+    Source: Golub and Van Loan 2013 (Padé table of the exponential).
 
     Examples
     --------

@@ -201,7 +201,7 @@ class TorqueSensor(_Transducer):
     Examples
     --------
     >>> TorqueSensor(of="spring.torque", noise=5e-3).title()
-    'TorqueSensor(gain = 1, bias = 0 N*m, noise = 0.005 N*m)'
+    'TorqueSensor(gain = 1, bias = 0 N·m, noise = 0.005 N·m)'
     """
 
     units: ClassVar[tuple[str, ...]] = ("N*m",)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...identification.records.measurement import Record
 from ...model import FlatModel
-from ...model.structure import reading_of
+from ...model.readings import reading_of
 
 Array = NDArray[np.float64]
 

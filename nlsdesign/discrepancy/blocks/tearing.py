@@ -12,7 +12,8 @@ from ...errors import MeasurementError
 from ...identification.equation_error.block import Block, Drive
 from ...model import FlatModel, Variable
 from ...model.flat import Symbols
-from ...model.structure import MovingBody, ReadingNames, body_moved_by, reading_of, top_part
+from ...model.readings import ReadingNames, reading_of
+from ...model.structure import MovingBody, body_moved_by, top_part
 from ...model.transform import cut, named, without_idle_states
 from ...symbolic import Expression, depends
 

@@ -31,7 +31,8 @@ def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
             assembly.with_part(f"{name}.delay", delay),
             (Unknown(f"{name}.delay.delay", (0.003,), 1e-4, 0.2),),
             "torque that follows the current late, the more the faster the current changes",
-            "Golub and Van Loan (Padé table)",
+            "Golub and Van Loan 2013 (Padé table)",
+            explains_lag=True,
         )
         for name in _motors_without(assembly, DriveDelay)
     ]
@@ -53,7 +54,7 @@ def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
             assembly.with_part(f"{name}.saturation", saturation),
             (Unknown(f"{name}.saturation.saturation_current", (1.5,), 0.2, 50.0, f"{name}.current"),),
             "torque that falls short the more, the larger the current, with either sign",
-            "Froelich's curve of magnetisation; Hanselman 2003",
+            "Hanselman 2003 (saturation, Froelich's curve of magnetisation)",
         )
         for name in _motors_without(assembly, DriveSaturation)
     ]

@@ -16,11 +16,12 @@ from ...identification.output_error.wiring import Wiring
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.statistics.metrics import rmse
 from ...model import Assembly, FlatModel, flatten
-from ...model.structure import reading_of
+from ...model.readings import reading_of
 from ..blocks.shown_values import shown_values
 from .verdict import RecordGap
 
 _PHASES = 4
+"""Windows begin at so many phases of one length, so that no sample is always near a beginning."""
 
 
 def fitted_over_windows(
@@ -47,12 +48,12 @@ def fitted_over_windows(
     model = flatten(actuator)
     free = [declared_parameter(model.variable(name), start) for name, start in starts.items()]
     wiring, shots = wiring_of(model, records.signals), Shots(length, False, phases=_PHASES)
-    seen = [_without_sensors(model, record, wiring) for record in records.of("fit")]
-    alone = fit_by_simulation(model, seen, free, shots=shots, wiring=wiring)
+    fitted = [_without_sensors(model, record, wiring) for record in records.of("fit")]
+    white = fit_by_simulation(model, fitted, free, shots=shots, wiring=wiring)
     # What a model leaves over is coloured; weighed as white it would drown the prior.
-    weights = Weights(coloured_sigma(alone))
-    found = fit_by_simulation(model, seen, free, shots=shots, wiring=wiring, weights=weights).fit
-    return dict(found.values), found
+    weights = Weights(coloured_sigma(white))
+    fit = fit_by_simulation(model, fitted, free, shots=shots, wiring=wiring, weights=weights).fit
+    return dict(fit.values), fit
 
 
 def window_gaps(
@@ -73,17 +74,17 @@ def window_gaps(
     """
     models = [flatten(actuator), flatten(actuator.with_values(values))]
     wiring = wiring_of(models[0], records.signals)
-    found = []
+    gaps = []
     for record in records.records:
         shown = _without_sensors(models[0], record, wiring)
         runs = [predict_in_windows(m, shown, length, wiring=wiring) for m in models]
         for signal in wiring.outputs:
             before, after = (rmse(run.error[signal]) for run in runs)
-            floor, unit = record.grain_of(signal).noise, record.trace.units[signal]
+            floor, unit = record.resolution_of(signal).noise, record.trace.units[signal]
             name = f"{signal} over {length:g} s"
             rows = len(runs[0].time)
-            found.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))
-    return tuple(found)
+            gaps.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))
+    return tuple(gaps)
 
 
 def wiring_of(model: FlatModel, signals: Sequence[str]) -> Wiring:

@@ -1,4 +1,4 @@
-"""Forces that lag the extension they belong to: a sign that the data are wrong, seen before any fit."""
+"""Check of causality: forces that lag the extension they belong to, seen before any fit."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...components import MATERIAL, Element, Tie
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.loop_work import Loop, loop_of
 from ...model import Assembly, FlatModel, flatten
-from ...model.structure import reading_of
+from ...model.readings import reading_of
+from ...model.structure import motions_of_efforts
 from ...symbolic import depends
 from ..blocks.shown_values import shown_values
 
 Array = NDArray[np.float64]
 
 _QUICK_OVER_SLOW = 3.0
+"""Ratio of paces of records from which a constant delay can be told from another cause."""
 
 
-class LateForces(NamedTuple):
+class LaggingForces(NamedTuple):
     """Forces that lag.
 
     Parameters
@@ -40,7 +41,7 @@ class LateForces(NamedTuple):
     testable: bool
 
 
-def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
+def lagging_forces(assembly: Assembly, records: RecordSet) -> LaggingForces:
     """Return measured forces that give work over closed paths and never take any: no passive piece can.
 
     Parameters
@@ -50,8 +51,8 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
     records
         Of all roles.
     """
-    model, motions = flatten(assembly), _motions(assembly)
-    found: list[Finding] = []
+    model, motions = flatten(assembly), motions_of_efforts(assembly)
+    findings: list[Finding] = []
     pace: list[float] = []
     for signal in records.signals:
         reading = reading_of(model.readings, signal)
@@ -59,7 +60,7 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
         extension = _extension(model, motion, records.signals) if motion else None
         if motion is None or extension is None:
             continue
-        noise = float(np.median([r.grain_of(signal).noise for r in records.records]))
+        noise = float(np.median([r.resolution_of(signal).noise for r in records.records]))
         paths = [(r, extension(r)) for r in records.records]
         loops = [
             (r, loop)
@@ -68,9 +69,9 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
         ]
         if any(loop.gives for _, loop in loops) and not any(loop.takes for _, loop in loops):
             head = records.column(signal).name
-            found += [_finding(r, head, motion, loop) for r, loop in loops if loop.gives]
+            findings += [_finding(r, head, motion, loop) for r, loop in loops if loop.gives]
             pace += [_pace(path, r.step) for r, path in paths]
-    return LateForces(tuple(found), bool(pace) and max(pace) > _QUICK_OVER_SLOW * min(pace))
+    return LaggingForces(tuple(findings), bool(pace) and max(pace) > _QUICK_OVER_SLOW * min(pace))
 
 
 def _pace(path: Array, step: float) -> float:
@@ -86,16 +87,6 @@ def _finding(record: Record, head: str, motion: str, loop: Loop) -> Finding:
         f"(∮F dδ < 0, {-100 * loop.share:.2g} % of the work that goes in and out), which no passive one can; "
         f"a force that comes at least {1e3 * loop.late_by:.2g} ms late does. Are the channels on one clock?",
     )
-
-
-def _motions(assembly: Assembly) -> dict[str, str]:
-    """Return the motion that does work with each force and torque, by name of the effort."""
-    pieces = ((path, part.element if isinstance(part, Tie) else part) for path, part in assembly.walk())
-    return {
-        f"{path}.{piece.domain.effort}": f"{path}.{piece.domain.motion}"
-        for path, piece in pieces
-        if isinstance(piece, Element) and piece.domain != MATERIAL
-    }
 
 
 def _extension(model: FlatModel, motion: str, signals: Sequence[str]) -> Callable[[Record], Array] | None:
@@ -117,7 +108,7 @@ def _extension(model: FlatModel, motion: str, signals: Sequence[str]) -> Callabl
 
     def at(record: Record) -> Array:
         rows = np.array([shown_values(model, record, signal) for _, signal in known])
-        found: Array = function.map(rows.shape[1])(rows).full().ravel()
-        return found
+        values: Array = function.map(rows.shape[1])(rows).full().ravel()
+        return values
 
     return at

@@ -38,6 +38,11 @@ class Shots:
     phases
         How many times windows apart are laid over a record, each time later by that share of their length;
         together they count as one. Where windows happen to begin then matters less.
+
+    Raises
+    ------
+    ValueRangeError
+        If ``phases`` is below one, or above one for windows that are joined.
     """
 
     length: float
@@ -119,10 +124,10 @@ class SimulationError:
         To be fitted.
     parameters
         What is free; delays of ``wiring.late_by`` among them.
-    wiring
-        Of measured signals; by name where ``None``.
     shots
         Windows.
+    wiring
+        Of measured signals; by name where ``None``.
     weights
         What counts how much; see :class:`Weights`.
     slopes
@@ -368,7 +373,7 @@ def _phases(record: Record, shots: Shots) -> list[Record]:
 
 def _noise(records: Sequence[Record], signal: str) -> float:
     rows = [r.trace[signal] for r in records]
-    grains = [r.grain_of(signal) for r in records]
-    white = float(np.median([g.noise for g in grains]))
-    rounding = float(np.median([g.quantum for g in grains])) / math.sqrt(12.0)
+    resolutions = [r.resolution_of(signal) for r in records]
+    white = float(np.median([g.noise for g in resolutions]))
+    rounding = float(np.median([g.quantum for g in resolutions])) / math.sqrt(12.0)
     return max(white, rounding) or float(np.std(np.concatenate(rows))) or 1.0

@@ -1,4 +1,4 @@
-"""Records on another clock, with a lag removed, or joined with a second recording of the same run."""
+"""Records resampled, aligned (a lag removed), or joined with a second recording of the same run."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import replace
 
 from ...errors import MeasurementError, unknown_name
 from ...simulation import Trace
-from .clocks import Channel, Grain, on_one_clock
+from .clocks import Channel, Resolution, on_one_clock
 from .lag import Lag, lag_between
 from .measurement import Record
 
 
 def resampled(record: Record, rate: float) -> Record:
-    """Return a record on another uniform clock; the rule is that of :mod:`.clocks`.
+    """Return a record resampled to another uniform clock by the rule of :mod:`.clocks`.
 
     Parameters
     ----------
@@ -25,20 +25,22 @@ def resampled(record: Record, rate: float) -> Record:
     Returns
     -------
     Record
-        Its ``source`` says what was done, its ``grain`` how fine the signals are.
+        Its ``source`` lists the changes, its ``resolution`` noise and count of the signals.
     """
-    return _put_together(record, [record], [0.0], (rate, ()))
+    return _merged(record, [record], [0.0], (rate, ()))
 
 
-def aligned(record: Record, late: str, reference: str, *, longest: float | None = None) -> tuple[Record, Lag]:
-    """Return a record with one of its signals moved to where another shows the same motion.
+def aligned(
+    record: Record, delayed: str, reference: str, *, longest: float | None = None
+) -> tuple[Record, Lag]:
+    """Return a record in which the lag between two of its signals is removed.
 
     Parameters
     ----------
     record
-        Measured. What the lag itself says, for instance the delay of a sensor, is gone from the result.
-    late, reference
-        Full names of two signals.
+        Measured. The result no longer contains the lag, for instance the delay of a sensor.
+    delayed, reference
+        Full names of two signals that show the same motion; the first is moved.
     longest
         As for :func:`~nlsdesign.identification.records.lag.lag_between`.
 
@@ -49,9 +51,9 @@ def aligned(record: Record, late: str, reference: str, *, longest: float | None 
     MeasurementError
         As for :func:`~nlsdesign.identification.records.lag.lag_between`.
     """
-    lag = lag_between(_channel(record, late), _channel(record, reference), longest=longest)
-    parts = [_only(record, [s for s in record.trace.signals if s != late]), _only(record, [late])]
-    return _put_together(record, parts, [0.0, lag.seconds], (1.0 / record.step, (_told(lag),))), lag
+    lag = lag_between(_channel(record, delayed), _channel(record, reference), longest=longest)
+    parts = [_only(record, [s for s in record.trace.signals if s != delayed]), _only(record, [delayed])]
+    return _merged(record, parts, [0.0, lag.seconds], (1.0 / record.step, (_removed(lag),))), lag
 
 
 def joined(
@@ -62,8 +64,8 @@ def joined(
     Parameters
     ----------
     record, other
-        Of two recorders that were not started together; the clock of the first is kept. Of a signal that both
-        have the first is kept.
+        From two recorders with different start times. The clock of the first is kept, and its version of a
+        signal that both have.
     by
         A signal of the first and one of the second that show the same motion.
     rate
@@ -82,11 +84,11 @@ def joined(
     new = [s for s in other.trace.signals if s not in record.trace.signals]
     if not new:
         raise MeasurementError(f"record '{other.name}'", f"has no signal that '{record.name}' lacks")
-    told = f"joined with {other.source or other.name}; {_told(lag)}"
-    return _put_together(record, [record, _only(other, new)], [0.0, lag.seconds], (rate, (told,))), lag
+    change = f"joined with {other.source or other.name}; {_removed(lag)}"
+    return _merged(record, [record, _only(other, new)], [0.0, lag.seconds], (rate, (change,))), lag
 
 
-def _told(lag: Lag) -> str:
+def _removed(lag: Lag) -> str:
     return f"{lag}, which was removed"
 
 
@@ -102,21 +104,23 @@ def _only(record: Record, signals: Sequence[str]) -> Record:
     return replace(record, trace=Trace(trace.time, kept, {s: trace.units[s] for s in signals}, trace.name))
 
 
-def _put_together(
+def _merged(
     record: Record, parts: Sequence[Record], lags: Sequence[float], how: tuple[float, tuple[str, ...]]
 ) -> Record:
     """Return signals of several records, each moved by a lag, under the name and role of the first."""
-    rate, told = how
-    channels, grain, units = [], {}, {}
+    rate, changes = how
+    channels, resolution, units = [], {}, {}
     for part, lag in zip(parts, lags, strict=True):
         for signal, values in part.trace.signals.items():
             channels.append(Channel(signal, part.trace.time - lag, values))
-            noise, quantum = part.grain_of(signal)
+            noise, quantum = part.resolution_of(signal)
             share = (rate * part.step) ** 0.5
-            grain[signal] = Grain(share * noise, share * quantum)
+            resolution[signal] = Resolution(share * noise, share * quantum)
             units[signal] = part.trace.units[signal]
-    found = on_one_clock(channels, rate)
-    words = "; ".join([*told, *found.words])
-    trace = Trace(found.time, found.values, units, record.name)
-    source = f"{record.source or record.name} ({words})" if words else record.source
-    return replace(record, trace=trace, source=source, grain=grain if words else record.grain)
+    resampling = on_one_clock(channels, rate)
+    summary = "; ".join([*changes, *resampling.changes])
+    trace = Trace(resampling.time, resampling.values, units, record.name)
+    source = f"{record.source or record.name} ({summary})" if summary else record.source
+    return replace(
+        record, trace=trace, source=source, resolution=resolution if summary else record.resolution
+    )

@@ -1,9 +1,9 @@
 """Channels on different or uneven clocks, put on one uniform clock by a stated rule.
 
-Rule: where the rate goes down, a zero-phase low-pass removes what the new clock cannot hold (Kaiser-windowed
+Rule: where the rate falls, a zero-phase low-pass is the anti-alias filter (Kaiser-windowed
 FIR with half its gain at the new Nyquist frequency, as ``scipy.signal.resample_poly`` designs it; at its two
-ends a record is continued by point reflection). Where the rate goes up, a cubic spline goes through the
-samples. Nothing is extrapolated: the new clock runs where every channel was sampled.
+ends a record is continued by point reflection). Where the rate rises, a cubic spline interpolates.
+Nothing is extrapolated: the new clock covers the time in which every channel was sampled.
 """
 
 from __future__ import annotations
@@ -26,17 +26,21 @@ Array = NDArray[np.float64]
 _HALF_LENGTH, _KAISER = 10, 5.0
 """Half length of the low-pass in new samples, and the shape of its window."""
 _SAME = 1e-6
+"""Relative difference up to which two rates or times are the same."""
 _UNEVEN = 0.02
 """Steps that differ by more than this share do not lie on a uniform grid."""
 _LEAST = 50
+"""Smallest number of samples of a channel."""
 _GAP = 1.5
+"""A step longer than this many usual ones is a gap."""
 
 
-class Grain(NamedTuple):
-    """How fine a channel is: standard deviation of its noise and size of a count, in the unit of the channel.
+class Resolution(NamedTuple):
+    """Standard deviation of the noise and size of one count of a channel, in the unit of the channel.
 
-    After resampling these are what white noise and counts on the new clock would be that weigh as much at low
-    frequency: both scale with the root of the rate. The samples themselves no longer show it.
+    After resampling these are the values of equivalent white noise and counts on the new clock, with the same
+    power density at low frequency: both scale with the square root of the rate. They can no longer be
+    estimated from the samples.
     """
 
     noise: float
@@ -78,7 +82,7 @@ class Channel:
             raise MeasurementError(self.name, "holds a number that is not finite")
         if np.any(np.diff(self.time) <= 0.0):
             row = int(np.argmax(np.diff(self.time) <= 0.0))
-            raise MeasurementError(self.name, f"its time does not ascend behind sample {row + 1}")
+            raise MeasurementError(self.name, f"its time does not ascend after sample {row + 1}")
 
     @property
     def step(self) -> float:
@@ -91,18 +95,18 @@ class Channel:
         steps = np.diff(self.time)
         return bool(np.max(np.abs(steps - self.step)) <= _UNEVEN * self.step)
 
-    def grain(self, step: float | None = None, quantum: float = 0.0) -> Grain:
-        """Return noise and count, as they weigh on a clock.
+    def resolution(self, step: float | None = None, quantum: float = 0.0) -> Resolution:
+        """Return noise and count, scaled to a clock.
 
         Parameters
         ----------
         step
             Of the new clock in s; the channel's own by default.
         quantum
-            Size of one count where it is declared; taken from the samples where 0.
+            Declared size of one count; 0 to estimate it from the samples.
         """
         share = math.sqrt(self.step / step) if step else 1.0
-        return Grain(share * noise_of(self.values), share * (quantum or quantum_of(self.values)))
+        return Resolution(share * noise_of(self.values), share * (quantum or quantum_of(self.values)))
 
 
 class Resampled(NamedTuple):
@@ -114,13 +118,13 @@ class Resampled(NamedTuple):
         In s, uniform, shape (n,).
     values
         By name, shape (n,).
-    words
-        What was done, one sentence part for each channel that was changed.
+    changes
+        One clause for each channel that was changed.
     """
 
     time: Array
     values: dict[str, Array]
-    words: tuple[str, ...]
+    changes: tuple[str, ...]
 
 
 def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
@@ -136,7 +140,7 @@ def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
     Returns
     -------
     Resampled
-        The clock begins with the channel that begins last and ends with the one that ends first.
+        The clock runs from the latest first sample to the earliest last sample of the channels.
 
     Raises
     ------
@@ -148,15 +152,15 @@ def on_one_clock(channels: Sequence[Channel], rate: float) -> Resampled:
     if not (rate > 0.0 and math.isfinite(rate)):
         raise ValueRangeError(f"rate {rate:g} Hz", "must be positive", next_step="give for instance 500")
     time = _common(channels, rate)
-    values, words = {}, []
+    values, changes = {}, []
     for each in channels:
-        values[each.name], told = _resampled(each, time, 1.0 / rate)
-        words += [told] if told else []
+        values[each.name], change = _resampled(each, time, 1.0 / rate)
+        changes += [change] if change else []
     first, last = (min(c.time[0] for c in channels), max(c.time[-1] for c in channels))
     for length, end in ((time[0] - first, "first"), (last - time[-1], "last")):
         if length >= 1.0 / rate:
-            words.append(f"{end} {length:.3g} s left out, where not every channel runs")
-    return Resampled(time, values, tuple(words))
+            changes.append(f"{end} {length:.3g} s left out, where not every channel runs")
+    return Resampled(time, values, tuple(changes))
 
 
 def _common(channels: Sequence[Channel], rate: float) -> Array:
@@ -174,7 +178,7 @@ def _common(channels: Sequence[Channel], rate: float) -> Array:
 
 
 def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
-    """Return the values at new times, and what was done; empty where samples only were left out."""
+    """Return the values at new times, and the change; empty where samples were only left out."""
     own, steps = channel.step, np.diff(channel.time)
     if np.max(steps) > max(_GAP * own, (1.0 + _UNEVEN) * step):
         row = int(np.argmax(steps))
@@ -186,16 +190,18 @@ def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
     named = f"{channel.name} {1.0 / own:.4g} -> {1.0 / step:.4g} Hz"
     slower = step > own * (1.0 + _SAME)
     if not slower:
-        found: Array = make_interp_spline(channel.time, channel.values, k=3)(time)
+        interpolated: Array = make_interp_spline(channel.time, channel.values, k=3)(time)
         same = channel.even and abs(step / own - 1.0) < _SAME and _on_samples(channel.time, time)
         return (
-            (channel.values[_places(channel.time, time)], "") if same else (found, f"{named} by cubic spline")
+            (channel.values[_nearest(channel.time, time)], "")
+            if same
+            else (interpolated, f"{named} by cubic spline")
         )
     even = channel.time if channel.even else np.linspace(channel.time[0], channel.time[-1], len(channel.time))
     values = channel.values if channel.even else np.interp(even, channel.time, channel.values)
     smooth = _low_pass(channel.name, values, step / float(even[1] - even[0]))
-    told = f"{named} behind an anti-alias filter" + ("" if channel.even else ", uneven steps evened linearly")
-    return make_interp_spline(even, smooth, k=3)(np.minimum(time, even[-1])), told
+    change = f"{named} with an anti-alias filter" + ("" if channel.even else ", uneven steps interpolated")
+    return make_interp_spline(even, smooth, k=3)(np.minimum(time, even[-1])), change
 
 
 def _low_pass(name: str, values: Array, ratio: float) -> Array:
@@ -210,18 +216,20 @@ def _low_pass(name: str, values: Array, ratio: float) -> Array:
     return result
 
 
-def _places(time: Array, wanted: Array) -> NDArray[np.intp]:
+def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
     right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    places: NDArray[np.intp] = right - (wanted - time[right - 1] < time[right] - wanted)
-    return places
+    rows: NDArray[np.intp] = right - (wanted - time[right - 1] < time[right] - wanted)
+    return rows
 
 
 def _on_samples(time: Array, wanted: Array) -> bool:
-    return bool(np.max(np.abs(time[_places(time, wanted)] - wanted)) < _UNEVEN * (time[1] - time[0]))
+    return bool(np.max(np.abs(time[_nearest(time, wanted)] - wanted)) < _UNEVEN * (time[1] - time[0]))
 
 
-def grains(channels: Mapping[str, Channel], step: float, quanta: Mapping[str, float]) -> dict[str, Grain]:
-    """Return how fine channels are on a new clock.
+def resolutions(
+    channels: Mapping[str, Channel], step: float, quanta: Mapping[str, float]
+) -> dict[str, Resolution]:
+    """Return the resolution of channels on a new clock.
 
     Parameters
     ----------
@@ -232,4 +240,4 @@ def grains(channels: Mapping[str, Channel], step: float, quanta: Mapping[str, fl
     quanta
         Declared sizes of a count; 0 where none is declared.
     """
-    return {name: each.grain(step, quanta.get(name, 0.0)) for name, each in channels.items()}
+    return {name: each.resolution(step, quanta.get(name, 0.0)) for name, each in channels.items()}

@@ -1,4 +1,4 @@
-"""From the table of a file to signals on one uniform clock, with what was done to them on the way."""
+"""From the table of a file to signals on one uniform clock, with a note of every change."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from numpy.typing import NDArray
 from ...errors import MeasurementError, nearest
 from ...quantity import parse_unit, same_dimension
 from ...simulation import Trace
-from .clocks import Channel, Grain, grains, on_one_clock
+from .clocks import Channel, Resolution, on_one_clock, resolutions
 from .lag import lag_between
 from .mapping import Align, Column, ColumnMap
-from .quality import Finding, check_columns, check_time, suspicions
-from .table_files import Table
+from .quality import Finding, channel_findings, check_columns, check_time
+from .table_files import RecordTable
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What one file says.
+    """Content of one file.
 
     Parameters
     ----------
     trace
         Signals in SI by full name, on a uniform grid.
     source
-        File, and what was done to the samples on the way in.
-    grain
-        Noise and count of the channels that were interpolated or filtered, by signal; see
-        :class:`~nlsdesign.identification.records.clocks.Grain`.
+        File, and the changes made to its samples.
+    resolution
+        Resolution of the channels that were interpolated or filtered, by signal; see
+        :class:`~nlsdesign.identification.records.clocks.Resolution`.
     findings
         What makes the file suspect.
     """
 
     trace: Trace
     source: str
-    grain: Mapping[str, Grain]
+    resolution: Mapping[str, Resolution]
     findings: tuple[Finding, ...]
 
 
-def read_run(name: str, table: Table, mapping: ColumnMap) -> Run:
+def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
     """Check a table and put its columns on one uniform clock.
 
     Parameters
@@ -53,7 +53,7 @@ def read_run(name: str, table: Table, mapping: ColumnMap) -> Run:
     table
         As read from the file.
     mapping
-        Says what the columns are, and asks for a new clock or an alignment.
+        Meaning of the columns, and the new clock and alignments, if any.
 
     Raises
     ------
@@ -62,19 +62,21 @@ def read_run(name: str, table: Table, mapping: ColumnMap) -> Run:
         and rows.
     """
     if mapping.resample is None:
-        trace, note, grain = _as_sampled(name, table, mapping)
+        trace, note, resolution = _as_sampled(name, table, mapping)
     else:
-        trace, note, grain = _on_new_clock(name, table, mapping, mapping.resample)
-    found = [
+        trace, note, resolution = _on_new_clock(name, table, mapping, mapping.resample)
+    findings = [
         f
         for c in mapping.columns
-        for f in suspicions(table.file, c.name, table.given[c.name], first_row=table.first_row)
+        for f in channel_findings(table.file, c.name, table.given[c.name], first_row=table.first_row)
     ]
-    return Run(trace, f"{table.file}{note}", grain, tuple(found))
+    return Run(trace, f"{table.file}{note}", resolution, tuple(findings))
 
 
-def _as_sampled(name: str, table: Table, mapping: ColumnMap) -> tuple[Trace, str, dict[str, Grain]]:
-    """Return the columns as they stand; those of one clock whose steps vary are evened linearly."""
+def _as_sampled(
+    name: str, table: RecordTable, mapping: ColumnMap
+) -> tuple[Trace, str, dict[str, Resolution]]:
+    """Return the columns as sampled; where the steps vary they are interpolated linearly."""
     heads = [c.name for c in (mapping.time, *mapping.columns)]
     _check_present(table, heads)
     raw = table.columns(heads)
@@ -82,34 +84,38 @@ def _as_sampled(name: str, table: Table, mapping: ColumnMap) -> tuple[Trace, str
     time = raw[mapping.time.name] * parse_unit(mapping.time.unit).factor
     note = check_time(table.file, mapping.time.name, time, first_row=table.first_row)
     grid = np.linspace(time[0], time[-1], len(time))
-    signals, grain = {}, {}
+    signals, resolution = {}, {}
     for column in mapping.columns:
         values = raw[column.name] * parse_unit(column.unit).factor
         signals[column.signal] = np.interp(grid, time, values) if note else values
         if note:
-            grain[column.signal] = Channel(column.name, time, values).grain(quantum=column.quantum)
-    return Trace(grid, signals, _units(mapping), name), note, grain
+            resolution[column.signal] = Channel(column.name, time, values).resolution(quantum=column.quantum)
+    return Trace(grid, signals, _units(mapping), name), note, resolution
 
 
 def _on_new_clock(
-    name: str, table: Table, mapping: ColumnMap, rate: float
-) -> tuple[Trace, str, dict[str, Grain]]:
+    name: str, table: RecordTable, mapping: ColumnMap, rate: float
+) -> tuple[Trace, str, dict[str, Resolution]]:
     channels = {c.signal: _channel(table, c, mapping.clock_of(c), 1.0 / rate) for c in mapping.columns}
-    told = []
+    changes = []
     for each in mapping.align:
-        channels, words = _aligned(table, mapping, each, channels)
-        told.append(words)
+        channels, change = _aligned(table, mapping, each, channels)
+        changes.append(change)
     heads = {channels[c.signal].name: c for c in mapping.columns}
-    found = on_one_clock(list(channels.values()), rate)
-    signals = {heads[n].signal: v for n, v in found.values.items()}
-    grain = {}
-    if told or found.words:
-        grain = grains(channels, 1.0 / rate, {c.signal: c.quantum for c in mapping.columns})
-    words = "; ".join([*told, *(w.removeprefix(f"{table.file}: column ") for w in found.words)])
-    return Trace(found.time, signals, _units(mapping), name), f" ({words})" if words else "", grain
+    resampling = on_one_clock(list(channels.values()), rate)
+    signals = {heads[n].signal: v for n, v in resampling.values.items()}
+    resolution = {}
+    if changes or resampling.changes:
+        resolution = resolutions(channels, 1.0 / rate, {c.signal: c.quantum for c in mapping.columns})
+    summary = "; ".join([*changes, *(c.removeprefix(f"{table.file}: column ") for c in resampling.changes)])
+    return (
+        Trace(resampling.time, signals, _units(mapping), name),
+        f" ({summary})" if summary else "",
+        resolution,
+    )
 
 
-def _channel(table: Table, column: Column, clock: Column, step: float) -> Channel:
+def _channel(table: RecordTable, column: Column, clock: Column, step: float) -> Channel:
     """Return a column in SI on its own clock, checked with the names and rows of the file."""
     _check_present(table, [column.name, clock.name])
     raw = table.columns([clock.name, column.name])
@@ -121,24 +127,26 @@ def _channel(table: Table, column: Column, clock: Column, step: float) -> Channe
 
 
 def _aligned(
-    table: Table, mapping: ColumnMap, asked: Align, channels: Mapping[str, Channel]
+    table: RecordTable, mapping: ColumnMap, request: Align, channels: Mapping[str, Channel]
 ) -> tuple[dict[str, Channel], str]:
-    """Return the channels with those of one clock moved, and what was done."""
+    """Return the channels with those of one clock moved, and the change."""
     mapped = {c.name: c for c in mapping.columns}
-    plain = Column(asked.column, "", "1", time=asked.time), Column(asked.to, "", "1")
-    # A column that is not mapped has no signal; its clock may be that of mapped ones, which it moves.
-    late, reference = (mapped.get(c.name, c) for c in plain)
+    requested = Column(request.column, "", "1", time=request.time), Column(request.to, "", "1")
+    # A column that is not mapped has no signal, but mapped columns on its clock are moved with it.
+    delayed, reference = (mapped.get(c.name, c) for c in requested)
     pair = [
         channels[c.signal] if c.signal else _channel(table, c, mapping.clock_of(c), 0.0)
-        for c in (late, reference)
+        for c in (delayed, reference)
     ]
-    lag = lag_between(pair[0], pair[1], longest=asked.longest)
+    lag = lag_between(pair[0], pair[1], longest=request.longest)
     moved = (
-        [c for c in mapping.columns if c.time == late.time] if late.time else [c for c in [late] if c.signal]
+        [c for c in mapping.columns if c.time == delayed.time]
+        if delayed.time
+        else [c for c in [delayed] if c.signal]
     )
     if not moved:
         raise MeasurementError(
-            f"align: column '{asked.column}'",
+            f"align: column '{request.column}'",
             "moves nothing: it is neither mapped nor on the clock of a mapped column",
             next_step="add time = '<head of its clock>'",
         )
@@ -146,15 +154,15 @@ def _aligned(
         s: replace(c, time=c.time - lag.seconds) if s in {m.signal for m in moved} else c
         for s, c in channels.items()
     }
-    told = (
+    change = (
         f"{', '.join(c.name for c in moved)} moved {1e3 * lag.seconds:.4g} ms "
         f"± {1e3 * lag.standard_error:.2g} ms earlier, by the correlation {lag.correlation:.3f} of "
-        f"{asked.column} with {asked.to}"
+        f"{request.column} with {request.to}"
     )
-    return result, told
+    return result, change
 
 
-def _check_present(table: Table, heads: list[str]) -> None:
+def _check_present(table: RecordTable, heads: list[str]) -> None:
     for head in heads:
         if head not in table.heads:
             raise MeasurementError(

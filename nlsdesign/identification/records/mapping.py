@@ -11,8 +11,8 @@ from typing import Any
 
 from ...errors import MeasurementError, UnitError, nearest
 from ...model import FlatModel
-from ...model.structure import reading_of
-from ...quantity import parse_unit, same_dimension
+from ...model.readings import reading_of
+from ...quantity import parse_unit, same_dimension, typeset_unit
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 _TIME_NAMES = ("t", "time")
@@ -32,9 +32,9 @@ class Column:
         Unit in the file.
     noise, quantum
         Declared standard deviation of the noise and size of one count, in SI; 0 where nothing is declared.
-        Declared numbers are a claim: the noise is also estimated from the records.
+        The noise is also estimated from the records.
     time
-        Head of the clock of this column, in the unit of ``[time]``; empty where it is that of ``[time]``.
+        Head of the clock of this column, in the unit of ``[time]``; empty for the clock of ``[time]``.
     """
 
     name: str
@@ -52,12 +52,12 @@ class Align:
     Parameters
     ----------
     column, to
-        Heads of two columns that show the same motion; the first may be late. They need not be mapped.
+        Heads of two columns that show the same motion; the first may be delayed. They need not be mapped.
     time
         Head of the clock of ``column`` where that is not mapped. All columns of a clock of its own move
         together; a column on the clock of ``[time]`` moves alone.
     longest
-        Largest lag looked for, in s; a quarter of the record where ``None``.
+        Largest lag in s; a quarter of the record where ``None``.
     """
 
     column: str
@@ -68,7 +68,7 @@ class Align:
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """Columns of a set of records, the time column, and what is kept apart.
+    """Columns of a set of records, the time column, and the records that are held out.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ class ColumnMap:
     held_out_after
         Time in s after which every record is held out; ``None`` where records are held out as a whole.
     resample
-        Rate in Hz of the common clock that all columns are put on; ``None`` where they are left as sampled.
+        Rate in Hz of the common clock; ``None`` to keep the columns as sampled.
     align
-        Lags to be removed before; these need a rate.
+        Lags to be removed before resampling; these need a rate.
     """
 
     time: Column
@@ -140,7 +140,7 @@ def read_mapping(path: Path) -> ColumnMap:
         raise MeasurementError(
             path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."'
         )
-    found = ColumnMap(
+    mapping = ColumnMap(
         Column(str(time.get("column", "t_s")), "time", str(time.get("unit", "s"))),
         columns,
         tuple(tables.get("held_out", ())),
@@ -149,8 +149,8 @@ def read_mapping(path: Path) -> ColumnMap:
         _rate(path.name, tables.get("resample_Hz")),
         tuple(_align(f"{path.name}: align", table) for table in _list_of_tables(path.name, tables)),
     )
-    _check_clock(path.name, found)
-    return found
+    _check_clock(path.name, mapping)
+    return mapping
 
 
 def _check_fields(where: str, given: Mapping[str, Any], known: Sequence[str], between: str = ": ") -> None:
@@ -208,14 +208,14 @@ def _align(where: str, table: Mapping[str, Any]) -> Align:
     return Align(table["column"], table["to"], str(table.get("time", "")), longest)
 
 
-def _check_clock(file: str, found: ColumnMap) -> None:
-    """Check that what needs a common clock asks for one: nothing is resampled unless it is said."""
-    if found.resample is not None:
+def _check_clock(file: str, mapping: ColumnMap) -> None:
+    """Check that a common rate is given where one is needed; nothing is resampled without it."""
+    if mapping.resample is not None:
         return
-    for column in found.columns:
+    for column in mapping.columns:
         if column.time:
             raise _without_rate(f"{file}: columns.{column.name}.time", "is a clock of its own")
-    if found.align:
+    if mapping.align:
         raise _without_rate(f"{file}: align", "moves a clock")
 
 
@@ -243,7 +243,7 @@ def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
 
 
 def default_mapping(heads: Sequence[str], model: FlatModel, file: str) -> ColumnMap:
-    """Return the mapping that the heads of the columns speak for themselves.
+    """Return the mapping that follows from the heads of the columns.
 
     Parameters
     ----------
@@ -308,7 +308,9 @@ def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str)
             break
     raise MeasurementError(
         f"{file}: column '{head}'",
-        f"could be {' or '.join(fitting)}" if fitting else f"no sensor of the model reads in {unit}",
+        f"could be {' or '.join(fitting)}"
+        if fitting
+        else f"no sensor of the model reads in {typeset_unit(unit)}",
         next_step="write a records.toml that maps each column to its signal"
         + ("" if fitting else ", or give the deck of the rig that was measured"),
     )
@@ -334,7 +336,7 @@ def _declared(model: FlatModel, signal: str) -> tuple[float, float]:
 
 
 def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:
-    """Check that every column measures something that the model has, in a unit that fits.
+    """Check that every column measures a signal of the model in a unit of its dimension.
 
     Parameters
     ----------
@@ -362,8 +364,9 @@ def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> Non
             )
         variable = everything[column.signal]
         if not same_dimension(column.unit, variable.unit):
+            given, expected = typeset_unit(column.unit), typeset_unit(variable.unit)
             raise MeasurementError(
                 where,
-                f"is in {column.unit}, but {column.signal} is measured in {variable.unit}",
-                next_step="mend the unit or the mapping",
+                f"is in {given}, but {column.signal} is measured in {expected}",
+                next_step="correct the unit or the mapping",
             )

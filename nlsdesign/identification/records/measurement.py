@@ -1,4 +1,4 @@
-"""Measured records: files of tables, read through a mapping of their columns to signals with units."""
+"""Measured records, read from tables through a mapping of columns to signals with units."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from ...errors import MeasurementError, nearest, unknown_name
 from ...model import FlatModel
 from ...simulation import Trace
 from ..statistics.residuals import noise_of, quantum_of
-from .clocks import Grain
+from .clocks import Resolution
 from .ingest import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
 from .mapping import check_signals, default_mapping, read_mapping, times_among
 from .quality import Finding
-from .table_files import Table, read_table, table_files
+from .table_files import RecordTable, read_table, table_files
 
 Array = NDArray[np.float64]
 Role = Literal["fit", "selection", "held_out"]
@@ -38,26 +38,26 @@ class Record:
     trace
         Signals in SI by full name.
     role
-        ``fit``: parameters are fitted to it; ``selection``: hypotheses are compared on it; ``held_out``: only
-        judged on, at the end.
+        ``fit``: parameters are fitted to it; ``selection``: hypotheses are compared on it; ``held_out``: used
+        only for the final assessment.
     source
-        File, and what was done to the samples on the way in.
-    grain
-        Noise and count of signals that were interpolated or filtered, which no longer show it.
+        File, and the changes made to its samples.
+    resolution
+        Noise and count of signals that were interpolated or filtered; their samples no longer show it.
     """
 
     name: str
     trace: Trace
     role: Role = "fit"
     source: str = ""
-    grain: Mapping[str, Grain] = field(default_factory=dict)
+    resolution: Mapping[str, Resolution] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
         """Time between samples in s."""
         return float((self.trace.time[-1] - self.trace.time[0]) / (len(self.trace) - 1))
 
-    def grain_of(self, signal: str) -> Grain:
+    def resolution_of(self, signal: str) -> Resolution:
         """Return noise and size of a count of a signal, in SI.
 
         Parameters
@@ -67,12 +67,12 @@ class Record:
 
         Returns
         -------
-        Grain
-            Kept from before where the signal was resampled; estimated from its samples otherwise.
+        Resolution
+            From before the resampling where the signal was resampled; else estimated from its samples.
         """
-        if signal in self.grain:
-            return self.grain[signal]
-        return Grain(noise_of(self.trace[signal]), quantum_of(self.trace[signal]))
+        if signal in self.resolution:
+            return self.resolution[signal]
+        return Resolution(noise_of(self.trace[signal]), quantum_of(self.trace[signal]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +84,9 @@ class RecordSet:
     records
         In order of name.
     columns
-        What was measured.
+        Measured columns.
     findings
-        What makes the data suspect.
+        Reasons to suspect the data.
     """
 
     records: tuple[Record, ...]
@@ -115,6 +115,11 @@ class RecordSet:
         ----------
         signal
             Full name.
+
+        Raises
+        ------
+        UnknownNameError
+            If the signal is not measured.
         """
         for each in self.columns:
             if each.signal == signal:
@@ -172,9 +177,9 @@ def load_records(
     records: list[Record] = []
     findings: list[Finding] = []
     for file, table in runs.items():
-        record, found = _record(file, table, chosen)
+        record, new_findings = _record(file, table, chosen)
         records.append(record)
-        findings += found
+        findings += new_findings
     held = tuple(hold_out) or chosen.held_out
     if chosen.held_out_after is not None and not hold_out:
         parts = [part for r in records for part in cut_in_time(r, chosen.held_out_after)]
@@ -183,7 +188,7 @@ def load_records(
 
 
 def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) -> RecordSet:
-    """Read one table as a record of its own, whole, whatever else stands in its folder.
+    """Read one table as a whole record, independent of other files in its folder.
 
     Parameters
     ----------
@@ -265,7 +270,7 @@ def split(
 
 
 def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
-    """Return what came before a time, for fitting, and what came after it, held out.
+    """Return the part before a time, for fitting, and the part after it, held out.
 
     Parameters
     ----------
@@ -293,14 +298,14 @@ def cut_in_time(record: Record, at: float) -> tuple[Record, Record]:
 
 
 def from_sample(record: Record, first: int) -> Record:
-    """Return a record without what came before a sample.
+    """Return a record from one sample on.
 
     Parameters
     ----------
     record
         To be shortened.
     first
-        Index of the sample that is to be the first.
+        Index of the new first sample.
     """
     return _part(record, slice(first, None), record.role, f"from {record.trace.time[first]:g} s")
 
@@ -313,12 +318,12 @@ def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
     )
 
 
-def _part(record: Record, rows: slice, role: Role, words: str) -> Record:
-    trace, name = record.trace, f"{record.name} ({words})"
+def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
+    trace, name = record.trace, f"{record.name} ({label})"
     signals = {n: v[rows] for n, v in trace.signals.items()}
     return replace(record, name=name, role=role, trace=Trace(trace.time[rows], signals, trace.units, name))
 
 
-def _record(file: Path, table: Table, mapping: ColumnMap) -> tuple[Record, tuple[Finding, ...]]:
+def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> tuple[Record, tuple[Finding, ...]]:
     run = read_run(file.stem, table, mapping)
-    return Record(file.stem, run.trace, source=run.source, grain=run.grain), run.findings
+    return Record(file.stem, run.trace, source=run.source, resolution=run.resolution), run.findings

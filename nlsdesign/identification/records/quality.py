@@ -16,23 +16,25 @@ Array = NDArray[np.float64]
 _GAP = 1.5
 """A step this much longer than the usual one is a gap."""
 _BRIDGED = 20.0
-"""A gap of so many steps is not to be bridged by a slower clock."""
+"""Longest gap, in usual steps, for which a slower clock is proposed."""
 _JITTER = 0.02
 """Steps that differ by more than this share are interpolated to a uniform grid."""
 _CLIPPED_RUN = 5
+"""Smallest number of equal extreme samples that may be clipping."""
 _APPROACH, _MISSING_COUNTS = 3, 3.0
+"""Samples before and after a run from which its slope is taken, and the missing peak height in counts."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that makes data suspect without making them unreadable.
+    """A reason to suspect data that can be read.
 
     Parameters
     ----------
     place
         File, column and rows.
     text
-        What is odd about it.
+        The reason.
     """
 
     place: str
@@ -81,12 +83,12 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged
     first_row
         As above.
     bridged
-        Steps in s up to which a gap is none, because the channel is to be put on so slow a clock.
+        Step in s of a slower clock to which the channel will be resampled; shorter gaps are accepted.
 
     Returns
     -------
     str
-        Empty if the grid is uniform; otherwise what was done about it.
+        Empty if the grid is uniform; otherwise the change that makes it uniform.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged
 
 
 def _slower(steps: Array, usual: float) -> str:
-    """Return the clock on which the gaps are none; where they are long it would hold nothing."""
+    """Return the proposal of a clock slow enough for the gaps; none where these are too long."""
     longest = float(np.max(steps))
     if longest > _BRIDGED * usual:
         return ""
@@ -128,8 +130,8 @@ def _slower(steps: Array, usual: float) -> str:
     return f", or put it on a slower clock: resample_Hz = {rate:g} in records.toml"
 
 
-def suspicions(file: str, head: str, values: Array, *, first_row: int = 2) -> list[Finding]:
-    """Return what looks like a dead or saturated channel.
+def channel_findings(file: str, head: str, values: Array, *, first_row: int = 2) -> list[Finding]:
+    """Return findings on a constant, clipped or saturated channel.
 
     Parameters
     ----------
@@ -145,28 +147,28 @@ def suspicions(file: str, head: str, values: Array, *, first_row: int = 2) -> li
         return [
             Finding(f"{place}, {_rows(np.arange(len(values)), first_row)}", f"is constant at {values[0]:g}")
         ]
-    # A channel without noise may well rest on its largest value; one with noise cannot.
+    # Without noise a channel may rest on its largest value; with noise this is clipping.
     if noise_of(values) < 2.0 * quantum_of(values):
         return []
-    for extreme, word in ((values.max(), "largest"), (values.min(), "smallest")):
+    for extreme, which in ((values.max(), "largest"), (values.min(), "smallest")):
         run = _longest_run(values == extreme)
         if len(run) >= _CLIPPED_RUN and _cut_off(values, run):
             return [
                 Finding(
                     f"{place}, {_rows(run, first_row)}",
-                    f"rests on its {word} value {extreme:g}: clipped or saturated",
+                    f"rests on its {which} value {extreme:g}: clipped or saturated",
                 )
             ]
     return []
 
 
 def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:
-    """Tell whether a signal came too fast to have turned by itself where it rests on an extreme."""
+    """Tell whether a signal approaches its extreme so fast that its peak must lie beyond it."""
     first, last = int(run[0]), int(run[-1])
     sides = values[max(first - _APPROACH, 0) : first + 1], values[last : last + _APPROACH + 1]
     slopes = [abs(part[-1] - part[0]) / (len(part) - 1) for part in sides if len(part) > 1]
     half = 0.5 * len(run)
-    # The peak of the parabola that has this slope half of the approach before the run.
+    # Peak of the parabola that has this slope half of the approach before the run.
     missing = 0.5 * half**2 * max(slopes, default=0.0) / (half + 0.5 * _APPROACH)
     return missing > _MISSING_COUNTS * max(quantum_of(values), noise_of(values))
 

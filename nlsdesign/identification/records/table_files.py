@@ -18,13 +18,13 @@ from ...errors import MeasurementError, missing_library
 Array = NDArray[np.float64]
 
 LEAST_ROWS = 50
-"""A record with fewer rows says nothing."""
+"""Smallest number of rows of a record."""
 _FIRST_ROW = 2
 _ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5")
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class RecordTable:
     """Columns of one file.
 
     Parameters
@@ -34,7 +34,7 @@ class Table:
     given
         Columns by head, shape (n,); in binary files they may differ in length.
     first_row
-        How the first row is counted where a person looks for it: 2 in a CSV file, whose heads are row 1.
+        Number of the first row in messages: 2 in a CSV file, whose heads are row 1.
     """
 
     file: str
@@ -57,21 +57,21 @@ class Table:
         Raises
         ------
         MeasurementError
-            If they differ in length, or are too short to say anything.
+            If they differ in length, or are too short.
         """
-        found = {head: self.given[head] for head in heads}
-        lengths = {head: len(values) for head, values in found.items()}
+        columns = {head: self.given[head] for head in heads}
+        lengths = {head: len(values) for head, values in columns.items()}
         if len(set(lengths.values())) > 1:
-            told = ", ".join(f"'{head}' {length}" for head, length in lengths.items())
+            shown = ", ".join(f"'{head}' {length}" for head, length in lengths.items())
             raise MeasurementError(
                 self.file,
-                f"its columns differ in length: {told}",
+                f"its columns differ in length: {shown}",
                 next_step="ask for one clock in records.toml: resample_Hz = <rate>, and in the table of each "
                 "column of another clock time = '<head of that clock>'",
             )
         if min(lengths.values()) < LEAST_ROWS:
             raise _too_short(self.file, min(lengths.values()))
-        return found
+        return columns
 
 
 def table_files(folder: Path) -> list[Path]:
@@ -85,7 +85,7 @@ def table_files(folder: Path) -> list[Path]:
     Raises
     ------
     MeasurementError
-        If there is none, or two files differ in nothing but the ending.
+        If there is none, or two files differ only in the ending.
     """
     files = sorted(f for f in folder.glob("*") if f.suffix.lower() in _ENDINGS) if folder.is_dir() else []
     if not files:
@@ -104,7 +104,7 @@ def table_files(folder: Path) -> list[Path]:
     return files
 
 
-def read_table(file: Path) -> Table:
+def read_table(file: Path) -> RecordTable:
     """Read the columns of one file.
 
     A CSV file has commas and one row of heads. In a MAT file every numeric vector is a column, fields of a
@@ -136,7 +136,7 @@ def _library(name: str, file: Path) -> Any:
         raise missing_library(f"reading {file.name}", name, "records") from None
 
 
-def _csv(file: Path) -> Table:
+def _csv(file: Path) -> RecordTable:
     with file.open(newline="", encoding="utf8") as stream:
         rows = [row for row in csv.reader(stream) if row]
     if len(rows) < 1 + LEAST_ROWS:
@@ -145,24 +145,24 @@ def _csv(file: Path) -> Table:
     try:
         numbers = np.array(rows[1:], dtype=float)
     except ValueError:
-        return Table(file.name, _ending_early(file.name, heads, rows[1:]), _FIRST_ROW)
-    return Table(file.name, {h: numbers[:, i] for i, h in enumerate(heads)}, _FIRST_ROW)
+        return RecordTable(file.name, _ending_early(file.name, heads, rows[1:]), _FIRST_ROW)
+    return RecordTable(file.name, {h: numbers[:, i] for i, h in enumerate(heads)}, _FIRST_ROW)
 
 
 def _ending_early(file: str, heads: list[str], rows: list[list[str]]) -> dict[str, Array]:
-    """Return columns of which some end before others, as two clocks side by side leave them."""
+    """Return columns of different length, as two clocks side by side give them."""
     if any(len(row) != len(heads) for row in rows):
         raise _bad_cell(file, heads, rows)
-    found = {}
+    columns = {}
     for place, head in enumerate(heads):
         cells = [row[place].strip() for row in rows]
         while cells and not cells[-1]:
             cells.pop()
         try:
-            found[head] = np.array(cells, dtype=float)
+            columns[head] = np.array(cells, dtype=float)
         except ValueError:
             raise _bad_cell(file, heads, rows) from None
-    return found
+    return columns
 
 
 def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> MeasurementError:
@@ -181,29 +181,29 @@ def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> Measurement
     return MeasurementError(file, "cannot be read as a table of numbers")
 
 
-def _parquet(file: Path) -> Table:
+def _parquet(file: Path) -> RecordTable:
     pyarrow = _library("pyarrow", file)
     parquet = _library("pyarrow.parquet", file)
     try:
         table = parquet.read_table(file)
     except pyarrow.ArrowInvalid as error:
         raise MeasurementError(file.name, f"cannot be read: {error}") from None
-    return Table(file.name, _numeric({n: table.column(n).to_numpy() for n in table.column_names}))
+    return RecordTable(file.name, _numeric({n: table.column(n).to_numpy() for n in table.column_names}))
 
 
-def _mat(file: Path) -> Table:
+def _mat(file: Path) -> RecordTable:
     if _is_hdf5(file):
         return _hdf5(file)
-    found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     try:
-        _gather(_library("scipy.io", file).loadmat(file, squeeze_me=True), "", found)
-    # SciPy says the second of versions of the format that it does not read.
+        _gather(_library("scipy.io", file).loadmat(file, squeeze_me=True), "", arrays)
+    # SciPy raises the second for versions of the format that it cannot read.
     except (ValueError, NotImplementedError) as error:
         raise MeasurementError(file.name, f"cannot be read: {error}") from None
-    return Table(file.name, _numeric(found))
+    return RecordTable(file.name, _numeric(arrays))
 
 
-def _gather(values: Any, prefix: str, found: dict[str, Any]) -> None:
+def _gather(values: Any, prefix: str, arrays: dict[str, Any]) -> None:
     names = values.dtype.names if isinstance(values, np.ndarray) else None
     for name in names or values:
         if name.startswith("__"):
@@ -215,9 +215,9 @@ def _gather(values: Any, prefix: str, found: dict[str, Any]) -> None:
             else value
         )
         if isinstance(inner, np.ndarray) and inner.dtype.names:
-            _gather(inner, f"{prefix}{name}.", found)
+            _gather(inner, f"{prefix}{name}.", arrays)
         else:
-            found[prefix + name] = inner
+            arrays[prefix + name] = inner
 
 
 def _is_hdf5(file: Path) -> bool:
@@ -226,22 +226,22 @@ def _is_hdf5(file: Path) -> bool:
         return b"\x89HDF\r\n\x1a\n" in stream.read(1024)
 
 
-def _hdf5(file: Path) -> Table:
+def _hdf5(file: Path) -> RecordTable:
     h5py = _library("h5py", file)
-    found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
 
     def visit(name: str, node: Any) -> None:
         if isinstance(node, h5py.Dataset) and not name.startswith("#"):
-            found[name] = node[()]
+            arrays[name] = node[()]
 
     with h5py.File(file, "r") as stream:
         stream.visititems(visit)
-    return Table(file.name, _numeric(found))
+    return RecordTable(file.name, _numeric(arrays))
 
 
-def _numeric(found: Mapping[str, Any]) -> dict[str, Array]:
+def _numeric(arrays: Mapping[str, Any]) -> dict[str, Array]:
     """Return the vectors of numbers among arrays."""
-    vectors = {name: np.squeeze(np.asarray(values)) for name, values in found.items()}
+    vectors = {name: np.squeeze(np.asarray(values)) for name, values in arrays.items()}
     return {
         name: values.astype(float)
         for name, values in vectors.items()

@@ -1,0 +1,73 @@
+"""Parallel map: same results, same order, no process left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.parallel import parallel_map
+
+ENDLESS = """
+import time
+from nlsdesign.parallel import parallel_map
+
+def work(number):
+    print("at work", flush=True)
+    time.sleep(60)
+
+list(parallel_map(work, 4))
+"""
+
+
+def test_results_come_in_order_and_see_what_the_work_refers_to() -> None:
+    offset = 7
+    assert list(parallel_map(lambda k: offset + k * k, 20)) == [7 + k * k for k in range(20)]
+    assert list(parallel_map(lambda k: k, 0)) == []
+
+
+def test_what_a_piece_raises_is_raised_here() -> None:
+    def work(number: int) -> float:
+        return 1.0 / number
+
+    with pytest.raises(ZeroDivisionError):
+        list(parallel_map(work, 3))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes as Linux lists them")
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_helpers_end_with_the_process_that_waits(ending: signal.Signals) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    helpers = [int(f.name) for f in Path("/proc").iterdir() if f.name.isdigit() and _parent(f) == process.pid]
+    assert helpers
+    process.send_signal(ending)
+    process.wait(timeout=30)
+    waited = 0
+    while any(os.path.exists(f"/proc/{pid}/fd") and _running(pid) for pid in helpers) and waited < 100:
+        time.sleep(0.1)
+        waited += 1
+    assert not [pid for pid in helpers if _running(pid)]
+
+
+def _parent(process: Path) -> int:
+    try:
+        return int((process / "stat").read_text(encoding="utf8").rpartition(")")[2].split()[1])
+    except OSError:
+        return 0  # it has ended in between
+
+
+def _running(pid: int) -> bool:
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf8") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
