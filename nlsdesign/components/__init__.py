@@ -1,6 +1,11 @@
 """Parts that can be declared; they never learn what they are used for."""
 
+from __future__ import annotations
+
+from typing import NoReturn
+
 from .assembly.named_parts import Assembly, assembly
+from .assembly.renamed import renamed
 from .assembly.smooth_form import Sharp, smoothed
 from .core.dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
 from .core.element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, parallel
@@ -163,3 +168,9 @@ __all__ = [
     "through",
     "tie",
 ]
+
+
+def __getattr__(name: str) -> NoReturn:
+    """Say the new name of a component that had another one."""
+    error = renamed(name)
+    raise error or AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -21,6 +21,7 @@ from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
+from .renamed import renamed
 
 
 @functools.cache
@@ -185,6 +186,10 @@ class Builder:
                 did_you_mean="component" if misspelt else None,
                 next_step='write component = "..."',
             )
+            return None
+        old = renamed(str(name))
+        if old:
+            self.problems.append(old.at(self.deck.place(f"{path}.component")))
             return None
         if not isinstance(name, str) or name not in self.classes:
             self._problem(
