@@ -20,7 +20,6 @@ from nlsdesign.components import (
     Inertia,
     MisshapenCam,
     Spring,
-    TorsionSpring,
     through,
     tie,
 )
@@ -84,8 +83,8 @@ def test_a_late_motor_that_saturates_is_both_in_any_order(order: tuple[str, str]
 
 
 def test_a_motor_takes_only_parts_of_a_drive() -> None:
-    with pytest.raises(ArrangementError, match=r"'spring' of a motor.*is a TorsionSpring"):
-        driven(spring=TorsionSpring(stiffness=1.0))  # type: ignore[arg-type]
+    with pytest.raises(ArrangementError, match=r"'spring' of a motor.*is a Spring"):
+        driven(spring=Spring(stiffness=1.0))  # type: ignore[arg-type]
     with pytest.raises(ArrangementError, match=r"name 'inertia'.*is taken"):
         driven(inertia=DriveDelay(delay=1e-3))
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
     Dashpot,
     Drift,
-    DrivenPoint,
+    Driven,
     Encoder,
     ForceSensor,
     Mass,
@@ -89,7 +90,9 @@ def test_an_angle_beyond_the_cam_is_seen_through_the_chain(rig: Assembly, sensor
 
 
 def pulled(**sensors: Sensor) -> Assembly:
-    return assembly("pulled", grip=DrivenPoint(), strip=tie(Spring(stiffness=1000.0), "grip"), **sensors)
+    return assembly(
+        "pulled", grip=Driven(domain=TRANSLATION), strip=tie(Spring(stiffness=1000.0), "grip"), **sensors
+    )
 
 
 def pulled_records(position: str, force: str, lag: float) -> RecordSet:

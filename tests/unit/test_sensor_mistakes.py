@@ -12,6 +12,7 @@ import pytest
 import nlsdesign.components as room
 from nlsdesign.cli import main
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
     CurrentSensor,
     Encoder,
@@ -19,9 +20,9 @@ from nlsdesign.components import (
     GearedMotor,
     SampleAndHold,
     Sensor,
+    Spring,
     Tachometer,
     TorqueSensor,
-    TorsionSpring,
     TransportDelay,
     tie,
 )
@@ -36,7 +37,9 @@ from nlsdesign.simulation import Trace, measure
 
 def bench(**sensors: Sensor) -> Assembly:
     motor = GearedMotor(inertia=1e-3, gear_ratio=4.0, torque_constant=0.05)
-    return assembly("bench", motor=motor, spring=tie(TorsionSpring(stiffness=2.0), "motor"), **sensors)
+    return assembly(
+        "bench", motor=motor, spring=tie(Spring(stiffness=2.0, domain=ROTATION), "motor"), **sensors
+    )
 
 
 WRONG = {

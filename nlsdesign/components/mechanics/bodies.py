@@ -13,7 +13,8 @@ from ...errors import ArrangementError
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
-from ..core.part import RESERVED, Part, check_names, parameter
+from ..core.parameters import one_of, parameter
+from ..core.part import RESERVED, Part, check_names
 from .drive_chain import DrivePart
 
 
@@ -84,12 +85,9 @@ class Free(Body):
 class Inertia(Free):
     """A turning body, J·ω̇ = ΣT + load torque."""
 
-    inertia: Quantity = parameter("kg*m^2", "moment of inertia", minimum=1e-12, maximum=1e6)
+    domain: ClassVar[Domain] = ROTATION
 
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
+    inertia: Quantity = parameter("kg*m^2", "moment of inertia", minimum=1e-12, maximum=1e6)
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the torque from outside, an input."""
@@ -104,14 +102,11 @@ class Inertia(Free):
 class Mass(Free):
     """A sliding body, m·v̇ = ΣF + outer force."""
 
+    domain: ClassVar[Domain] = TRANSLATION
+
     inertia_name: ClassVar[str] = "mass"
 
     mass: Quantity = parameter("kg", "mass", minimum=1e-9, maximum=1e9)
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the force from outside, an input."""
@@ -149,6 +144,8 @@ class GearedMotor(Free):
     ['delay', 'saturation']
     """
 
+    domain: ClassVar[Domain] = ROTATION
+
     inertia: Quantity = parameter(
         "kg*m^2", "moment of inertia at the gear's output", minimum=1e-12, maximum=1e6
     )
@@ -167,11 +164,6 @@ class GearedMotor(Free):
                     f"is a {type(part).__name__}, which does not lie between current and torque",
                     next_step="put a DriveDelay or a DriveSaturation there",
                 )
-
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
 
     def children(self) -> Mapping[str, Part]:
         """Return the parts of the drive by name."""
@@ -199,12 +191,9 @@ class GearedMotor(Free):
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed(Body):
-    """A body that does not turn: the bench."""
+    """A body that does not turn: the bench. With ``domain=TRANSLATION`` the clamp of a tensile machine."""
 
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
+    domain: Domain = one_of(ROTATION, TRANSLATION)
 
     def motion(self, scope: Scope) -> Motion:
         """Return zero."""
@@ -216,23 +205,13 @@ class Fixed(Body):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FixedPoint(Fixed):
-    """A point that does not move: the clamp of a tensile machine."""
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION
-
-
-@dataclass(frozen=True, kw_only=True)
 class Driven(Body):
-    """A body whose angle is prescribed from outside: angle and speed are inputs."""
+    """A body whose motion is prescribed from outside: angle, or position, and speed are inputs.
 
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
+    With ``domain=TRANSLATION`` the grip of a tensile machine.
+    """
+
+    domain: Domain = one_of(ROTATION, TRANSLATION)
 
     def motion(self, scope: Scope) -> Motion:
         """Declare motion and speed as inputs."""
@@ -245,13 +224,3 @@ class Driven(Body):
     def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
         """Name the effort that the prescribed motion takes."""
         scope.signal("reaction", -effort, self.domain.effort_unit, f"what moves {scope.path}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class DrivenPoint(Driven):
-    """A point whose position is prescribed from outside: the grip of a tensile machine."""
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ...components import Assembly, DriveDelay, DrivePart, DriveSaturation, GearedMotor
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown
+from .effect import ranked
 
 
 def _motors_without(assembly: Assembly, kind: type[DrivePart]) -> list[str]:
@@ -15,6 +16,7 @@ def _motors_without(assembly: Assembly, kind: type[DrivePart]) -> list[str]:
     return [n for n, motor in motors.items() if not any(isinstance(p, kind) for _, p in motor.chain)]
 
 
+@ranked(160)
 def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
     """A motor whose torque follows the measured current late.
 
@@ -38,6 +40,7 @@ def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(170)
 def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
     """A motor whose iron saturates.
 

@@ -19,6 +19,7 @@ from ...components import (
 )
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, free_name
+from .effect import ranked
 
 
 def _inserted(assembly: Assembly, sensor: str, name: str, fault: Sensor) -> Assembly:
@@ -40,6 +41,7 @@ def _sensors_without(assembly: Assembly, kind: type[Sensor], fault: type[Sensor]
     return {name: each for name, each in sensors.items() if isinstance(each, kind) and name not in faulty}
 
 
+@ranked(130)
 def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell whose reading comes late.
 
@@ -66,6 +68,7 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
     return candidates
 
 
+@ranked(140)
 def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell whose zero is off.
 
@@ -88,6 +91,7 @@ def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(150)
 def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell that reads too much or too little in proportion.
 
@@ -110,6 +114,7 @@ def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(70)
 def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     """An ammeter whose zero is off, or a constant torque on the body that the current drives.
 
@@ -132,6 +137,7 @@ def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(200)
 def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
     """An encoder whose disc sits off its shaft, on the shaft that is read or on the motor in front of a gear.
 
@@ -172,6 +178,7 @@ def _disc_orders(assembly: Assembly, measured: str) -> list[Quantity]:
     return orders
 
 
+@ranked(250)
 def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell whose zero wanders from the start of each record.
 
