@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import nlsdesign.components as room
 from nlsdesign.cli import main
 from nlsdesign.components import (
     ROTATION,
@@ -25,10 +26,11 @@ from nlsdesign.components import (
     TransportDelay,
     tie,
 )
+from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import read_deck
-from nlsdesign.errors import ArrangementError, NlsError, UnitError, ValueRangeError
+from nlsdesign.errors import ArrangementError, NlsError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, measure
 
@@ -86,6 +88,24 @@ def test_sensors_that_read_one_another_in_a_circle_are_named() -> None:
         bench(**circle)
     with pytest.raises(ArrangementError, match=r"'dial' reads 'dial.reading': .*circle: dial ◁ dial"):
         bench(dial=Encoder(of="dial.reading", quantum=1e-3))
+
+
+@pytest.mark.parametrize(
+    "old",
+    [
+        "DelayedForceSensor", "DelayedMotor", "DriftingForceSensor", "EccentricEncoder", "SampledEncoder",
+        "SaturatingMotor",
+    ],
+)  # fmt: skip
+def test_a_combination_of_part_and_fault_is_written_as_a_chain_now(old: str) -> None:
+    text = deck_text(bench(dial=Encoder(of="motor.angle", quantum=1e-3)))
+    text = text.replace('component = "Encoder"', f'component = "{old}"')
+    problem, *_ = deck_problems(read_deck(text, Path("bench.toml")))
+    parts = re.findall(r"\b[A-Z]\w+", str(problem).partition("-> write ")[2])
+    assert parts
+    assert set(parts) & set(component_classes()), str(problem)
+    with pytest.raises(UnknownNameError, match=f"'{old}': has another name now -> write "):
+        getattr(room, old)
 
 
 DANGLING = {

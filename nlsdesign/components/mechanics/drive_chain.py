@@ -11,7 +11,8 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.delay import delayed
 from ..core.element import Scope
-from ..core.part import Part, parameter
+from ..core.parameters import parameter
+from ..core.part import Part
 
 
 @dataclass(frozen=True, kw_only=True)
