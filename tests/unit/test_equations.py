@@ -24,7 +24,7 @@ from nlsdesign.components import (
     Pulley,
     Rounded,
     Sharp,
-    Smooth,
+    Regularised,
     Spring,
     StrainStiffening,
     TwoSidedCam,
@@ -60,7 +60,7 @@ def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
         bearing=tie(
             parallel(
                 oil=Dashpot(damping=1e-3, domain=ROTATION),
-                rub=CoulombFriction(sliding_effort=0.02, contact=Smooth(creep_speed=0.02)),
+                rub=CoulombFriction(sliding_effort=0.02, contact=Regularised(creep_speed=0.02)),
             ),
             "motor",
         ),

@@ -11,8 +11,8 @@ import casadi as ca
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
-from ..core.parameters import one_of, parameter
 from ..core.part import Part
+from ..core.part_numbers import one_of, parameter
 
 
 class Motion(NamedTuple):
