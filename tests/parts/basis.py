@@ -24,10 +24,10 @@ from nlsdesign.components import (
     Pulley,
     PullOnly,
     QuadraticDrag,
+    Regularised,
     Rounded,
     Slack,
     SlidingFillers,
-    Smooth,
     Specimen,
     Spring,
     StrainStiffening,
@@ -55,7 +55,7 @@ FORCE = "spring.rubber.force"
 _PARTS: tuple[Part, ...] = (
     Backlash(members=(("cam", HOUSING),), gap=0.01, contact=Rounded(width=5e-4)),
     Backlash(members=(("cam", HOUSING),), gap=0.01, contact=Inertial(inertia=9e-4, contact_time=1e-2)),
-    CoulombFriction(sliding_effort=0.02, contact=Smooth(creep_speed=0.02)),
+    CoulombFriction(sliding_effort=0.02, contact=Regularised(creep_speed=0.02)),
     CurrentSensor(of="motor.current", bias=0.05),
     Dashpot(damping=12.0),
     Driven(),
@@ -68,7 +68,7 @@ _PARTS: tuple[Part, ...] = (
     Inertia(inertia=6e-4),
     InextensibleCable(members=(("rubber", SPRING),)),
     RUBBER,
-    LoadFriction(members=(("gear", HOUSING),), ratio=0.05, contact=Smooth(creep_speed=0.02)),
+    LoadFriction(members=(("gear", HOUSING),), ratio=0.05, contact=Regularised(creep_speed=0.02)),
     Mass(mass=0.4),
     Pulley(radius=0.01),
     PullOnly(members=(("rubber", SPRING),)),
@@ -81,7 +81,7 @@ _PARTS: tuple[Part, ...] = (
     StrainStiffening(modulus=MODULI, knots=KNOTS),
     StretchyCable(stiffness=9e5, members=(("rubber", SPRING),)),
     StribeckFriction(
-        sliding_effort=0.02, contact=Smooth(creep_speed=0.02), breakaway=0.01, stribeck_speed=0.5
+        sliding_effort=0.02, contact=Regularised(creep_speed=0.02), breakaway=0.01, stribeck_speed=0.5
     ),
     Through(cam=Pulley(radius=0.01), behind=("rubber", SPRING)),
     TorqueRipple(sine=0.01, cosine=0.005, order=28.0),

@@ -42,8 +42,8 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.components.core.parameters import readings
 from nlsdesign.components.core.part import walk
+from nlsdesign.components.core.part_numbers import readings
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ExportError
 from nlsdesign.export.compilation.cross_compiler import compiler, run_compiler

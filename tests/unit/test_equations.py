@@ -22,9 +22,9 @@ from nlsdesign.components import (
     GearedMotor,
     LinearElastic,
     Pulley,
+    Regularised,
     Rounded,
     Sharp,
-    Smooth,
     Spring,
     StrainStiffening,
     TransportDelay,
@@ -61,7 +61,7 @@ def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
         bearing=tie(
             parallel(
                 oil=Dashpot(damping=1e-3, domain=ROTATION),
-                rub=CoulombFriction(sliding_effort=0.02, contact=Smooth(creep_speed=0.02)),
+                rub=CoulombFriction(sliding_effort=0.02, contact=Regularised(creep_speed=0.02)),
             ),
             "motor",
         ),

@@ -16,8 +16,8 @@ from ...errors import DeckError, NlsError, nearest, unknown_name
 from ...quantity import Quantity
 from ..core.domain import Domain
 from ..core.element import Combination, Element
-from ..core.parameters import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.part import Part
+from ..core.part_numbers import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
@@ -107,7 +107,7 @@ class Builder:
         intended: set[str | None] = set()
         for key, raw in table.items():
             full = f"{path}.{key}"
-            if key in names:
+            if key in names and not (isinstance(raw, dict) and "component" in raw):
                 try:
                     given[key] = self.deck.number(full, raw)
                 except NlsError as error:

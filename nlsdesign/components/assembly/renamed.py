@@ -6,9 +6,6 @@ from ...errors import UnknownNameError
 
 COMPONENTS: dict[str, str] = {
     "CableGuide": "CapstanFriction with guide=WrapProduct(wrap=...); in a deck with wrap",
-    "DelayedForceSensor": "TransportDelay in front of a ForceSensor, which reads its reading",
-    "DelayedMotor": "GearedMotor with a DriveDelay in its chain; in a deck a table [motor.delay]",
-    "DriftingForceSensor": "Drift in front of a ForceSensor, which reads its reading",
     "DryFriction": "CoulombFriction, which sticks unless it has a creep_speed",
     "DryLoadFriction": "LoadFriction, which sticks unless it has a creep_speed",
     "DryStribeckFriction": "StribeckFriction, which sticks unless it has a creep_speed",
@@ -29,8 +26,8 @@ COMPONENTS: dict[str, str] = {
     "SmoothStrainStiffening": "StrainStiffening with contact=Rounded(width=...); in a deck with width",
     "Softening": "StressSoftening with curve=OgdenRoxburgh(...); in a deck with strength and scale",
     "TensionSet": "PermanentSet with memory=Following(...); in a deck with following",
-    "TorsionDashpot": "Dashpot, with its damping in N*m*s/rad",
-    "TorsionSpring": "Spring, with its stiffness in N*m/rad",
+    "TorsionDashpot": "Dashpot, with its damping in N·m·s/rad",
+    "TorsionSpring": "Spring, with its stiffness in N·m/rad",
     "ViscousHeating": "SelfHeating with heat=ViscousHeat(...); in a deck with halving_speed",
     "WorkHeating": "SelfHeating with heat=WorkHeat(...); in a deck with halving_work",
 }

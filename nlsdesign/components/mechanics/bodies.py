@@ -13,8 +13,8 @@ from ...errors import ArrangementError
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
-from ..core.parameters import one_of, parameter
 from ..core.part import RESERVED, Part, check_names
+from ..core.part_numbers import one_of, parameter
 from .drive_chain import DrivePart
 
 

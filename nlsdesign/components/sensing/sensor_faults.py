@@ -13,7 +13,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.delay import delayed
 from ..core.element import Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 from .sensors import Array, Numbers, Sensor
 
 
