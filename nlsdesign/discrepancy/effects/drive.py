@@ -54,7 +54,7 @@ def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
             ),
             (Unknown(f"{name}.saturation_current", (1.5,), 0.2, 50.0, f"{name}.current"),),
             "torque that falls short the more, the larger the current, with either sign",
-            "Hanselman 2003 (saturation; Froelich's curve of magnetisation)",
+            "Hanselman 2003 (saturation, Froelich's curve of magnetisation)",
         )
         for name, motor in _ideal_motors(assembly)
     ]
