@@ -47,7 +47,7 @@ class DelayedMotor(ImperfectMotor):
 
     The delay is its (2,2) Padé approximation, e^(−sτ) ≈ (1 − sτ/2 + s²τ²/12)/(1 + sτ/2 + s²τ²/12), with phase
     error below (ωτ)⁵/720. The states are a, which rests at the current, and b = τ·ȧ; the acting current is
-    I − b. Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
+    I − b. Source: Golub and Van Loan 2013 (Padé table of the exponential).
     """
 
     delay: Quantity = parameter("s", "time from current to torque", minimum=1e-6, maximum=10.0)
@@ -67,8 +67,8 @@ class SaturatingMotor(ImperfectMotor):
     """Geared motor whose iron saturates: T = n·k_T·I/√(1 + (I/I_s)²).
 
     At I = I_s the torque is 71 % of the ideal one; k_T is that of small currents. C∞. Valid for slow changes,
-    without hysteresis of the iron. Source: Froelich's curve of magnetisation in its smooth form; e.g.
-    Hanselman 2003 on saturation.
+    without hysteresis of the iron. Source: Hanselman 2003 (saturation,
+    Froelich's curve of magnetisation in its smooth form).
     """
 
     saturation_current: Quantity = parameter(

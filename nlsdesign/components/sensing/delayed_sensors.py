@@ -37,7 +37,7 @@ class TransportDelay(Sensor):
     e^(−sτ) ≈ (1 − sτ/2 + s²τ²/12)/(1 + sτ/2 + s²τ²/12). Phase error below (ωτ)⁵/720: 4e-5 rad at ωτ = 0.5.
     The states are a, which rests at the value, and b = τ·ȧ; the delayed value is v − b.
     In records the delay is exact; before the first sample the value stood still.
-    Source: Golub and Van Loan, Matrix Computations, Padé table of the exponential.
+    Source: Golub and Van Loan 2013 (Padé table of the exponential).
 
     Examples
     --------
