@@ -130,6 +130,11 @@ class StressSoftening(Combination):
     a specimen or a piece whose section and length are not known apart. Valid for what the first pull does;
     there is no recovery, no set and no loss on reloading. Sources: Mullins 1969; Ogden and Roxburgh 1999.
 
+    Raises
+    ------
+    ArrangementError
+        If the curve needs the strain energy and a member does not say it.
+
     Examples
     --------
     >>> from nlsdesign.components import NeoHooke

@@ -119,7 +119,7 @@ class GearedMotor(Free):
     """Electric motor behind a rigid gear, seen from the output: J·ω̇ = n·k_T·I + ΣT.
 
     The inertia is that of everything that turns, reflected to the output; the gear has no loss here, so
-    friction is an element of its own. Source: any text on electric drives.
+    friction is an element of its own. Source: Leonhard 2001.
     """
 
     domain: ClassVar[Domain] = ROTATION

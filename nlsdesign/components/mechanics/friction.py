@@ -35,8 +35,8 @@ class CoulombFriction(WithFriction, Viscous):
 
     At rest T is what keeps both sides together: valid between two bodies, one of which has inertia. With
     ``contact=Smooth(creep_speed=...)`` it is T_c·tanh(ω/ω_s), C∞, and creeps at rest. Viscous friction goes
-    beside it as a :class:`Dashpot`. Source: Coulomb 1785; as a set-valued law Pfeiffer and Glocker 1996; the
-    smooth form e.g. in Armstrong-Hélouvry 1991.
+    beside it as a :class:`Dashpot`. Source: Coulomb 1785; Pfeiffer and Glocker
+    1996 (as a set-valued law); Armstrong-Hélouvry 1991 (the smooth form).
 
     Examples
     --------
@@ -61,7 +61,7 @@ class StribeckFriction(CoulombFriction):
 
     |T| ≤ T_c + ΔT while ω = 0; ΔT is what the friction near standstill has beyond sliding. With
     ``contact=Smooth(creep_speed=...)`` tanh(ω/ω_s) stands for the sign. Valid as :class:`CoulombFriction`.
-    Source: Stribeck 1902; this form in Armstrong-Hélouvry 1991.
+    Source: Stribeck 1902; Armstrong-Hélouvry 1991 (this form).
     """
 
     breakaway: Quantity = parameter(
@@ -88,7 +88,7 @@ class LoadFriction(WithFriction, Combination):
     backward. While ω = 0 the friction is at most µ·|T_in|, so a loaded gear stays where it is, and none of
     the elements inside may be sharp dry friction itself. With ``contact=Smooth(creep_speed=...)`` tanh(ω/ω_s)
     stands for the sign: C∞ but for the corner of |T_in|. Source: Coulomb 1785 with the load as normal force;
-    the usual model of gear losses.
+    Niemann and Winter 2003 (losses of gears).
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (ROTATION, TRANSLATION)
