@@ -194,10 +194,12 @@ class Builder:
 
         Parameters
         ----------
-        name, table
+        name
             As for :meth:`part`.
         element
             The element; its ends are checked even where it could not be made.
+        table
+            As for :meth:`part`.
         """
         ends = table.get("between")
         if not isinstance(ends, list) or not all(isinstance(end, str) for end in ends):

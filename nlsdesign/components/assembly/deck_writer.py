@@ -159,6 +159,8 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
     ------
     NlsError
         If the table is missing or is another component, or a number is missing, unknown or not valid.
+    DeckError
+        If the deck has a part there that the model has not, or has problems.
     """
     table: Any = deck.tables
     for step in path.split("."):

@@ -175,6 +175,11 @@ class Combination(Element):
     ----------
     members
         Pairs of name and element.
+
+    Raises
+    ------
+    ArrangementError
+        If there is no member, one is no element, or they relate other quantities than this one takes.
     """
 
     picture: ClassVar[str] = "around"

@@ -104,6 +104,11 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
         ----------
         children
             All parts inside, by name.
+
+        Raises
+        ------
+        UnknownNameError
+            If there are children; a part without any takes none.
         """
         if children:
             raise unknown_name("part", next(iter(children)), ())

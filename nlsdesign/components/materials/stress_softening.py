@@ -133,7 +133,7 @@ class StressSoftening(Combination):
     Raises
     ------
     ArrangementError
-        If a law that the curve needs the energy of does not say it.
+        If the curve needs the strain energy and a member does not say it.
 
     Examples
     --------

@@ -123,7 +123,7 @@ class GearedMotor(Free):
 
     The inertia is that of everything that turns, reflected to the output; the gear has no loss here, so
     friction is an element of its own. I is the current within its limit, as it comes out of the parts of the
-    drive, in written order. Source: any text on electric drives.
+    drive, in written order. Source: Leonhard 2001.
 
     Parameters
     ----------

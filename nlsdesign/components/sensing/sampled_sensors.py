@@ -76,7 +76,7 @@ class Tachometer(Sensor):
     In the flat model y = 2πf_c·(θ − θ_f) with θ̇_f = y: a differentiator with a first-order roll-off at f_c,
     as smooth as what it reads. In records the same filter acts on differences of samples,
     y_k = a·y_(k−1) + (1 − a)·(θ_k − θ_(k−1))·f_s with a = e^(−2πf_c/f_s), from rest. One count of an encoder
-    shows as a step of (1 − a)·q·f_s. Source: any text on digital filters; the filter is exact for held input.
+    shows as a step of (1 − a)·q·f_s. Source: Oppenheim and Schafer 2010 (exact for held input).
 
     Examples
     --------
