@@ -145,7 +145,13 @@ class OwnNames(SwitchScope):
         return self._builder.inputs[full][1]
 
     def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state."""
+        """Declare a state.
+
+        Raises
+        ------
+        ArrangementError
+            If two equations claim the state.
+        """
         full = self._builder.own(self.path, name)
         if full in self._builder.states:
             raise ArrangementError(full, "two equations claim this state")

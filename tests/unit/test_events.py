@@ -16,7 +16,7 @@ from nlsdesign.export.compilation.cross_compiler import compiler
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.transform import replace_state, with_outputs
 from nlsdesign.simulation import Event, Sine, simulate
-from nlsdesign.simulation.events import located
+from nlsdesign.simulation.events import locate_event
 from nlsdesign.simulation.input_signals import drives_of
 
 LAWS: list[tuple[Callable[[float], float], float]] = [
@@ -37,7 +37,7 @@ def test_an_event_is_located_from_behind(law: Callable[[float], float], root: fl
         asked.append(length)
         return law(length)
 
-    found = located(lasts, 1.2, 1e-12)
+    found = locate_event(lasts, 1.2, 1e-12)
     assert root <= found + 1e-15
     assert found - root < 1e-12
     assert asked[-1] == found, "the step that is kept is the last one that was taken"
@@ -48,7 +48,7 @@ def test_an_event_is_located_from_behind(law: Callable[[float], float], root: fl
 def test_smooth_laws_take_few_steps() -> None:
     for law, _ in LAWS[:3]:
         asked: list[float] = []
-        located(lambda h, law=law, asked=asked: asked.append(h) or law(h), 1.2, 1e-12)  # type: ignore[misc]
+        locate_event(lambda h, law=law, asked=asked: asked.append(h) or law(h), 1.2, 1e-12)  # type: ignore[misc]
         assert len(asked) <= 11
 
 

@@ -140,8 +140,8 @@ def test_the_report_lists_what_was_left_and_says_so_if_nothing_was() -> None:
     assert table.marked == {0}
     quiet = range_table("Stated ranges", {"soft pull": stretched_to(0.2)})
     assert quiet.rows == ()
-    assert "within the range" in quiet.caption
-    assert "within the range" in report_text(Path(), [quiet], title="quiet")
+    assert "within its stated range" in quiet.caption
+    assert "within its stated range" in report_text(Path(), [quiet], title="quiet")
 
 
 def test_a_piecewise_law_of_tension_says_when_it_is_compressed() -> None:

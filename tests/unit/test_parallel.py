@@ -1,4 +1,4 @@
-"""Work shared out among processes: same results, same order, nobody left behind."""
+"""Parallel map: same results, same order, no process left behind."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.parallel_map import shared_out
+from nlsdesign.parallel import parallel_map
 
 ENDLESS = """
 import time
-from nlsdesign.parallel_map import shared_out
+from nlsdesign.parallel import parallel_map
 
 def work(number):
     print("at work", flush=True)
     time.sleep(60)
 
-list(shared_out(work, 4))
+list(parallel_map(work, 4))
 """
 
 
 def test_results_come_in_order_and_see_what_the_work_refers_to() -> None:
     offset = 7
-    assert list(shared_out(lambda k: offset + k * k, 20)) == [7 + k * k for k in range(20)]
-    assert list(shared_out(lambda k: k, 0)) == []
+    assert list(parallel_map(lambda k: offset + k * k, 20)) == [7 + k * k for k in range(20)]
+    assert list(parallel_map(lambda k: k, 0)) == []
 
 
 def test_what_a_piece_raises_is_raised_here() -> None:
@@ -36,7 +36,7 @@ def test_what_a_piece_raises_is_raised_here() -> None:
         return 1.0 / number
 
     with pytest.raises(ZeroDivisionError):
-        list(shared_out(work, 3))
+        list(parallel_map(work, 3))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes as Linux lists them")
