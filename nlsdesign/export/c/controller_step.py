@@ -22,7 +22,7 @@ def step_body(model: FlatModel, name: str, real: Real) -> tuple[list[str], set[i
     model
         Discrete model.
     name
-        First word of all C names.
+        Prefix of all C names.
     real
         Number type.
     """

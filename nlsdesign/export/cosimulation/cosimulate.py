@@ -128,7 +128,7 @@ def cosimulate(
 
 @contextmanager
 def _instances(fmus: Mapping[str, str | Path]) -> Iterator[dict[str, FmuInstance]]:
-    """Give loaded instances; at the end, whatever happens, all are freed and every unpacked file is gone."""
+    """Yield loaded instances; afterwards, also after an error, all are freed and their files removed."""
     with tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-") as folder, ExitStack() as stack:
         instances: dict[str, FmuInstance] = {}
         for number, (name, path) in enumerate(fmus.items()):
@@ -184,7 +184,7 @@ def _check_units(instances: Mapping[str, FmuInstance], target: str, source: str)
         one, other = (parse_unit(unit or "1") for unit in units)
     except UnitError:
         return  # a unit of a foreign FMU that cannot be read here
-    # The radian is left out: torque is written as N*m and as N*m/rad.
+    # Without the radian: torque is given in N·m and in N·m/rad.
     if (one.factor, one.mechanical) != (other.factor, other.mechanical):
         raise UnitError(f"wire '{target}' [{units[0]}]", f"reads '{source}', which is in [{units[1]}]")
 
