@@ -20,7 +20,6 @@ from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.identification import RecordSet
-from nlsdesign.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.identification.records.measurement import Record
 from nlsdesign.identification.statistics.filters import derivative
@@ -61,7 +60,7 @@ def table_of(declared: Assembly, records: RecordSet) -> Table:
     base = Comparison(bench, typical_sizes(declared, records)).base(declared)
     residuals, columns = {}, {}
     for block in blocks_of(base.fitted, records.signals):
-        pieces = bench.evidence(DrivenBlock(block, []), records.of("fit"), {})
+        pieces = bench.evidence(bench.driven(block, []), records.of("fit"), {})
         residuals[block.name] = np.concatenate([e.residual({})[0] for e in pieces])
         given = [_regressors(e.record, torque=block.target is None) for e in pieces]
         columns[block.name] = {

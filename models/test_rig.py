@@ -33,7 +33,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import DeckError, nearest
-from nlsdesign.quantity import Quantity, quantity
+from nlsdesign.quantity import Quantity, quantity, significant
 
 _CONTROL_VALUES = 80
 _CHANGEOVER = 2e-5  # rad; at 15 mm lever arm 0.3 µm of extension
@@ -114,7 +114,7 @@ class _Numbers:
 
 def _rubber(numbers: _Numbers) -> Specimen:
     length = numbers("rubber", "L0_m", "m")
-    engaged = tuple(d / length.number for d in numbers.raw("rubber", "delta_i_m"))
+    engaged = significant(d / length.number for d in numbers.raw("rubber", "delta_i_m"))
     return specimen(
         area=numbers("rubber", "A0_m2", "m^2"),
         rest_length=length,
@@ -131,7 +131,7 @@ def _rubber(numbers: _Numbers) -> Specimen:
 
 def _cam(cam_csv: Path) -> TwoSidedCam:
     table = _cam_table(cam_csv)
-    values = control_values(table[:, 0], table[:, 2], _CONTROL_VALUES)
+    values = significant(control_values(table[:, 0], table[:, 2], _CONTROL_VALUES))
     source = f"{cam_csv.name}, lever_arm_m, as a cubic spline"
     return TwoSidedCam(
         lever_arm=quantity(values, "m", source=source),

@@ -1,50 +1,29 @@
 """Symbolic design workbench for series elastic actuators whose spring is a cam that stretches rubber.
 
-``import nlsdesign as nls`` gives every public name of the rooms: parts and their algebra, ``flatten``,
-``simulate``, ``design_cam``, ``over_angle``, ``design_observer``, ``export_c``, ``export_fmu``,
-``cosimulate``, ``load_records``, ``diagnose``, ``write_report`` and what belongs to them. A room is imported
-when one of its names is first asked for, so the command line starts at once.
+``import nlsdesign as nls`` gives the names that a design study needs: ``flatten``, ``simulate``,
+``design_cam``, ``over_angle``, ``design_observer``, ``export_c``, ``load_records``, ``diagnose`` and what
+belongs to them; everything else through its room, as ``nls.components.Yeoh``. ``__init__.pyi`` lists the
+names for type checkers and for the import at run time: a room is imported when one of its names is first
+asked for.
 """
 
 from __future__ import annotations
 
+import ast
+import functools
 import importlib
-from typing import Any
+from pathlib import Path
+from types import ModuleType
 
-from .errors import unknown_name
+from .errors import nearest
 from .locations import bundled, version
-from .quantity import quantity  # the function, before a room's import puts the module in its place
+from .quantity import quantity as quantity  # the function; a later import of the module leaves it in place
 
 __version__ = version()
-__all__ = ["ROOMS", "WHOLE", "__version__", "quantity"]
-
-ROOMS = (
-    "quantity",
-    "deck",
-    "components",
-    "components.assembly.deck_writer",
-    "model",
-    "model.equations",
-    "model.linear",
-    "model.transform",
-    "simulation",
-    "design",
-    "analysis",
-    "observer",
-    "control",
-    "identification",
-    "discrepancy",
-    "export",
-    "report",
-)
-"""Where names are looked for, in this order."""
-
-WHOLE = ("effects", "errors", "figures", "models", "progress", "report")
-"""Modules that are given whole, as ``nls.figures``."""
 
 
-def __getattr__(name: str) -> Any:
-    """Return a public name of the first room that has it.
+def __getattr__(name: str) -> object:
+    """Return a public name from where it lives.
 
     Parameters
     ----------
@@ -54,41 +33,49 @@ def __getattr__(name: str) -> Any:
     Raises
     ------
     AttributeError
-        If no room has it; the nearest name is given.
+        If it is not public here; says where it lives, or the nearest public name.
     """
     if name.startswith("_"):
         raise AttributeError(name)
-    found = _whole(name) if name in WHOLE else _from_rooms(name)
-    globals()[name] = found
-    return found
-
-
-def _whole(name: str) -> Any:
-    if name == "models":
-        return bundled("models")
-    return importlib.import_module("." + ("discrepancy.effects" if name == "effects" else name), __name__)
-
-
-def _from_rooms(name: str) -> Any:
-    for room in ROOMS:
-        module = importlib.import_module("." + room, __name__)
-        if name in _public(module):
-            return getattr(module, name)
-    message = str(unknown_name("nlsdesign has no name", name, __dir__()))
-    raise AttributeError(message)
-
-
-def _public(module: Any) -> list[str]:
-    listed = getattr(module, "__all__", None)
-    if listed is not None:
-        return list(listed)
-    return [
-        n
-        for n, v in vars(module).items()
-        if getattr(v, "__module__", None) == module.__name__ and n[0] != "_"
-    ]
+    if name not in _homes():
+        raise AttributeError(_advice(name))
+    home = _homes()[name]
+    if home == "models":
+        value: object = bundled("models")
+    elif home == "":
+        value = importlib.import_module(f".{name}", __name__)
+    else:
+        value = getattr(importlib.import_module(f".{home}", __name__), name)
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:
-    names = {n for room in ROOMS for n in _public(importlib.import_module("." + room, __name__))}
-    return sorted(names | set(WHOLE) | {"__version__"})
+    return sorted({*_homes(), "__version__"})
+
+
+@functools.cache
+def _homes() -> dict[str, str]:
+    """Return the module of each public name, below this package; "" for the modules of the package itself."""
+    stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    homes = {a.name: a.name for node in stub.body if isinstance(node, ast.Import) for a in node.names}
+    for node in stub.body:
+        if isinstance(node, ast.ImportFrom):
+            homes |= {a.name: node.module or "" for a in node.names}
+    return homes
+
+
+def _advice(name: str) -> str:
+    """Return what to write in place of a name that is not public here."""
+    homes = _homes()
+    text = f"nlsdesign has no name '{name}'"
+    for room in dict.fromkeys(home or one for one, home in homes.items() if home != "models"):
+        if name in _public(importlib.import_module(f".{room}", __name__)):
+            return f"{text}; it is nlsdesign.{room}.{name}"
+    near = nearest(name, homes)
+    return f"{text}; did you mean '{near}'?" if near else f"{text}; dir(nlsdesign) lists the public names"
+
+
+def _public(module: ModuleType) -> list[str]:
+    own = [n for n, v in vars(module).items() if getattr(v, "__module__", None) == module.__name__]
+    return getattr(module, "__all__", [n for n in own if not n.startswith("_")])

@@ -217,6 +217,11 @@ def read_deck(text: str, path: Path) -> Deck:
         TOML.
     path
         Where it came from, for messages.
+
+    Raises
+    ------
+    DeckError
+        If the text is no TOML, or ``deck`` is not a table.
     """
     try:
         tables = tomllib.loads(text, parse_float=Written)

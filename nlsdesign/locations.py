@@ -67,6 +67,11 @@ def bundled(name: Literal["models", "studies"], module: str = "") -> ModuleType:
         Folder.
     module
         Module inside; the package itself where none is given.
+
+    Raises
+    ------
+    UnknownNameError
+        If the folder holds no package that can be loaded.
     """
     alias = f"nlsdesign_{name}"
     if alias not in sys.modules:

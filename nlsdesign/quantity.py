@@ -199,6 +199,11 @@ class Quantity:
         Citation, data-sheet page, bench file with date, or "assumed" with a reason.
     spread
         One-sided relative spread; 0.06 means ± 6 %.
+
+    Raises
+    ------
+    ValueRangeError
+        If the row is empty, a value is not finite, or the spread is negative.
     """
 
     value: float | tuple[float, ...]
@@ -318,6 +323,32 @@ def quantity(
     factor, plain = parse_unit(unit).factor, _plain(value)
     converted = tuple(item * factor for item in plain) if isinstance(plain, tuple) else plain * factor
     return Quantity(converted, unit, source, spread)
+
+
+def significant(values: Iterable[float], digits: int = 9) -> tuple[float, ...]:
+    """Return numbers rounded to significant digits of the largest of them, zero and all.
+
+    What a spline, a solver or a fit gives differs in its last digits from one processor to the next; a number
+    that is written down is rounded to what it means, so that everybody writes the same.
+
+    Parameters
+    ----------
+    values
+        Numbers of one row, in one unit.
+    digits
+        How many digits of the largest magnitude stay.
+
+    Examples
+    --------
+    >>> significant([0.0123456789012, 1.2e-19], 6)
+    (0.0123457, 0.0)
+    """
+    row = [float(v) for v in values]
+    largest = max((abs(v) for v in row if math.isfinite(v)), default=0.0)
+    if largest == 0.0:
+        return tuple(row)
+    places = digits - 1 - math.floor(math.log10(largest))
+    return tuple(round(v, places) + 0.0 for v in row)
 
 
 def degrees(value: float) -> float:

@@ -13,7 +13,7 @@ import pytest
 from tests.import_graph import Import, cycles, imports, modules
 
 # Open to every room.
-BASE = {"errors", "quantity", "symbolic", "locations", "parallel", "progress", "writing"}
+BASE = {"bibliography", "errors", "quantity", "symbolic", "locations", "parallel", "progress", "writing"}
 # What the floors above the waist stand on: they see the flat model and never the components it came from.
 WAIST = {"deck", "model"}
 SIMULATED = WAIST | {"simulation"}
@@ -55,7 +55,9 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     "identification": (
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
-    "discrepancy": ({"blocks", "effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"}),
+    "discrepancy": (
+        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"},
+    ),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip
 

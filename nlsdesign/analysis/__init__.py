@@ -3,6 +3,6 @@
 from .kalman import EstimateDeviation
 from .observability import Observability
 from .stability import Stability
-from .sweep import Chart, Point, View, over_angle
+from .sweep import Chart, RestPoint, View, over_angle
 
-__all__ = ["Chart", "EstimateDeviation", "Observability", "Point", "Stability", "View", "over_angle"]
+__all__ = ["Chart", "EstimateDeviation", "Observability", "RestPoint", "Stability", "View", "over_angle"]

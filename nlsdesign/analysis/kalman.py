@@ -11,8 +11,9 @@ from scipy.linalg import expm, solve_discrete_are, solve_discrete_lyapunov
 
 from ..errors import ConvergenceError, ValueRangeError, unknown_name
 from ..model import FlatModel, Variable
+from ..model.roles import spring_torque
 from .rest import rate_state
-from .sweep import Point, View
+from .sweep import RestPoint, View
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 def discrete_noise(a: Array, density: Array, sample_time: float) -> tuple[Array, Array]:
     """Return Φ = e^(AT) and the covariance ∫₀ᵀ e^(At)·W·e^(Aᵀt) dt of white noise over one sample.
 
-    Source: Van Loan, Computing integrals involving the matrix exponential, 1978.
+    Source: Van Loan 1978.
 
     Parameters
     ----------
@@ -89,20 +90,29 @@ class EstimateDeviation(View):
     measurement
         Standard deviation of each measured output by name; an encoder has quantum/√12.
     estimate
-        Output that is wanted.
+        Output that is wanted; by default the torque of the series spring.
     sample_time
         In s.
     """
 
     process: Mapping[str, float]
     measurement: Mapping[str, float]
-    estimate: str = "spring.torque"
+    estimate: str | None = None
     sample_time: float = 1e-3
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If an output or a state has another name in the model.
+        ValueRangeError
+            If a standard deviation of the measurement is not positive.
+        """
         outputs, states = {v.name for v in model.outputs}, {v.name for v in model.states}
-        for name in (self.estimate, *self.measurement):
+        estimate = spring_torque(model, self.estimate)
+        for name in (estimate, *self.measurement):
             if name not in outputs:
                 raise unknown_name("output", name, outputs)
         for name in self.process:
@@ -110,15 +120,13 @@ class EstimateDeviation(View):
                 raise unknown_name("state", name, states)
         if not all(value > 0.0 for value in self.measurement.values()):
             raise ValueRangeError("measurement", "a standard deviation must be positive")
-        unit = model.variable(self.estimate).unit
+        unit = model.variable(estimate).unit
         return (
-            Variable("deviation.model", unit, f"standard deviation of {self.estimate} from the model alone"),
-            Variable(
-                "deviation.best", unit, f"standard deviation of {self.estimate} with the best correction"
-            ),
+            Variable("deviation.model", unit, f"standard deviation of {estimate} from the model alone"),
+            Variable("deviation.best", unit, f"standard deviation of {estimate} with the best correction"),
         )
 
-    def at(self, point: Point) -> tuple[tuple[float, ...], dict[str, str]]:
+    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
         """Return both deviations; no words."""
         linear = point.linear
         states, outputs = list(linear.states), list(linear.outputs)
@@ -127,7 +135,7 @@ class EstimateDeviation(View):
         spread = np.array(list(self.measurement.values()))
         transition, noise = discrete_noise(linear.A, density, self.sample_time)
         _, best = steady_state_kalman(transition, linear.C[rows], noise, spread)
-        wanted = linear.C[outputs.index(self.estimate)]
+        wanted = linear.C[outputs.index(spring_torque(point.model, self.estimate))]
         angle, speed = states.index(point.angle), states.index(rate_state(point.model, point.angle))
         inner = [i for i in range(len(states)) if i not in (angle, speed)]
         alone = np.zeros((len(states), len(states)))
@@ -139,5 +147,5 @@ class EstimateDeviation(View):
         alone[angle, angle] = self._spread_of(point) ** 2
         return tuple(float(np.sqrt(wanted @ p @ wanted)) for p in (alone, best)), {}
 
-    def _spread_of(self, point: Point) -> float:
+    def _spread_of(self, point: RestPoint) -> float:
         return self.measurement.get(point.angle, 0.0)

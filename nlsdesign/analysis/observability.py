@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from ..errors import unknown_name
 from ..model import FlatModel, Variable
-from .sweep import Point, View
+from .sweep import RestPoint, View
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,13 @@ class Observability(View):
     measured: tuple[str, ...] = ()
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If something measured is neither a state nor an output of the model.
+        """
         known = {v.name for v in model.states + model.outputs}
         for name in (*self.nominal, *self.measured):
             if name not in known:
@@ -69,7 +75,7 @@ class Observability(View):
             ),
         )
 
-    def at(self, point: Point) -> tuple[tuple[float, ...], dict[str, str]]:
+    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
         """Return the numbers; in words the direction that is not seen, or least."""
         a, c = self._scaled(point)
         powers = [c]
@@ -93,7 +99,7 @@ class Observability(View):
             "weakest direction": _in_words(directions[-1], point.linear.states),
         }
 
-    def _scaled(self, point: Point) -> tuple[Array, Array]:
+    def _scaled(self, point: RestPoint) -> tuple[Array, Array]:
         linear, sizes = point.linear, {**point.sizes, **self.nominal}
         chosen = [i for i, n in enumerate(linear.outputs) if not self.measured or n in self.measured]
         state = np.array([sizes.get(name, 1.0) for name in linear.states])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArrangementError, ConvergenceError, unknown_name
 from ..model import FlatModel
+from ..model.roles import measured_motion
 from ..model.transform import named
 
 Array = NDArray[np.float64]
@@ -49,7 +50,7 @@ def rest_states(
     model: FlatModel,
     angles: Array,
     *,
-    angle: str = "motor.angle",
+    angle: str | None = None,
     consistent: Mapping[str, str] | None = None,
     tolerance: float = 1e-9,
 ) -> Array:
@@ -62,7 +63,7 @@ def rest_states(
     angles
         Shape (n,), in rad.
     angle
-        State that is held; its rate is held at zero.
+        State that is held, its rate at zero; by default the motion of the driven body.
     consistent
         States that have to agree with a signal of the same model, such as the extension of the published
         form with ``"spring.rubber.extension.geometric"``; state name to signal name.
@@ -78,7 +79,10 @@ def rest_states(
     ------
     ConvergenceError
         If a state does not come to rest.
+    ArrangementError
+        If no angle is named and the structure does not say which body is driven.
     """
+    angle = measured_motion(model, angle)
     names = [v.name for v in model.states]
     tied = dict(consistent or {})
     held = {angle, rate_state(model, angle), *tied}
@@ -98,7 +102,7 @@ def rest_states(
     return _newton(newton, x, (u, p), free, (tolerance, model.name))
 
 
-def typical_sizes(model: FlatModel, angles: Array, *, angle: str = "motor.angle") -> dict[str, float]:
+def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) -> dict[str, float]:
     """Return a typical size of every state and output over a range of angles, for scaling.
 
     Angle: the largest in the range. Other states: the largest of their rest values and of what they would
@@ -112,8 +116,14 @@ def typical_sizes(model: FlatModel, angles: Array, *, angle: str = "motor.angle"
     angles
         Shape (n,), ascending, in rad.
     angle
-        Name of the state that is swept.
+        Name of the state that is swept; by default the motion of the driven body.
+
+    Raises
+    ------
+    ArrangementError
+        If no angle is named and the structure does not say which body is driven.
     """
+    angle = measured_motion(model, angle)
     names = [v.name for v in model.states]
     speed = rate_state(model, angle)
     grid = np.linspace(0.0, float(np.max(np.abs(angles))), 65)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel, Variable
 from ..model.linear import LinearModel, jacobian_function
+from ..model.roles import measured_motion
 from ..writing import write_table
 from .rest import rest_states, typical_sizes
 
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class RestPoint:
     """The model at rest at one angle.
 
     Parameters
@@ -59,7 +60,7 @@ class View(ABC):
         """
 
     @abstractmethod
-    def at(self, point: Point) -> tuple[tuple[float, ...], dict[str, str]]:
+    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
         """Return the numbers, in the order of the columns, and findings in words.
 
         Parameters
@@ -146,7 +147,7 @@ def over_angle(
     views: Sequence[View],
     *,
     angles: Sequence[float] | Array,
-    angle: str = "motor.angle",
+    angle: str | None = None,
     consistent: Mapping[str, str] | None = None,
 ) -> Chart:
     """Evaluate views of a model at rest over its angle.
@@ -160,7 +161,7 @@ def over_angle(
     angles
         Shape (n,), in rad.
     angle
-        State that is swept.
+        State that is swept; by default the motion of the driven body.
     consistent
         States that have to agree with a signal, as for :func:`~nlsdesign.analysis.rest.rest_states`.
 
@@ -170,7 +171,10 @@ def over_angle(
         If an angle is not finite, or the model has no finite slope at one.
     ConvergenceError
         If the model does not come to rest.
+    ArrangementError
+        If no angle is named and the structure does not say which body is driven.
     """
+    angle = measured_motion(model, angle)
     at = np.asarray(angles, dtype=float)
     if at.ndim != 1 or len(at) == 0 or not np.all(np.isfinite(at)):
         raise ValueRangeError("angles", "must be a row of finite numbers in rad")
@@ -179,9 +183,9 @@ def over_angle(
     columns = tuple(column for view in views for column in view.columns(model))
     values, words = np.zeros((len(at), len(columns))), dict[str, list[str]]()
     for row, linear in enumerate(_linearised(model, states)):
-        found = [view.at(Point(model, angle, states[row], linear, sizes)) for view in views]
-        values[row] = [number for numbers, _ in found for number in numbers]
-        for _, texts in found:
+        views_here = [view.at(RestPoint(model, angle, states[row], linear, sizes)) for view in views]
+        values[row] = [number for numbers, _ in views_here for number in numbers]
+        for _, texts in views_here:
             for name, text in texts.items():
                 words.setdefault(name, []).append(text)
     return Chart(model.variable(angle), at, columns, values, {name: tuple(t) for name, t in words.items()})

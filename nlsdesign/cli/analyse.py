@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
-from ..analysis import Observability, Stability, over_angle
-from ..components.assembly.deck_writer import declare
-from ..deck import load_deck
-from ..model import Variable, flatten
 from ..quantity import typeset_unit
 from .output import deck_option, json_option, out_option, show_json, show_table
 from .units import Number
+
+if TYPE_CHECKING:
+    from ..model import Variable
 
 
 @click.command()
@@ -25,6 +24,13 @@ from .units import Number
 @json_option
 def analyse(deck_name: str, last: float, count: int, measured: str, out: Path, as_json: bool) -> None:
     """Rank and condition of observability, poles and stiffness, from zero to the last angle."""
+    import numpy as np
+
+    from ..analysis import Observability, Stability, over_angle
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..model import flatten
+
     model = flatten(declare(load_deck(deck_name)), outputs=[measured, "spring.torque"])
     views = [Observability(measured=(measured,)), Stability()]
     chart = over_angle(model, views, angles=np.linspace(0.0, last, count), angle=measured)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
-import numpy as np
 
 from ..errors import ValueRangeError
-from ..export import Late, cosimulate
 from ..quantity import typeset_unit
-from ..simulation import Sine
 from .output import json_option, show_json, show_table
 from .units import Number
+
+if TYPE_CHECKING:
+    from ..simulation import Sine
 
 T = TypeVar("T")
 _LATE = "late:"
@@ -35,6 +35,10 @@ _LATE = "late:"
 @json_option
 def cosimulation(stop: float, step: float | None, out: Path, as_json: bool, **given: tuple[str, ...]) -> None:
     """Run FMUs together; numbers are in the units that the FMUs state for their variables."""
+    import numpy as np
+
+    from ..export import cosimulate
+
     joined = _pairs("--wire", given["wires"], _source)
     run = cosimulate(
         fmus=_pairs("--fmu", given["fmus"], Path),
@@ -78,9 +82,13 @@ def _pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dic
 
 
 def _source(text: str) -> str:
+    from ..export import Late
+
     return Late(text.removeprefix(_LATE)) if text.startswith(_LATE) else text
 
 
 def _signal(text: str) -> Sine:
+    from ..simulation import Sine
+
     size, at, frequency = text.partition("@")
     return Sine(float(size), float(frequency)) if at else Sine(0.0, 0.0, float(size))

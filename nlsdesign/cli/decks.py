@@ -7,7 +7,6 @@ from pathlib import Path
 
 import click
 
-from ..components.assembly.deck_writer import deck_problems, declare, write_deck
 from ..deck import deck_names, load_deck
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
@@ -32,6 +31,8 @@ def list_decks() -> None:
 @json_option
 def check(deck_name: str, as_json: bool) -> None:
     """Name every problem with line and column, and the share of numbers that are only assumed."""
+    from ..components.assembly.deck_writer import deck_problems, declare
+
     read = load_deck(deck_name)
     problems = deck_problems(read)
     if problems:
@@ -51,6 +52,8 @@ def check(deck_name: str, as_json: bool) -> None:
 @json_option
 def show(deck_name: str, as_json: bool) -> None:
     """Draw the parts and list the numbers."""
+    from ..components.assembly.deck_writer import declare
+
     assembly = declare(load_deck(deck_name))
     numbers = assembly.quantities()
     if as_json:
@@ -74,6 +77,8 @@ def show(deck_name: str, as_json: bool) -> None:
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
 def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
+    from ..components.assembly.deck_writer import write_deck
+
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
     write_deck(assembly, out)
     click.echo(f"written: {out}, {len(assembly.quantities())} numbers; next: nlsdesign diagnose --deck {out}")

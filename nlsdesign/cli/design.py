@@ -7,18 +7,6 @@ from typing import Any
 
 import click
 
-from ..components.assembly.deck_writer import declare, write_deck
-from ..deck import load_deck
-from ..design import (
-    ExponentialTorque,
-    Limit,
-    MaximumCamRadius,
-    MaximumStrain,
-    MinimumRadiusOfCurvature,
-    design_cam,
-    write_drawings,
-)
-from ..progress import Steps
 from .output import deck_option, json_option, out_option, show_json, show_table
 from .units import Number
 
@@ -54,6 +42,19 @@ from .units import Number
 @json_option
 def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     """Design the cam for tau(angle) = maximum * (exp(c angle) - 1) / (exp(c end) - 1)."""
+    from ..components.assembly.deck_writer import declare, write_deck
+    from ..deck import load_deck
+    from ..design import (
+        ExponentialTorque,
+        Limit,
+        MaximumCamRadius,
+        MaximumStrain,
+        MinimumRadiusOfCurvature,
+        design_cam,
+        write_drawings,
+    )
+    from ..progress import Steps
+
     keep: list[Limit] = [
         MinimumRadiusOfCurvature(given["minimum_radius"]),
         MaximumCamRadius(given["maximum_radius"]),

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
-from ..components.assembly.deck_writer import declare
-from ..deck import load_deck
-from ..discrepancy import diagnose as find_what_is_missing
-from ..discrepancy import predict, write_verdict
-from ..identification import load_record, load_records
-from ..model import flatten
-from ..progress import Steps
 from ..quantity import typeset_unit
-from ..report import verdict_sections, write_report
-from ..simulation import Trace
 from .output import deck_option, json_option, out_option, show_json, show_table
+
+if TYPE_CHECKING:
+    from ..simulation import Trace
 
 _file = click.Path(path_type=Path, dir_okay=False)
 _mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
@@ -35,6 +28,15 @@ def diagnose(
     deck_name: str, records: Path, hold_out: tuple[str, ...], mapping: Path | None, out: Path, as_json: bool
 ) -> None:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..discrepancy import diagnose as find_what_is_missing
+    from ..discrepancy import write_verdict
+    from ..identification import load_records
+    from ..model import flatten
+    from ..progress import Steps
+    from ..report import verdict_sections, write_report
+
     actuator = declare(load_deck(deck_name))
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
@@ -59,6 +61,12 @@ def diagnose(
 @json_option
 def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
     """Drive the model with a measured record and write its predictions of the measured signals."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..discrepancy import predict
+    from ..identification import load_record
+    from ..model import flatten
+
     actuator = declare(load_deck(deck_name))
     records = load_record(record, flatten(actuator), mapping=mapping)
     (measured,) = records.records
@@ -83,6 +91,8 @@ def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
     measured, predicted
         At the same times.
     """
+    import numpy as np
+
     rows = []
     for name, values in predicted.signals.items():
         error = values - measured[name] if name in measured else values

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ..components.assembly.deck_writer import declare
-from ..components.assembly.named_parts import Assembly
-from ..deck import load_deck
 from ..errors import ArrangementError
-from ..export import export_c, export_fmu
-from ..model import FlatModel, flatten
-from ..observer import design_observer
 from .output import deck_option, out_option
 from .units import Number
+
+if TYPE_CHECKING:
+    from ..components import Assembly
+    from ..model import FlatModel
 
 _sample_time = click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
 
@@ -45,6 +44,9 @@ def observer_of(assembly: Assembly, sample_time: float) -> FlatModel:
     ArrangementError
         If the assembly is no actuator.
     """
+    from ..model import flatten
+    from ..observer import design_observer
+
     if not is_actuator(assembly):
         raise ArrangementError(
             f"deck '{assembly.name}'",
@@ -61,6 +63,10 @@ def observer_of(assembly: Assembly, sample_time: float) -> FlatModel:
 @click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
 def observer(deck_name: str, sample_time: float, out: Path, real: str) -> None:
     """Design the torque observer and write it as C with a self-test."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..export import export_c
+
     model = observer_of(declare(load_deck(deck_name)), sample_time)
     source = export_c(model, out, real=real, name="observer")
     click.echo(str(model))
@@ -79,6 +85,10 @@ def export() -> None:
 @click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
 def export_observer(deck_name: str, sample_time: float, out: Path, real: str) -> None:
     """Write the torque observer as C99."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..export import export_c
+
     source = export_c(
         observer_of(declare(load_deck(deck_name)), sample_time), out, real=real, name="observer"
     )
@@ -103,6 +113,11 @@ def export_fmus(
     deck_name: str, sample_time: float, out: Path, version: str, platforms: tuple[str, ...], plant_only: bool
 ) -> None:
     """Write plant and, for an actuator, its observer as co-simulation FMUs."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..export import export_fmu
+    from ..model import flatten
+
     assembly = declare(load_deck(deck_name))
     models = {"plant": flatten(assembly)}
     if is_actuator(assembly) and not plant_only:

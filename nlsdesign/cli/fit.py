@@ -6,12 +6,6 @@ from pathlib import Path
 
 import click
 
-from ..components.assembly.deck_writer import declare
-from ..deck import load_deck
-from ..discrepancy import refit, write_refit
-from ..identification import load_records
-from ..model import flatten
-from ..progress import Steps
 from ..quantity import typeset_unit
 from .output import deck_option, json_option, out_option, show_json, show_table
 from .units import Number
@@ -38,6 +32,13 @@ def fit(
     as_json: bool,
 ) -> None:
     """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..discrepancy import refit, write_refit
+    from ..identification import load_records
+    from ..model import flatten
+    from ..progress import Steps
+
     actuator = declare(load_deck(deck_name))
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
-from ..components.materials import library
 from .output import json_option, show_json, show_table
+
+if TYPE_CHECKING:
+    from ..components import Material
 
 
 @click.command()
@@ -13,6 +17,8 @@ from .output import json_option, show_json, show_table
 @json_option
 def materials(name: str | None, as_json: bool) -> None:
     """List the rubbers of the library, or show one: values, conditions, grade of evidence and source."""
+    from ..components.materials import library
+
     if name is None:
         known = library.materials()
         if as_json:
@@ -32,7 +38,7 @@ def materials(name: str | None, as_json: bool) -> None:
         click.echo(chosen.remark)
 
 
-def _loss(material: library.Material) -> str:
+def _loss(material: Material) -> str:
     if "loss_tangent" not in material:
         return "not known"
     tangent = material["loss_tangent"]

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import inspect
 import math
+from typing import TYPE_CHECKING
 
 import click
 
-from ..components import Body, Cam, Element, Gear, Part, Sensor
-from ..components.assembly.deck_reader import component_classes
-from ..components.core.part import ParameterInfo
+from ..bibliography import cited
 from ..errors import unknown_name
 from ..quantity import typeset_unit
 from .output import json_option, show_json, show_table
 
-_KINDS: dict[str, type[Part]] = {
-    "element": Element,
-    "body": Body,
-    "gear": Gear,
-    "cam": Cam,
-    "sensor": Sensor,
-}
+if TYPE_CHECKING:
+    from ..components import Part
+    from ..components.core.part import ParameterInfo
 
 
 @click.command()
@@ -28,6 +23,8 @@ _KINDS: dict[str, type[Part]] = {
 @json_option
 def parts(name: str | None, as_json: bool) -> None:
     """List the parts that a deck can name, or show one: its law, source and numbers."""
+    from ..components.assembly.deck_reader import component_classes
+
     known = component_classes()
     if name is None:
         rows = sorted((_kind(c), n, _law(c)) for n, c in known.items())
@@ -38,11 +35,13 @@ def parts(name: str | None, as_json: bool) -> None:
         return
     if name not in known:
         raise unknown_name("part", name, known)
-    infos = known[name].parameter_infos()
+    infos, law = known[name].parameter_infos(), inspect.getdoc(known[name]) or ""
+    publications = [str(reference) for reference in cited(law)]
     if as_json:
-        show_json({"kind": _kind(known[name]), "law": inspect.getdoc(known[name]), "numbers": _plain(infos)})
+        content = {"law": law, "references": publications, "numbers": _plain(infos)}
+        show_json({"kind": _kind(known[name]), **content})
         return
-    click.echo(f"{name} ({_kind(known[name])})\n\n{inspect.getdoc(known[name])}\n")
+    click.echo("\n".join([f"{name} ({_kind(known[name])})", "", law, "", *publications, ""]))
     columns = ("name", "unit", "from", "to", "meaning")
     numbers = [
         (n, typeset_unit(i.unit), f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()
@@ -51,7 +50,12 @@ def parts(name: str | None, as_json: bool) -> None:
 
 
 def _kind(part: type[Part]) -> str:
-    return next(kind for kind, base in _KINDS.items() if issubclass(part, base))
+    from ..components import Body, Cam, Element, Gear, Sensor
+
+    kinds: dict[str, type[Part]] = {
+        "element": Element, "body": Body, "gear": Gear, "cam": Cam, "sensor": Sensor,
+    }  # fmt: skip
+    return next(kind for kind, base in kinds.items() if issubclass(part, base))
 
 
 def _law(part: type[Part]) -> str:

@@ -8,13 +8,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, Protocol, runtime_checkable
 
 import click
 
 from ..errors import NlsError, unknown_name
 from ..locations import bundled, folder
-from ..progress import Steps
 from ..quantity import with_unit
 from .output import json_option, show_json, show_table
 
@@ -44,18 +44,31 @@ class Claim:
         Parameters
         ----------
         result
-            Result in the same unit.
+            In the same unit.
         """
         return abs(result - self.value) <= self.tolerance
 
 
+@runtime_checkable
+class Results(Protocol):
+    """What ``main(out, fast=False)`` of a study returns: any typed object that lists its numbers."""
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """The results by the names of ``expected.toml``."""
+        ...
+
+
 def study_names() -> list[str]:
-    """Return the names of the studies that come with the project."""
-    return sorted(p.stem for p in folder("studies").glob("*.py") if not p.stem.startswith("_"))
+    """Return the names of the studies that come with the project: modules and packages."""
+    place = folder("studies")
+    modules = [path.stem for path in place.glob("*.py")]
+    packages = [path.parent.name for path in place.glob("*/__init__.py")]
+    return sorted(name for name in (*modules, *packages) if not name.startswith("_"))
 
 
-def load_study(name: str) -> Any:
-    """Return a study as a module with ``main(out, fast, steps)``.
+def load_study(name: str) -> ModuleType:
+    """Return a study as a module with ``main(out, fast=False)``.
 
     Parameters
     ----------
@@ -66,6 +79,8 @@ def load_study(name: str) -> Any:
     ------
     UnknownNameError
         If there is no such study.
+    NlsError
+        If there is no such file, or it cannot be loaded as Python.
     """
     path = Path(name)
     if path.suffix != ".py":
@@ -96,6 +111,57 @@ def claims(name: str) -> dict[str, Claim]:
     return {key: Claim(**table) for key, table in tables.get(name, {}).items()}
 
 
+def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
+    """Run a study and return its numbers; none where it was skipped.
+
+    Parameters
+    ----------
+    name
+        As for :func:`load_study`.
+    out
+        Folder for what it writes.
+    fast
+        Coarser and shorter.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such study.
+    NlsError
+        If its ``main`` returns something without numbers.
+    """
+    results = load_study(name).main(out, fast=fast)
+    if results is None:
+        return {}
+    if not isinstance(results, Results):
+        raise NlsError(
+            f"study '{name}'",
+            f"main() returned {type(results).__name__}, which has no property 'numbers'",
+            next_step="return an object whose 'numbers' is a mapping of float by name, or None if skipped",
+        )
+    return dict(results.numbers)
+
+
+def not_as_claimed(results: Mapping[str, float], expected: Mapping[str, Claim]) -> dict[str, str]:
+    """Return, by name, what is wrong with a claimed number: too far off, or not computed.
+
+    Parameters
+    ----------
+    results
+        Numbers of a study; without any it was skipped, and nothing is wrong.
+    expected
+        Its claims.
+    """
+    wrong = {}
+    for key, claim in expected.items() if results else ():
+        wanted = f"expected {claim.value:.4g} ± {claim.tolerance:.2g}"
+        if key not in results:
+            wrong[key] = f"{key} was not computed, {wanted}"
+        elif not claim.holds(results[key]):
+            wrong[key] = f"{key} = {results[key]:.4g}, {wanted}"
+    return wrong
+
+
 @click.group()
 def study() -> None:
     """List and run design studies."""
@@ -120,14 +186,12 @@ def list_studies() -> None:
 @json_option
 def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
     """Run a study; exit status 1 if a number differs from its claim."""
-    module = load_study(name)
     target = out if out is not None else Path("out") / Path(name).stem
     target.mkdir(parents=True, exist_ok=True)
-    results: Mapping[str, float] = module.main(target, fast=fast, steps=Steps())
-    expected = claims(Path(name).stem)
-    failed = [key for key, claim in expected.items() if key in results and not claim.holds(results[key])]
+    results, expected = run_study(name, target, fast=fast), claims(Path(name).stem)
+    wrong = not_as_claimed(results, expected)
     if as_json:
-        show_json({"results": dict(results), "not_as_claimed": failed, "out": target})
+        show_json({"results": results, "not_as_claimed": list(wrong), "out": target})
     else:
         show_table(
             f"Study {name}",
@@ -135,10 +199,9 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
             [_row(k, v, expected.get(k)) for k, v in results.items()],
         )
         click.echo(f"report: {target / 'report.html'}")
-    for key in failed:
-        expectation = f"{expected[key].value:.4g} ± {expected[key].tolerance:.2g}"
-        click.echo(f"not as claimed: {key} = {results[key]:.4g}, expected {expectation}", err=True)
-    sys.exit(1 if failed and not fast else 0)
+    for message in wrong.values():
+        click.echo(f"not as claimed: {message}", err=True)
+    sys.exit(1 if wrong and not fast else 0)
 
 
 def _row(key: str, value: float, claim: Claim | None) -> tuple[str, str, str]:

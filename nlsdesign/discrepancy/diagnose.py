@@ -3,13 +3,18 @@
 Each hypothesis is fitted to the same records in the same way; what decides is the share of a block's excess
 over the noise that an effect explains, on the fitted and on the held-out records. An effect that explains
 little is not added, however significant; if what remains is large, the verdict is ``unknown``.
+
+To understand why an effect was named, read on in ``selection/search.py``, what is tried and in which order,
+and in ``selection/criteria.py``, which decides.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal, Protocol
 
 from ..components import Assembly
 from ..components.assembly.deck_writer import write_deck
@@ -19,20 +24,31 @@ from ..identification.records.measurement import RecordSet
 from ..writing import write_text
 from .blocks.tearing import blocks_of
 from .effects import ALL, Effect
+from .fitting.unpredictable import Key
 from .reporting.advice import advice, more_excitation, where_they_differ
 from .reporting.gap import course_of, gaps_of, shapes_of
-from .reporting.refit import Refit, refit_text, sourced
+from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict
-from .screening.causality import late_forces
+from .screening.causality import lagging_forces
 from .screening.other_rig import other_numbers, out_of_reach
-from .screening.scale_check import suspicions_of, typical_sizes
+from .screening.scale_check import scale_findings, typical_sizes
 from .selection.comparison import Comparison
-from .selection.excess import DECLARED, Excess, excesses
+from .selection.criteria import DECLARED, Excess, Excesses
+from .selection.excess import excesses
 from .selection.hypothesis import Hypothesis
 from .selection.search import Outcome, Step, search
 
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
+"""So many of each are shown; a longer list is not read."""
+
+
+@dataclass(frozen=True)
+class _Decision:
+    """The verdict in one word, and what makes the records suspect in sentences."""
+
+    verdict: Literal["none", "named", "unknown", "data_suspect"]
+    findings: tuple[str, ...] = ()
 
 
 def _silent(text: str) -> None:
@@ -73,87 +89,96 @@ def diagnose(
     """
     progress("refitting the declared model")
     bench = Bench(records, blocks_of(actuator, records.signals))
+    records = bench.records
     comparison = Comparison(bench, typical_sizes(actuator, records))
     base = comparison.base(actuator)
-    findings = [*records.findings, *out_of_reach(actuator, records), *suspicions_of(comparison, base)]
-    late = late_forces(actuator, records)
-    if findings or (late.findings and not late.testable):
-        findings += late.findings
-        outcome = Outcome(base, (), (), False)
-        return _verdict(comparison, base, outcome, ("data_suspect", tuple(str(f) for f in findings)))
+    findings = [*records.findings, *out_of_reach(actuator, records), *scale_findings(comparison, base)]
+    lagging = lagging_forces(actuator, records)
+    if findings or (lagging.findings and not lagging.testable):
+        findings += lagging.findings
+        decision = _Decision("data_suspect", tuple(str(f) for f in findings))
+        return _verdict(comparison, base, Outcome(base), decision)
     outcome = search(comparison, base, catalogue, progress)
-    if late.findings and not any("delay" in step.chosen.added[-1].effect for step in outcome.steps):
-        told = tuple(str(f) for f in late.findings)
-        return _verdict(comparison, base, outcome, ("data_suspect", told))
-    word = _word(comparison, base, outcome)
-    other = other_numbers(comparison, base, outcome.last if word == "named" else base)
-    told = (other.words,) if other.words else ()
-    return _verdict(comparison, base, outcome, ("data_suspect" if other.decides else word, told))
+    if lagging.findings and not any(step.chosen.newest.explains_lag for step in outcome.steps):
+        decision = _Decision("data_suspect", tuple(str(f) for f in lagging.findings))
+    else:
+        decision = _decision(comparison, base, outcome)
+    return _verdict(comparison, base, outcome, decision)
 
 
-def _word(comparison: Comparison, base: Hypothesis, outcome: Outcome) -> str:
+def _decision(comparison: Comparison, base: Hypothesis, outcome: Outcome) -> _Decision:
+    """Return what is missing, unless other numbers of the rig explain the records better."""
+    verdict: Literal["none", "named", "unknown"]
     if not any(e.open for e in excesses(base, comparison.bench).values()):
-        return "none"
-    return "named" if outcome.steps and outcome.explained else "unknown"
+        verdict = "none"
+    else:
+        verdict = "named" if outcome.steps and outcome.explained else "unknown"
+    other = other_numbers(comparison, base, outcome.last if verdict == "named" else base)
+    return _Decision("data_suspect" if other.decides else verdict, (other.words,) if other.words else ())
 
 
-def _verdict(
-    comparison: Comparison, base: Hypothesis, outcome: Outcome, said: tuple[str, tuple[str, ...]]
-) -> Verdict:
-    word, findings = said
-    better = outcome.last if word == "named" else base
+def _verdict(comparison: Comparison, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Verdict:
+    verdict = decision.verdict
+    better = outcome.last if verdict == "named" else base
+    steps = outcome.steps if verdict == "named" else ()
     before, after = excesses(base, comparison.bench), excesses(better, comparison.bench)
-    blocks = [n for n in before if n != DECLARED]
-    worst = max(blocks, key=lambda n: sum(before[n].chi2) / max(sum(before[n].rows), 1))
-    steps = outcome.steps if word == "named" else ()
-    named = {step.effect for step in steps}
-    tried = [(c.effect, share) for c, share in outcome.ranking]
-    runners_up = [pair for pair in tried if pair[0] in named] + [
-        pair for pair in tried if pair[0] not in named
-    ]
-    unidentified = tuple(text for fit in better.fits.values() for text in fit.unidentified())
+    worst = _furthest([n for n in before if n != DECLARED], before)
+    unpredictable = [k for k in comparison.keys if k in better.unpredictable]
     return Verdict(
-        word,
+        verdict,
         tuple(_named(better, step, place) for place, step in enumerate(steps)),
         tuple(_where(before[n], after[n]) for n in before if n != DECLARED or before[n].open)
-        + tuple(_gone(key) for key in sorted(better.astray))
-        + findings,
+        + tuple(_not_predicted(key) for key in unpredictable)
+        + decision.findings,
         gaps_of(base, better, comparison),
         worst,
-        tuple(sorted(runners_up[:_RUNNERS_UP], key=lambda pair: -pair[1])),
+        _runners_up(outcome, steps),
         sourced(better),
         sourced(base),
         course_of(base, better, comparison, worst),
-        unidentified,
+        tuple(text for fit in better.fits.values() for text in fit.unidentified()),
         shapes_of(base, better, comparison, worst),
         tuple(better.fits.values()),
-        _remainder(comparison, better, after) if word in ("named", "unknown") else None,
+        _remainder(comparison, better, after) if verdict in ("named", "unknown") else None,
         _next_steps(comparison, steps, tuple(better.fits.values())),
+        outcome.skipped,
     )
 
 
-def _remainder(comparison: Comparison, better: Hypothesis, after: dict[str, Excess]) -> Remainder | None:
+def _furthest(names: Sequence[str], excesses: Excesses) -> str:
+    """Return the block that is furthest from its noise floor."""
+    return max(names, key=lambda name: excesses[name].mean_square)
+
+
+def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[str, float], ...]:
+    """Return what was tried first, with the share that it explains; what was named is always among it."""
+    named = {step.effect for step in steps}
+    tried = [(c.effect, share) for c, share in outcome.ranking]
+    first = sorted(tried, key=lambda pair: pair[0] not in named)[:_RUNNERS_UP]
+    return tuple(sorted(first, key=lambda pair: -pair[1]))
+
+
+def _remainder(comparison: Comparison, better: Hypothesis, after: Excesses) -> Remainder | None:
     """Return what is left in the block that is furthest from its noise floor, if any is open."""
     left = [n for n, e in after.items() if n != DECLARED and e.open]
     if not left:
         return None
-    worst = max(left, key=lambda n: sum(after[n].chi2) / max(sum(after[n].rows), 1))
-    bench = comparison.bench
-    mine = [j for j in comparison.judged(better) if j.block.name == worst]
-    return remainder_of(mine, bench.records, [s for s in bench.records.signals if bench.noise.rounded[s]])
+    worst, bench = _furthest(left, after), comparison.bench
+    judged = [j for j in comparison.judged(better) if j.block.name == worst]
+    return remainder_of(judged, bench.records, [s for s in bench.records.signals if bench.noise.rounded[s]])
 
 
 def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fit]) -> tuple[str, ...]:
     """Return what to measure to tell apart what these records cannot."""
-    found: list[str] = []
+    sentences: list[str] = []
     for step in steps:
-        mine = comparison.judged(step.chosen) if step.equals else ()
+        judged = comparison.judged(step.chosen) if step.equals else ()
         differ = {
-            h.added[-1].effect: where_they_differ(mine, comparison.judged(h))
+            h.newest.effect: where_they_differ(judged, comparison.judged(h))
             for h in step.equals[:_MOST_ALIASES]
         }
-        found += advice(step.effect, differ)
-    return (*found, *more_excitation(fits))
+        sentences += advice(step.effect, differ)
+    return (*sentences, *more_excitation(fits))
 
 
 def _where(before: Excess, after: Excess) -> str:
@@ -164,22 +189,22 @@ def _where(before: Excess, after: Excess) -> str:
         )
     ratio, later = before.held_out / before.floor, after.held_out / after.floor
     state = "open" if before.open else "closed"
-    told = f"{ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
-    return f"{before.block} ({state}): {told}"
+    times = f"{ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
+    return f"{before.block} ({state}): {times}"
 
 
-def _gone(key: tuple[str, str]) -> str:
+def _not_predicted(key: Key) -> str:
     block, record = key
     return (
-        f"{block}: record '{record}', the quickest, is not predicted: there a body that coasts between "
+        f"{block}: record '{record}', the quickest, is not predicted: there a body that flies freely between "
         "contacts may go another way. The effect is judged by the other records."
     )
 
 
 def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
-    mine = last.added[place]
-    own = {u.name for u in mine.unknowns}
+    candidate = last.added[place]
+    own = {u.name for u in candidate.unknowns}
     numbers = {
         p.name: (last.values[p.name], p.unit, fit.standard_error(p.name))
         for fit in last.fits.values()
@@ -187,15 +212,24 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         if p.name in own
     }
     return NamedEffect(
-        mine.effect,
-        mine.location,
+        candidate.effect,
+        candidate.location,
         numbers,
-        tuple(h.added[-1].effect for h in step.equals),
+        tuple(h.newest.effect for h in step.equals),
         step.share_fit,
         step.share_held_out,
-        mine.signature,
-        mine.source,
+        candidate.signature,
+        candidate.source,
     )
+
+
+class _Written(Protocol):
+    """What is written as a JSON file beside the deck it ends with."""
+
+    @property
+    def actuator(self) -> Assembly: ...
+
+    def to_dict(self, model: str) -> Mapping[str, Any]: ...
 
 
 def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
@@ -204,29 +238,29 @@ def write_verdict(verdict: Verdict, folder: Path) -> list[Path]:
     Parameters
     ----------
     verdict
-        As found.
+        Of a diagnosis.
     folder
         Is made where it does not exist.
     """
-    deck, file = folder / "model.toml", folder / "verdict.json"
-    folder.mkdir(parents=True, exist_ok=True)
-    write_deck(verdict.actuator, deck)
-    write_text(file, json.dumps(verdict.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
-    return [file, deck]
+    return _write(verdict, folder, "verdict.json")
 
 
-def write_refit(found: Refit, folder: Path) -> list[Path]:
+def write_refit(refit: Refit, folder: Path) -> list[Path]:
     """Write ``fit.json`` and the deck with the fitted numbers, ``model.toml``.
 
     Parameters
     ----------
-    found
-        As fitted.
+    refit
+        Of the declared numbers.
     folder
         Is made where it does not exist.
     """
-    deck, file = folder / "model.toml", folder / "fit.json"
+    return _write(refit, folder, "fit.json")
+
+
+def _write(result: _Written, folder: Path, name: str) -> list[Path]:
+    deck, file = folder / "model.toml", folder / name
     folder.mkdir(parents=True, exist_ok=True)
-    write_deck(found.actuator, deck)
-    write_text(file, refit_text(found, str(deck)))
+    write_deck(result.actuator, deck)
+    write_text(file, json.dumps(result.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
     return [file, deck]

@@ -15,6 +15,7 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
+from .structure import MovingBody, ReadingNames, SpringNames, Structure
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -142,6 +143,8 @@ class FlatModel:
         Looked-up numbers w; empty for a continuous model.
     switching
         Where the equations are not smooth; ``None`` if they are everywhere, or if nobody said.
+    bodies, springs, readings
+        What the model is made of: which variables belong together, in written order. Empty where nobody said.
     """
 
     name: str
@@ -155,6 +158,9 @@ class FlatModel:
     sample_time: float | None = None
     tables: tuple[Table, ...] = ()
     switching: Switching | None = None
+    bodies: tuple[MovingBody, ...] = ()
+    springs: tuple[SpringNames, ...] = ()
+    readings: tuple[ReadingNames, ...] = ()
 
     def symbols(self) -> Symbols:
         """Return fresh symbols and the expressions in them."""
@@ -178,6 +184,24 @@ class FlatModel:
             For instance ``model.states``.
         """
         return np.array([v.start for v in of], dtype=float)
+
+    @property
+    def structure(self) -> Structure:
+        """Bodies, springs and readings together."""
+        return Structure(self.bodies, self.springs, self.readings)
+
+    def with_structure(self, structure: Structure) -> FlatModel:
+        """Return a copy made of other bodies, springs and readings; what has no variables here is left out.
+
+        Parameters
+        ----------
+        structure
+            Of this model or of one that it came from.
+        """
+        groups = (self.states, self.inputs, self.outputs, self.signals)
+        names = {v.name for group in groups for v in group}
+        kept = structure.within(names, {v.name for v in self.inputs})
+        return replace(self, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
 
     def variable(self, name: str) -> Variable:
         """Return the variable of that name.
@@ -261,8 +285,8 @@ class FlatModel:
         """
         at = {v.name: float(state[i]) for i, v in enumerate(self.states)}
         at |= {v.name: float(inputs[i]) for i, v in enumerate(self.inputs)}
-        found = [table.look_up(at[table.argument]) for table in self.tables]
-        return np.concatenate(found) if found else np.zeros(0)
+        columns = [table.look_up(at[table.argument]) for table in self.tables]
+        return np.concatenate(columns) if columns else np.zeros(0)
 
     def symbolic_equations(self) -> Equations:
         """Return the equations as SymPy expressions, which print, and give LaTeX by ``latex()``.

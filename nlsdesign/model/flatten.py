@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 
@@ -18,10 +19,11 @@ from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor
 from ..errors import ArrangementError, UnitError, nearest, unknown_name
 from ..symbolic import Expression, depends
-from .equation_builder import Ledger, PartScope
+from .equation_builder import EquationBuilder, PartScope
 from .flat import FlatModel, Variable
 from .gear_train import balance_train, train_motions, trains
 from .stiction import Laws, natural_modes, switch_laws, switching
+from .structure import Owners, moving_bodies, readings_of, springs_of
 
 
 def flatten(
@@ -54,20 +56,20 @@ def flatten(
     >>> [v.name for v in flatten(swing).states]
     ['wheel.angle', 'wheel.speed']
     """
-    ledger = Ledger(assembly)
-    _write_mechanics(assembly, ledger)
-    _write_sensors(assembly, ledger)
-    return _model(assembly, ledger, inputs, outputs)
+    builder = EquationBuilder(assembly)
+    _write_mechanics(assembly, builder)
+    _write_sensors(assembly, builder)
+    return _model(assembly, builder, inputs, outputs)
 
 
-def _write_mechanics(assembly: Assembly, ledger: Ledger) -> None:
+def _write_mechanics(assembly: Assembly, builder: EquationBuilder) -> None:
     bodies = {name: part for name, part in assembly.parts if isinstance(part, Body)}
-    scopes = {name: PartScope(ledger, name) for name, _ in assembly.parts}
+    scopes = {name: PartScope(builder, name) for name, _ in assembly.parts}
     geared = trains(assembly)
     followers = {w.name for lead, train in geared.items() for w in train.wheels() if w.name != lead}
     motions = {name: b.motion(scopes[name]) for name, b in bodies.items() if name not in followers}
     turning = {lead: train_motions(train, scopes, motions[lead]) for lead, train in geared.items()}
-    motions |= {name: motion for found in turning.values() for name, (motion, _) in found.items()}
+    motions |= {name: motion for train in turning.values() for name, (motion, _) in train.items()}
     sums = {name: ca.SX(0) for name in bodies}
     rest = Motion(ca.SX(0), ca.SX(0))
     for name, part in assembly.parts:
@@ -84,30 +86,30 @@ def _write_mechanics(assembly: Assembly, ledger: Ledger) -> None:
             turned.balance(scopes[name], motions[name], sums[name])
 
 
-def _write_sensors(assembly: Assembly, ledger: Ledger) -> None:
+def _write_sensors(assembly: Assembly, builder: EquationBuilder) -> None:
     for name, part in assembly.sensors().items():
-        known = ledger.named()
+        known = builder.named()
         if part.of not in known:
             raise unknown_name(f"sensor '{name}' reads", part.of, known)
-        unit = _variable_of(ledger, part.of).unit
+        unit = _variable_of(builder, part.of).unit
         if not part.sees(unit):
-            fitting = [n for n in known if part.sees(_variable_of(ledger, n).unit)]
+            fitting = [n for n in known if part.sees(_variable_of(builder, n).unit)]
             raise UnitError(
                 f"sensor '{name}' of '{part.of}'",
                 f"{type(part).__name__} reads {' or '.join(part.units)}, '{part.of}' is in {unit}",
                 did_you_mean=nearest(part.of, fitting),
                 next_step=f"read one of: {', '.join(fitting) or 'nothing here has such a unit'}",
             )
-        reading = part.read(PartScope(ledger, name), known[part.of], unit)
+        reading = part.read(PartScope(builder, name), known[part.of], unit)
         about = f"reading of {name}, which sees {part.of}"
-        PartScope(ledger, name).signal("reading", reading, part.reading_unit(unit), about)
+        PartScope(builder, name).signal("reading", reading, part.reading_unit(unit), about)
 
 
-def _variable_of(ledger: Ledger, name: str) -> Variable:
-    for group in (ledger.states, ledger.inputs, ledger.signals):
+def _variable_of(builder: EquationBuilder, name: str) -> Variable:
+    for group in (builder.states, builder.inputs, builder.signals):
         if name in group:
             return group[name][0]
-    raise unknown_name("signal", name, ledger.named())
+    raise unknown_name("signal", name, builder.named())
 
 
 def _default_outputs(assembly: Assembly) -> list[str]:
@@ -128,51 +130,52 @@ def _chosen(
 
 
 def _needed_states(
-    ledger: Ledger, derivatives: Mapping[str, Expression], roots: Iterable[Expression]
+    builder: EquationBuilder, derivatives: Mapping[str, Expression], roots: Iterable[Expression]
 ) -> list[str]:
     """Drop states that nothing depends on, such as the place of a dashpot between dashpots."""
     wanted = list(roots)
     needed: set[str] = set()
     while wanted:
         expression = wanted.pop()
-        for name, (_, symbol) in ledger.states.items():
+        for name, (_, symbol) in builder.states.items():
             if name not in needed and depends(expression, symbol):
                 needed.add(name)
                 wanted.append(derivatives[name])
-    return [name for name in ledger.in_order(ledger.states) if name in needed]
+    return [name for name in builder.in_order(builder.states) if name in needed]
 
 
 def _model(
-    assembly: Assembly, ledger: Ledger, inputs: Sequence[str] | None, outputs: Sequence[str] | None
+    assembly: Assembly, builder: EquationBuilder, inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> FlatModel:
-    open_states = [name for name in ledger.states if name not in ledger.derivatives]
+    open_states = [name for name in builder.states if name not in builder.derivatives]
     if open_states:
         raise ArrangementError(open_states[0], "no equation gives its derivative")
-    laws = switch_laws(ledger)
-    kept = _chosen("input", inputs, ledger.inputs, ledger.in_order(ledger.inputs))
-    known = ledger.named()
-    given = _chosen("output", outputs, known, _default_outputs(assembly))
-    ledger.signals = {name: ledger.signals[name] for name in ledger.in_order(ledger.signals)}
-    derivatives, signals, results, checks, laws = _finished(ledger, laws, kept, given)
-    moving = [ledger.states[n][1] for n in ledger.states if isinstance(assembly[n.rpartition(".")[0]], Body)]
-    states = _needed_states(ledger, derivatives, [*signals, *results, *moving, *laws.lasts])
+    laws = switch_laws(builder)
+    kept = _chosen("input", inputs, builder.inputs, builder.in_order(builder.inputs))
+    given = _chosen("output", outputs, builder.named(), _default_outputs(assembly))
+    builder.signals = {name: builder.signals[name] for name in builder.in_order(builder.signals)}
+    solved = _solved(builder, laws, kept, given)
+    laws = solved.laws
+    moving = [s for n, (_, s) in builder.states.items() if isinstance(assembly[builder.owners[n]], Body)]
+    roots = [*solved.signals, *solved.outputs, *moving, *laws.lasts]
+    states = _needed_states(builder, solved.derivatives, roots)
     columns = [
         ca.SX.sym("time"),
-        ca.vertcat(*[ledger.states[n][1] for n in states]),
-        ca.vertcat(*[ledger.inputs[n][1] for n in kept]),
-        ca.vertcat(*[e for _, e in ledger.parameters.values()]),
+        ca.vertcat(*[builder.states[n][1] for n in states]),
+        ca.vertcat(*[builder.inputs[n][1] for n in kept]),
+        ca.vertcat(*[e for _, e in builder.parameters.values()]),
         ca.SX.sym("w", 0),
     ]
-    rows = [[derivatives[n] for n in states], results, signals, checks]
+    rows = [[solved.derivatives[n] for n in states], solved.outputs, solved.signals, solved.checks]
     switches = switching(laws, columns, rows[0], states) if laws.switches else None
     rows = _natural(laws, rows)
     equations = ca.Function(
         "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
     )  # fmt: skip
-    _check_unique(ledger)
-    values = [v.start for v, _ in ledger.parameters.values()]
-    named = [*(f"der({n})" for n in states), *given, *ledger.signals, *ledger.checks]
+    _check_unique(builder)
+    values = [v.start for v, _ in builder.parameters.values()]
+    named = [*(f"der({n})" for n in states), *given, *builder.signals, *builder.checks]
     broken = [n for n, v in zip(named, _probe(equations, values), strict=True) if not math.isfinite(v)]
     if broken:
         raise ArrangementError(
@@ -180,40 +183,58 @@ def _model(
             f"the equations are singular: {broken[0]} has no finite value",
             next_step="look there for springs or dashpots of zero stiffness in series",
         )
-    return FlatModel(
-        assembly.name, assembly.description,
-        tuple(ledger.states[n][0] for n in states), tuple(ledger.inputs[n][0] for n in kept),
-        tuple(v for v, _ in ledger.parameters.values()), tuple(_variable_of(ledger, n) for n in given),
-        tuple(v for v, _ in ledger.signals.values()), equations, switching=switches,
+    owners = Owners(
+        builder.owned(builder.parameters), builder.owned(states), builder.owned(kept),
+        builder.owned(builder.signals),
     )  # fmt: skip
+    return FlatModel(
+        name=assembly.name,
+        description=assembly.description,
+        states=tuple(builder.states[n][0] for n in states),
+        inputs=tuple(builder.inputs[n][0] for n in kept),
+        parameters=tuple(v for v, _ in builder.parameters.values()),
+        outputs=tuple(_variable_of(builder, n) for n in given),
+        signals=tuple(v for v, _ in builder.signals.values()),
+        equations=equations,
+        switching=switches,
+        bodies=moving_bodies(assembly, owners),
+        springs=springs_of(assembly, owners),
+        readings=readings_of(assembly),
+    )
 
 
-def _finished(
-    ledger: Ledger, laws: Laws, inputs: Sequence[str], outputs: Sequence[str]
-) -> tuple[dict[str, Expression], list[Expression], list[Expression], list[Expression], Laws]:
-    """Return derivatives, signals, outputs, checks, switches: unknowns solved, unused inputs at zero.
+@dataclass(frozen=True)
+class _Solved:
+    """The equations with all unknowns solved and unused inputs at zero."""
 
-    All are substituted together, so that they go on sharing their common parts.
-    """
-    known = ledger.named()
+    derivatives: dict[str, Expression]
+    signals: list[Expression]
+    outputs: list[Expression]
+    checks: list[Expression]
+    laws: Laws
+
+
+def _solved(builder: EquationBuilder, laws: Laws, inputs: Sequence[str], outputs: Sequence[str]) -> _Solved:
+    """Solve for all unknowns; all are substituted together, so that they go on sharing their common parts."""
+    known = builder.named()
     groups = [
-        list(ledger.derivatives.values()),
-        [e for _, e in ledger.signals.values()],
+        list(builder.derivatives.values()),
+        [e for _, e in builder.signals.values()],
         [known[name] for name in outputs],
-        list(ledger.checks.values()),
+        list(builder.checks.values()),
         *laws.columns(),
     ]
-    everything = ledger.cleaned(ca.vertcat(*[e for group in groups for e in group]))
-    rest = ca.vertcat(*[e for n, (_, e) in ledger.inputs.items() if n not in inputs])
+    everything = builder.cleaned(ca.vertcat(*[e for group in groups for e in group]))
+    rest = ca.vertcat(*[e for n, (_, e) in builder.inputs.items() if n not in inputs])
     everything = ca.cse(ca.SX(ca.substitute(everything, rest, ca.SX.zeros(rest.shape))))
-    done = iter(ca.vertsplit(everything))
-    split = [[next(done) for _ in group] for group in groups]
-    return (
-        dict(zip(ledger.derivatives, split[0], strict=True)),
-        split[1],
-        split[2],
-        split[3],
-        laws.with_columns(split[4:]),
+    items = iter(ca.vertsplit(everything))
+    derivatives, signals, results, checks, *of_laws = [[next(items) for _ in group] for group in groups]
+    return _Solved(
+        dict(zip(builder.derivatives, derivatives, strict=True)),
+        signals,
+        results,
+        checks,
+        laws.with_columns(of_laws),
     )
 
 
@@ -223,13 +244,13 @@ def _natural(laws: Laws, rows: list[list[Expression]]) -> list[list[Expression]]
         return rows
     everything = ca.vertcat(*[e for row in rows for e in row])
     everything = ca.cse(ca.SX(ca.substitute(everything, ca.vertcat(*laws.modes), natural_modes(laws))))
-    done = iter(ca.vertsplit(everything))
-    return [[next(done) for _ in row] for row in rows]
+    items = iter(ca.vertsplit(everything))
+    return [[next(items) for _ in row] for row in rows]
 
 
-def _check_unique(ledger: Ledger) -> None:
+def _check_unique(builder: EquationBuilder) -> None:
     seen: set[str] = set()
-    for group in (ledger.states, ledger.inputs, ledger.parameters, ledger.signals):
+    for group in (builder.states, builder.inputs, builder.parameters, builder.signals):
         for name in group:
             if name in seen:
                 raise ArrangementError(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
-import control
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, ValueRangeError, unknown_name
 from .flat import FlatModel
+
+if TYPE_CHECKING:
+    import control
 
 Matrix = NDArray[np.float64]
 
@@ -33,6 +35,8 @@ class LinearModel(NamedTuple):
 
     def to_control(self) -> control.StateSpace:
         """Return the model as ``control.StateSpace`` with the same names."""
+        import control
+
         step = 0 if self.sample_time is None else self.sample_time
         return control.StateSpace(
             self.A, self.B, self.C, self.D, step,

@@ -16,7 +16,7 @@ import numpy as np
 from ..components.core.switches import Hold
 from ..errors import ArrangementError
 from ..symbolic import Expression, depends
-from .equation_builder import Ledger
+from .equation_builder import EquationBuilder
 from .switching import Switch, Switching
 
 _SMOOTH = "take the smooth form of the law: smoothed(assembly)"
@@ -24,7 +24,7 @@ _SMOOTH = "take the smooth form of the law: smoothed(assembly)"
 
 @dataclass(frozen=True)
 class Laws:
-    """What the switches of a ledger say, in the symbols of the model and of the modes.
+    """What the switches of a builder say, in the symbols of the model and of the modes.
 
     ``reach`` holds one row of holding efforts for each state by name.
     """
@@ -51,12 +51,12 @@ class Laws:
         return Laws(self.switches, self.modes, lasts, first, stays, leads, rates, rebounds, reach)
 
 
-def switch_laws(ledger: Ledger) -> Laws:
-    """Solve for all holding efforts, note them in the ledger and return what the switches say.
+def switch_laws(builder: EquationBuilder) -> Laws:
+    """Solve for all holding efforts, note them in the builder and return what the switches say.
 
     Parameters
     ----------
-    ledger
+    builder
         With everything that the parts have said.
 
     Raises
@@ -64,14 +64,14 @@ def switch_laws(ledger: Ledger) -> Laws:
     ArrangementError
         If a rate that is to be held has no inertia, or two efforts hold the same one.
     """
-    holds = _merged(ledger)
-    reach = _solved(ledger, holds) if holds else {name: () for name in ledger.derivatives}
-    others = (*ledger.sides, *ledger.corners)
-    corner_modes = [ca.SX.sym(f"{c.name}.mode") for c in ledger.corners]
-    modes = (*(h.mode for h in holds), *(s.mode for s in ledger.sides), *corner_modes)
+    holds = _merged(builder)
+    reach = _solved(builder, holds) if holds else {name: () for name in builder.derivatives}
+    others = (*builder.sides, *builder.corners)
+    corner_modes = [ca.SX.sym(f"{c.name}.mode") for c in builder.corners]
+    modes = (*(h.mode for h in holds), *(s.mode for s in builder.sides), *corner_modes)
     none = tuple(ca.SX(0) for _ in others)
     switches = [Switch(h.name, h.words, True) for h in holds]
-    switches += [Switch(s.name, ((1, s.above), (-1, s.below)), s in ledger.sides) for s in others]
+    switches += [Switch(s.name, ((1, s.above), (-1, s.below)), s in builder.sides) for s in others]
     lasts = [ca.if_else(h.mode == 0, h.stays, h.lands) for h in holds]
     lasts += [m * s.value for m, s in zip(modes[len(holds) :], others, strict=True)]
     first = [*(h.first for h in holds), *(ca.if_else(s.value >= 0, 1, -1) for s in others)]
@@ -83,11 +83,11 @@ def switch_laws(ledger: Ledger) -> Laws:
     )  # fmt: skip
 
 
-def _merged(ledger: Ledger) -> list[Hold]:
+def _merged(builder: EquationBuilder) -> list[Hold]:
     """Return the holds with those of dry friction on the same rate made one; each gets its share."""
     found: list[Hold] = []
-    for hold in ledger.holds:
-        rate = ledger.cleaned(hold.rate)
+    for hold in builder.holds:
+        rate = builder.cleaned(hold.rate)
         same = [i for i, h in enumerate(found) if ca.is_equal(ca.simplify(h.rate - rate), ca.SX(0), 2)]
         if not same or hold.level is None or found[same[0]].level is None:
             found.append(replace(hold, rate=rate))
@@ -99,10 +99,10 @@ def _merged(ledger: Ledger) -> list[Hold]:
         level = before + more
         share = ca.if_else(level > 0, before / ca.if_else(level > 0, level, 1), 0)
         own = ca.if_else(first.mode == 0, whole * share, first.moving)
-        ledger.define(first.effort, own)
+        builder.define(first.effort, own)
         # So the sum is that of both whether they stick or not.
-        ledger.define(hold.effort, whole - own)
-        ledger.define(hold.mode, first.mode)
+        builder.define(hold.effort, whole - own)
+        builder.define(hold.mode, first.mode)
         found[same[0]] = replace(
             first, name=f"{first.name}+{hold.name}", effort=whole, moving=first.moving + moving,
             stays=level - ca.fabs(whole), leads=ca.if_else(whole >= 0, 1, -1), level=level,
@@ -110,15 +110,15 @@ def _merged(ledger: Ledger) -> list[Hold]:
     return found
 
 
-def _solved(ledger: Ledger, holds: Sequence[Hold]) -> dict[str, list[Expression]]:
+def _solved(builder: EquationBuilder, holds: Sequence[Hold]) -> dict[str, list[Expression]]:
     efforts = ca.vertcat(*[h.effort for h in holds])
-    cleaned = ca.vertsplit(ledger.cleaned(ca.vertcat(*ledger.derivatives.values())))
-    rates = dict(zip(ledger.derivatives, cleaned, strict=True))
+    cleaned = ca.vertsplit(builder.cleaned(ca.vertcat(*builder.derivatives.values())))
+    rates = dict(zip(builder.derivatives, cleaned, strict=True))
     for hold in holds:
-        _check_rate(ledger, hold)
-    accelerations = ca.vertcat(*[_acceleration(ledger, h.rate, rates) for h in holds])
+        _check_rate(builder, hold)
+    accelerations = ca.vertcat(*[_acceleration(builder, h.rate, rates) for h in holds])
     matrix = ca.jacobian(accelerations, efforts)
-    moving = ledger.cleaned(ca.vertcat(*[h.moving for h in holds]))
+    moving = builder.cleaned(ca.vertcat(*[h.moving for h in holds]))
     _check_linear(holds, matrix, moving, efforts)
     free = ca.substitute(accelerations, efforts, ca.SX.zeros(efforts.shape))
     unit = ca.SX.eye(len(holds))
@@ -128,9 +128,9 @@ def _solved(ledger: Ledger, holds: Sequence[Hold]) -> dict[str, list[Expression]
     right = [ca.if_else(h.mode == 0, -free[i], moving[i]) for i, h in enumerate(holds)]
     found = right[0] / rows[0] if len(holds) == 1 else _eliminated(rows, right)
     for hold, solution in zip(holds, ca.vertsplit(found), strict=True):
-        ledger.define(hold.effort, solution)
+        builder.define(hold.effort, solution)
     for hold in holds:
-        _hold_exactly(ledger, hold, rates)
+        _hold_exactly(builder, hold, rates)
     return {name: ca.horzsplit(ca.densify(ca.jacobian(rate, efforts))) for name, rate in rates.items()}
 
 
@@ -148,13 +148,13 @@ def _eliminated(rows: list[Expression], right: list[Expression]) -> Expression:
     return ca.vertcat(*[found[i] for i in range(count)])
 
 
-def _check_rate(ledger: Ledger, hold: Hold) -> None:
+def _check_rate(builder: EquationBuilder, hold: Hold) -> None:
     known = {
         e.element_hash()
-        for group in (ledger.states, ledger.inputs, ledger.parameters)
+        for group in (builder.states, builder.inputs, builder.parameters)
         for _, e in group.values()
     }
-    known |= {s.mode.element_hash() for s in ledger.sides}
+    known |= {s.mode.element_hash() for s in builder.sides}
     inside = [s.element_hash() for s in ca.symvar(hold.rate)]
     if not inside or not known.issuperset(inside):
         raise ArrangementError(
@@ -163,15 +163,15 @@ def _check_rate(ledger: Ledger, hold: Hold) -> None:
         )  # fmt: skip
 
 
-def _acceleration(ledger: Ledger, rate: Expression, rates: Mapping[str, Expression]) -> Expression:
+def _acceleration(builder: EquationBuilder, rate: Expression, rates: Mapping[str, Expression]) -> Expression:
     """Return the time derivative of a rate; what moves a driven body gets its acceleration as an input."""
     found = ca.SX(0)
-    for name, (_, state) in ledger.states.items():
+    for name, (_, state) in builder.states.items():
         if depends(rate, state):
             found += ca.jacobian(rate, state) * rates[name]
-    for name, (variable, symbol) in list(ledger.inputs.items()):
+    for name, (variable, symbol) in list(builder.inputs.items()):
         if depends(rate, symbol):
-            found += ca.jacobian(rate, symbol) * ledger.rate_of_input(name, variable)
+            found += ca.jacobian(rate, symbol) * builder.rate_of_input(name, variable)
     return found
 
 
@@ -205,15 +205,15 @@ def _check_linear(holds: Sequence[Hold], matrix: Expression, moving: Expression,
         )  # fmt: skip
 
 
-def _hold_exactly(ledger: Ledger, hold: Hold, rates: Mapping[str, Expression]) -> None:
+def _hold_exactly(builder: EquationBuilder, hold: Hold, rates: Mapping[str, Expression]) -> None:
     """While held, let the first state in the rate follow the others, so that no rounding moves it."""
-    inside = [n for n, (_, s) in ledger.states.items() if depends(hold.rate, s)]
-    slopes = {n: ca.jacobian(hold.rate, ledger.states[n][1]) for n in inside}
+    inside = [n for n, (_, s) in builder.states.items() if depends(hold.rate, s)]
+    slopes = {n: ca.jacobian(hold.rate, builder.states[n][1]) for n in inside}
     if not inside or any(ca.symvar(slope) for slope in slopes.values()):
         return
     first = inside[0]
-    rest = _acceleration(ledger, hold.rate, dict(ledger.derivatives) | {first: ca.SX(0)})
-    ledger.derivatives[first] = ca.if_else(hold.mode == 0, -rest / slopes[first], ledger.derivatives[first])
+    rest = _acceleration(builder, hold.rate, dict(builder.derivatives) | {first: ca.SX(0)})
+    builder.derivatives[first] = ca.if_else(hold.mode == 0, -rest / slopes[first], builder.derivatives[first])
 
 
 def natural_modes(laws: Laws) -> Expression:

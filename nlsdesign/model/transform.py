@@ -143,7 +143,8 @@ def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
     )  # fmt: skip
     states = tuple(variable if i == place else v for i, v in enumerate(model.states))
     signals = (*(model.signals[i] for i in kept), replace(model.states[place], start=0.0))
-    return _rebuilt(model, changed, states=states, signals=signals)
+    structure = model.structure.with_state(old, signal)
+    return _rebuilt(model.with_structure(structure), changed, states=states, signals=signals)
 
 
 def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatModel:
@@ -254,7 +255,7 @@ def _rebuilt(
         [shared[a:b] for a, b in pairwise(ends)],
         ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
     )  # fmt: skip
-    return replace(
+    changed = replace(
         model,
         equations=equations,
         # Corners may be forgotten: the equations say them too.
@@ -264,6 +265,7 @@ def _rebuilt(
         outputs=model.outputs if outputs is None else outputs,
         signals=model.signals if signals is None else signals,
     )
+    return changed.with_structure(changed.structure)
 
 
 def _column(items: Iterable[Expression]) -> Expression:

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..errors import unknown_name
 from .html import Html
-from .mathml import formula
 from .sections import PagePosition, Section
 
 OUTCOMES = {
@@ -113,6 +112,8 @@ def typeset(expression: Any) -> Html:
     >>> typeset(sympy.Symbol("F_M"))
     "<math displaystyle='true'><mrow><msub><mi>F</mi><mi>M</mi></msub></mrow></math>"
     """
+    from .mathml import formula  # here, because it loads SymPy
+
     rate = r"<mfrac><mrow><mi>d</mi><mi>\1</mi></mrow><mrow><mi>d</mi><mi>\2</mi></mrow></mfrac>"
     text = _RATE.sub(rate, formula(expression))
     text = _STAR.sub(r"<msup><mi>\1</mi><mo>*</mo></msup>", text)

@@ -58,6 +58,10 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
             )
         )  # fmt: skip
     parts += _shape_figures(verdict)
+    if verdict.skipped:
+        skipped = tuple((s.effect, s.location, " and ".join(s.beside), s.reason) for s in verdict.skipped)
+        heads = ("effect", "location", "beside", "reason")
+        parts.append(TableSection("What could not be compared", heads, skipped))
     if verdict.next_steps:
         rows = tuple((text,) for text in verdict.next_steps)
         parts.append(TableSection("What to measure next", ("experiment",), rows))

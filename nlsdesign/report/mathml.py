@@ -7,17 +7,15 @@ several letters, and a long sum is a row of formulas, so that its lines wrap.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from html import escape
-from typing import Any, ClassVar
+from typing import Any
 
 import sympy
 from sympy.core.function import AppliedUndef
 
 from ..model.equations import Equations
 from .html import Html
-from .sections import PagePosition, Section
 
 _INDEXED = re.compile(r"^(?P<name>.+)\[(?P<index>\d+)\]$")
 _RELATIONS = {"==": "=", "!=": "≠", "<=": "≤", ">=": "≥"}
@@ -25,28 +23,17 @@ _FUNCTIONS = {"Max": "max", "Min": "min", "log": "ln", "sign": "sgn"}
 _FENCES = {"Abs": ("|", "|"), "floor": ("⌊", "⌋"), "ceiling": ("⌈", "⌉")}
 
 
-@dataclass(frozen=True, eq=False)
-class EquationsSection(Section):
-    """The equations of a flat model.
+def equation_rows(equations: Equations) -> tuple[list[list[Html]], list[list[Html]]]:
+    """Return the derivatives (or next states) and the definitions, each in pieces between which it may break.
 
     Parameters
     ----------
     equations
-        From :func:`nlsdesign.model.equations.equations`.
-    caption
-        What they describe.
+        Of a flat model.
     """
-
-    equations: Equations
-    caption: str = ""
-    template: ClassVar[str] = "equations.html"
-
-    def content(self, place: PagePosition) -> Mapping[str, Any]:
-        """Return the rows of the derivatives and of the definitions."""
-        left = _next if self.equations.discrete else _derivative
-        states = [_row(left(name), e) for name, e in self.equations.derivatives.items()]
-        signals = [_row(_name(name), e) for name, e in self.equations.definitions.items()]
-        return {"states": states, "signals": signals, "caption": self.caption}
+    left = _next if equations.discrete else _derivative
+    states = [_row(left(name), e) for name, e in equations.derivatives.items()]
+    return states, [_row(_name(name), e) for name, e in equations.definitions.items()]
 
 
 def formula(expression: Any) -> Html:

@@ -3,8 +3,8 @@
 Between events the modes of all switches are constant, so each step has smooth equations. For each switch the
 model gives an event function that is not negative while its mode lasts; it is evaluated in the middle and at
 the end of each step. Where one is negative, the step is repeated with shorter lengths until the time of the
-event is known. Source: Shampine and Thompson 2000, Event location for ordinary differential equations;
-for the laws that hold a rate, Pfeiffer and Glocker 1996, Multibody Dynamics with Unilateral Contacts.
+event is known.
+Source: Shampine and Thompson 2000; Pfeiffer and Glocker 1996 (laws that hold a rate).
 """
 
 from __future__ import annotations
@@ -155,6 +155,11 @@ class Modes:
         With switches.
     span
         Simulated time in s.
+
+    Raises
+    ------
+    ValueError
+        If the model has no switches.
     """
 
     def __init__(self, model: FlatModel, span: float) -> None:

@@ -1,6 +1,6 @@
 """Implicit integration for stiff models: CVODES, restarted at every sample.
 
-Source: Hindmarsh et al. 2005, SUNDIALS, through CasADi.
+Source: Hindmarsh et al. 2005 (SUNDIALS), through CasADi.
 """
 
 from __future__ import annotations

@@ -104,6 +104,11 @@ class Trace:
         Signals that left the stated range of their law.
     events
         Changes of mode, in order of time.
+
+    Raises
+    ------
+    MeasurementError
+        If a signal has another number of samples than time.
     """
 
     time: Array

@@ -13,7 +13,7 @@ from nlsdesign.components import Assembly, DrivenPoint, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import diagnose
-from nlsdesign.discrepancy.screening.causality import late_forces
+from nlsdesign.discrepancy.screening.causality import lagging_forces
 from nlsdesign.identification import RecordSet, load_records
 from nlsdesign.identification.statistics.loop_work import loop_of
 from nlsdesign.model import flatten
@@ -71,7 +71,7 @@ def test_the_points_of_fig_6_are_suspect_and_the_reason_is_said(tmp_path: Path) 
 
 
 def test_the_same_points_drawn_the_other_way_are_not_suspect(tmp_path: Path) -> None:
-    found = late_forces(element(), written(tmp_path, order=-1))
+    found = lagging_forces(element(), written(tmp_path, order=-1))
     assert found.findings == ()
 
 

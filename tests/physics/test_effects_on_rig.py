@@ -15,7 +15,8 @@ from nlsdesign.discrepancy.effects import ALL
 from nlsdesign.discrepancy.effects.friction import backlash
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.excess import excesses, total_excess
+from nlsdesign.discrepancy.selection.criteria import total_excess
+from nlsdesign.discrepancy.selection.excess import excesses
 from nlsdesign.identification import load_records
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten

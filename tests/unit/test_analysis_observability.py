@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from nlsdesign.analysis import EstimateDeviation, Observability, Point, over_angle
+from nlsdesign.analysis import EstimateDeviation, Observability, RestPoint, over_angle
 from nlsdesign.analysis.kalman import discrete_noise, steady_state_kalman
 from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, tie
 from nlsdesign.components.assembly.named_parts import assembly
@@ -67,7 +67,7 @@ def test_a_mixed_direction_is_written_out() -> None:
         "spring": tie(TorsionSpring(stiffness=STIFF), "motor", "load"),
     }
     model = flatten(assembly("pair", **parts), outputs=["spring.angle", "motor.angle"])
-    point = Point(model, "motor.angle", np.zeros(4), linearise(model, np.zeros(4)), {})
+    point = RestPoint(model, "motor.angle", np.zeros(4), linearise(model, np.zeros(4)), {})
     numbers, words = Observability(measured=("spring.angle",)).at(point)
     assert numbers[0] == 2
     assert {"+0.71 motor.angle +0.71 load.angle", "+0.71 load.angle +0.71 motor.angle"} & {

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.analysis import Chart, Point, Stability, View, over_angle
+from nlsdesign.analysis import Chart, RestPoint, Stability, View, over_angle
 from nlsdesign.analysis.rest import rate_state, rest_states, typical_sizes
 from nlsdesign.components import Dashpot, Mass, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
@@ -26,7 +26,7 @@ class Torque(View):
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
         return (Variable("torque", "N*m", "torque at rest"),)
 
-    def at(self, point: Point) -> tuple[tuple[float, ...], dict[str, str]]:
+    def at(self, point: RestPoint) -> tuple[tuple[float, ...], dict[str, str]]:
         torque = point.model.evaluate(list(point.state))["spring.torque"]
         return (torque,), {"sign": "pulls" if torque > 0.0 else "pushes or rests"}
 

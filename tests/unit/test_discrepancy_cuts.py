@@ -57,7 +57,7 @@ def test_both_blocks_vanish_on_records_of_the_model_itself(rig: Assembly, change
     record = simulated(edited)
     sizes = {"spring": np.max(record.trace["force_sensor.reading"]), "motor": 0.755 * 3.0}
     for block in blocks_of(edited, SIGNALS):
-        driven = DrivenBlock(block, [])
+        driven = DrivenBlock(block, [], records=[record])
         output = driven.respond(driven.samples(record, {}), {}).output
         error = (record.trace[block.target] if block.target else 0.0) - output
         seen = smoothing(len(TIME), block.width, 5) @ error
@@ -77,7 +77,7 @@ def test_a_chain_of_sensors_is_read_back_to_what_its_first_one_sees(rig: Assembl
     assert {d.late_by for d in motor.drives.values()} == {None, "bus.delay"}
     sizes = {"spring": np.max(record.trace["bus.reading"]), "motor": 0.755 * 3.0}
     for block in (spring, motor):
-        driven = DrivenBlock(block, [])
+        driven = DrivenBlock(block, [], records=[record])
         output = driven.respond(driven.samples(record, {}), {}).output
         error = (record.trace[block.target] if block.target else 0.0) - output
         seen = smoothing(len(TIME), block.width, 5) @ error
@@ -107,7 +107,7 @@ def test_the_balance_of_a_geared_train_is_in_torque_at_its_leading_body(rig: Ass
     record = simulated(declared.with_values({"drum.inertia": 5e-3}))
     assert flatten(declared).evaluate([0.0] * 3)["drum.train_inertia"] == pytest.approx(4e-3 + 625 * 2e-5)
     (motor,) = (b for b in blocks_of(declared, SIGNALS) if b.target is None)
-    driven = DrivenBlock(motor, [])
+    driven = DrivenBlock(motor, [], records=[record])
     output = driven.respond(driven.samples(record, {}), {}).output
     seen = smoothing(len(TIME), motor.width, 5) @ output
     assert motor.name == "drum"
@@ -127,7 +127,7 @@ def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
     record = simulated(rig.with_values({"motor.inertia": 0.012}))
     found = {}
     for block in blocks_of(rig, SIGNALS):
-        driven = DrivenBlock(block, [])
+        driven = DrivenBlock(block, [], records=[record])
         output = driven.respond(driven.samples(record, {}), {}).output
         error = (record.trace[block.target] if block.target else 0.0) - output
         found[block.name] = float(np.std(smoothing(len(TIME), block.width, 5) @ error))

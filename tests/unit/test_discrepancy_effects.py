@@ -239,7 +239,7 @@ def test_a_drifting_cell_is_read_without_its_drift(rig: Assembly) -> None:
 def test_a_second_effect_keeps_the_numbers_of_the_first(first: Effect, rig: Assembly) -> None:
     """Whatever is added next, an effect's own numbers stay, under a name that the search finds again."""
     for one in first(rig):
-        blank = Hypothesis(one.assembly, (one,), {}, {}, {}, {}, {})
+        blank = Hypothesis(one.assembly, (one,))
         for second in ALL:
             for two in second(one.assembly):
                 numbers = {n.partition("[")[0] for n in two.assembly.quantities()}

@@ -108,7 +108,7 @@ FREE = [
 
 def test_a_driven_block_answers_like_another_integrator() -> None:
     block = block_of(puller())
-    driven = DrivenBlock(block, FREE)
+    driven = DrivenBlock(block, FREE, records=[record_of(np.zeros_like(TIME))])
     found = driven.respond(
         driven.samples(record_of(np.zeros_like(TIME)), block.model.values), block.model.values
     )
@@ -122,7 +122,7 @@ def test_derivatives_are_those_of_finite_differences(inside: dict[str, object]) 
     names = [*FREE, "cell.gain"] + [
         f"spring.piece.fillers.{n}" for n in ("modulus", "yield_stress") if inside
     ]
-    driven = DrivenBlock(block, names)
+    driven = DrivenBlock(block, names, records=[record_of(np.zeros_like(TIME))])
     values = dict(block.model.values)
     samples = driven.samples(record_of(np.zeros_like(TIME)), values)
     slope = driven.respond(samples, values).slope
@@ -140,7 +140,7 @@ def test_a_stretchy_cable_answers_like_the_implicit_equation_solved_by_bisection
         "spring.piece", StretchyCable(members=(("piece", piece),), stiffness=stiffness)
     )
     block = block_of(declared)
-    driven = DrivenBlock(block, [])
+    driven = DrivenBlock(block, [], records=[record_of(np.zeros_like(TIME))])
     found = driven.respond(driven.samples(record_of(np.zeros_like(TIME)), {}), {}).output
     # By hand: Euler with 20 parts per sample for the dashpot, bisection for the split of the extension.
     parts, x, expected = 20, 0.0, [0.0]
@@ -162,7 +162,7 @@ def test_a_stretchy_cable_answers_like_the_implicit_equation_solved_by_bisection
 
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(UnknownNameError, match=r"did you mean 'cell.gain'"):
-        DrivenBlock(block_of(puller()), ["cell.gian"])
+        DrivenBlock(block_of(puller()), ["cell.gian"], records=[])
 
 
 # --- steps ------------------------------------------------------------------------------------------
@@ -231,7 +231,7 @@ def test_a_fit_finds_the_numbers_behind_noisy_records_within_its_own_errors() ->
     truth = dict(zip(FREE, (0.85e6, 0.7e6, 0.55e6, 2.4e4), strict=True))
     clean = force_by_hand((0.85e6, 0.7e6), 0.55e6, 2.4e4)
     block = block_of(puller())
-    driven = DrivenBlock(block, FREE)
+    driven = DrivenBlock(block, FREE, records=[record_of(np.zeros_like(TIME))])
     parameters = [declared_parameter(block.model.variable(n)) for n in FREE]
     beyond = []
     for seed in range(6):
@@ -244,22 +244,22 @@ def test_a_fit_finds_the_numbers_behind_noisy_records_within_its_own_errors() ->
     assert 0.5 < np.sqrt(np.mean(np.square(beyond))) < 1.6
 
 
-def test_strain_says_how_far_the_numbers_have_left_their_declaration() -> None:
+def test_prior_z_scores_say_how_far_the_numbers_have_left_their_declaration() -> None:
     block = block_of(puller())
-    driven = DrivenBlock(block, FREE)
+    driven = DrivenBlock(block, FREE, records=[record_of(np.zeros_like(TIME))])
     record = record_of(
         force_by_hand((1.15 * 0.9e6, 0.6e6)) + 0.05 * np.random.default_rng(1).standard_normal(len(TIME))
     )
     evidence = bench_of([record], block).evidence(driven, [record], block.model.values)
-    strain = fit(evidence, [declared_parameter(block.model.variable(n)) for n in FREE]).strain()
+    scores = fit(evidence, [declared_parameter(block.model.variable(n)) for n in FREE]).prior_z_scores()
     # The prior's deviation is ln(1.2)/√3.
-    assert strain[FREE[0]] == pytest.approx(np.log(1.15) * np.sqrt(3.0) / np.log(1.2), abs=0.1)
-    assert abs(strain[FREE[1]]) < 0.3
+    assert scores[FREE[0]] == pytest.approx(np.log(1.15) * np.sqrt(3.0) / np.log(1.2), abs=0.1)
+    assert abs(scores[FREE[1]]) < 0.3
 
 
 def test_what_the_records_cannot_tell_is_said_in_words() -> None:
     block = block_of(puller())
-    driven = DrivenBlock(block, [*FREE, "cell.gain"])
+    driven = DrivenBlock(block, [*FREE, "cell.gain"], records=[record_of(np.zeros_like(TIME))])
     record = record_of(force_by_hand() + 0.1 * np.random.default_rng(2).standard_normal(len(TIME)))
     evidence = bench_of([record], block).evidence(driven, [record], block.model.values)
     open_ended = [
@@ -277,7 +277,7 @@ def test_what_the_records_cannot_tell_is_said_in_words() -> None:
 def test_a_look_ahead_equals_the_fit_of_a_linear_problem() -> None:
     block = block_of(puller())
     names = FREE[:2]
-    driven = DrivenBlock(block, names)
+    driven = DrivenBlock(block, names, records=[record_of(np.zeros_like(TIME))])
     record = record_of(
         force_by_hand((0.8e6, 0.5e6)) + 0.1 * np.random.default_rng(3).standard_normal(len(TIME))
     )
@@ -286,7 +286,7 @@ def test_a_look_ahead_equals_the_fit_of_a_linear_problem() -> None:
     assert predicted_cost(evidence, parameters) == pytest.approx(fit(evidence, parameters).cost, rel=1e-4)
 
 
-def test_descent_meets_bounds_like_a_solver_for_linear_problems() -> None:
+def test_least_squares_meets_bounds_like_a_solver_for_linear_problems() -> None:
     draw = np.random.default_rng(4)
     matrix, target = draw.standard_normal((30, 5)), draw.standard_normal(30)
     box = (np.full(5, -0.05), np.full(5, 0.08))
@@ -296,7 +296,7 @@ def test_descent_meets_bounds_like_a_solver_for_linear_problems() -> None:
     assert found.converged
 
 
-def test_descent_follows_a_curved_valley_and_steps_around_a_hole() -> None:
+def test_least_squares_follows_a_curved_valley_and_steps_around_a_hole() -> None:
     def rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if x[0] < -1.5:
             raise ConvergenceError("response", "is not finite")

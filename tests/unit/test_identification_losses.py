@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nlsdesign.identification.statistics.losses import Huber, bent, saturated
+from nlsdesign.identification.statistics.losses import Huber, bounded_total, huber_rows
 
 X = np.array([0.3, -0.8])
 
@@ -17,7 +17,7 @@ def rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_record_within_its_bound_counts_as_it_is() -> None:
     residual, slope = rows(X)
-    same, same_slope = saturated(residual, slope, float(residual @ residual))
+    same, same_slope = bounded_total(residual, slope, float(residual @ residual))
     assert np.array_equal(same, residual)
     assert np.array_equal(same_slope, slope)
 
@@ -27,7 +27,7 @@ def test_the_sum_of_squares_is_the_stated_one(share: float) -> None:
     residual, slope = rows(X)
     total = float(residual @ residual)
     bound = share * total
-    scaled = saturated(residual, slope, bound)[0]
+    scaled = bounded_total(residual, slope, bound)[0]
     assert scaled @ scaled == pytest.approx(bound * (2.0 - bound / total), rel=1e-12)
     assert scaled @ scaled < 2.0 * bound
 
@@ -35,21 +35,21 @@ def test_the_sum_of_squares_is_the_stated_one(share: float) -> None:
 @pytest.mark.parametrize("share", [0.9, 0.5, 1e-3])
 def test_the_slope_is_that_of_the_scaled_residuals(share: float) -> None:
     bound = share * float(rows(X)[0] @ rows(X)[0])
-    slope, step = saturated(*rows(X), bound)[1], 1e-6
+    slope, step = bounded_total(*rows(X), bound)[1], 1e-6
     for k in range(2):
         aside = step * np.eye(2)[k]
-        ends = [saturated(*rows(X + sign * aside), bound)[0] for sign in (1.0, -1.0)]
+        ends = [bounded_total(*rows(X + sign * aside), bound)[0] for sign in (1.0, -1.0)]
         assert slope[:, k] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize("bend", [0.5, 1.05, 10.0])
-def test_bent_residuals_have_the_loss_of_huber_and_its_slope(bend: float) -> None:
+@pytest.mark.parametrize("limit", [0.5, 1.05, 10.0])
+def test_scaled_residuals_have_the_loss_of_huber_and_its_slope(limit: float) -> None:
     residual, slope = rows(X)
-    scaled, scaled_slope = bent(residual, slope, bend)
-    assert 0.5 * scaled @ scaled == pytest.approx(Huber(bend).value(residual), rel=1e-12)
+    scaled, scaled_slope = huber_rows(residual, slope, limit)
+    assert 0.5 * scaled @ scaled == pytest.approx(Huber(limit).value(residual), rel=1e-12)
     assert np.array_equal(np.sign(scaled), np.sign(residual))
     step = 1e-6
     for k in range(2):
         aside = step * np.eye(2)[k]
-        ends = [bent(*rows(X + sign * aside), bend)[0] for sign in (1.0, -1.0)]
+        ends = [huber_rows(*rows(X + sign * aside), limit)[0] for sign in (1.0, -1.0)]
         assert scaled_slope[:, k] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-6, abs=1e-9)

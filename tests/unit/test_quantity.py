@@ -21,6 +21,7 @@ from nlsdesign.quantity import (
     parse_unit,
     quantity,
     same_dimension,
+    significant,
     sources,
     typeset_unit,
     with_unit,
@@ -253,3 +254,15 @@ def test_quantities_pickle_and_print() -> None:
     assert str(quantity(0.5, "1")) == "0.5"
     assert str(quantity(0.5, "N*m/rad")) == "0.5 N·m/rad"
     assert degrees(180.0) == pytest.approx(math.pi, rel=1e-15)
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-16, -5e-15])
+def test_what_is_written_does_not_depend_on_the_last_digits(noise: float) -> None:
+    row = [0.016396776846523842, 0.0115, 1e-19]
+    assert significant([v * (1.0 + noise) + noise * 1e-3 for v in row]) == (0.0163967768, 0.0115, 0.0)
+
+
+def test_significant_digits_count_from_the_largest_number_of_a_row() -> None:
+    assert significant([123456.0, -1.26], 6) == (123456.0, -1.0)
+    assert significant([0.0, 0.0]) == (0.0, 0.0)
+    assert significant([math.inf, 1.23456], 3) == (math.inf, 1.23)

@@ -68,6 +68,22 @@ class Assembly:
         """Return the sensors by name."""
         return {name: part for name, part in self.parts if isinstance(part, Sensor)}
 
+    def measured(self, signal: str) -> tuple[str, tuple[str, ...]]:
+        """Return what a signal shows, and the sensors between, the one that gives the reading first.
+
+        Parameters
+        ----------
+        signal
+            Full name; a signal that is not the reading of a sensor shows itself.
+        """
+        sensors = self.sensors()
+        readings = {f"{name}.reading": name for name in sensors}
+        chain: list[str] = []
+        while signal in readings:
+            chain.append(readings[signal])
+            signal = sensors[chain[-1]].of
+        return signal, tuple(chain)
+
     def quantities(self) -> dict[str, Quantity]:
         """Return every number by full name."""
         return {k: q for name, part in self.parts for k, q in quantities(part, name).items()}

@@ -135,6 +135,11 @@ class Element(Part):
         return False
 
     @property
+    def restores(self) -> bool:
+        """Whether a displacement is answered by a restoring effort, as by a spring."""
+        return False
+
+    @property
     def valid(self) -> Range:
         """Least and greatest motion for which the law is stated to hold; results name it when it is left."""
         return UNBOUNDED
@@ -213,6 +218,11 @@ class Combination(Element):
     def domain(self) -> Domain:
         """The domain of the members."""
         return self._inner
+
+    @property
+    def restores(self) -> bool:
+        """Whether any member restores."""
+        return any(member.restores for _, member in self.members)
 
     def children(self) -> Mapping[str, Part]:
         """Return the members by name."""

@@ -26,6 +26,11 @@ class Elastic(Element):
         """False: an elastic law knows no rate."""
         return False
 
+    @property
+    def restores(self) -> bool:
+        """True: it pulls back."""
+        return True
+
 
 @dataclass(frozen=True, kw_only=True)
 class Spring(Elastic):

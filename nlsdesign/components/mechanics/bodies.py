@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
@@ -30,6 +30,11 @@ class Body(Part):
     def domain(self) -> Domain:
         """Rotation or translation."""
 
+    @property
+    def motion_names(self) -> tuple[str, str]:
+        """Own names of the motion and its rate."""
+        return ("angle", "speed") if self.domain == ROTATION else ("position", "speed")
+
     @abstractmethod
     def motion(self, scope: Scope) -> Motion:
         """Return motion and rate, declaring states or inputs."""
@@ -39,17 +44,16 @@ class Body(Part):
         """Close the equations with the sum of the efforts of all elements on the body."""
 
 
-def _names(domain: Domain) -> tuple[str, str]:
-    return ("angle", "speed") if domain == ROTATION else ("position", "speed")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Free(Body):
     """Base of the bodies that move by themselves: two states."""
 
+    inertia_name: ClassVar[str] = "inertia"
+    """Field that says what is accelerated."""
+
     def motion(self, scope: Scope) -> Motion:
         """Declare motion and speed as states."""
-        place, speed = _names(self.domain)
+        place, speed = self.motion_names
         return Motion(
             scope.state(place, self.domain.motion_unit, f"{place} of {scope.path}"),
             scope.state(speed, self.domain.rate_unit, f"{speed} of {scope.path}"),
@@ -96,6 +100,8 @@ class Inertia(Free):
 @dataclass(frozen=True, kw_only=True)
 class Mass(Free):
     """A sliding body, m·v̇ = ΣF + outer force."""
+
+    inertia_name: ClassVar[str] = "mass"
 
     mass: Quantity = parameter("kg", "mass", minimum=1e-9, maximum=1e9)
 
@@ -185,7 +191,7 @@ class Driven(Body):
 
     def motion(self, scope: Scope) -> Motion:
         """Declare motion and speed as inputs."""
-        place, speed = _names(self.domain)
+        place, speed = self.motion_names
         return Motion(
             scope.input(place, self.domain.motion_unit, f"prescribed {place} of {scope.path}"),
             scope.input(speed, self.domain.rate_unit, f"prescribed {speed} of {scope.path}"),

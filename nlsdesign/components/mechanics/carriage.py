@@ -30,6 +30,8 @@ class LinearDrive(Free):
     'LinearDrive(mass = 95.1 kg, force_constant = 35.15 N/V, voltage_limit = 10 V)'
     """
 
+    inertia_name: ClassVar[str] = "mass"
+
     mass: Quantity = parameter("kg", "mass that moves, reflected to the line", minimum=1e-9, maximum=1e9)
     force_constant: Quantity = parameter(
         "N/V", "force on the carriage per voltage", minimum=1e-9, maximum=1e9
@@ -99,6 +101,11 @@ class ConstantForce(Elastic):
 
     # Not named "force": every element between bodies has a signal of that name.
     load: Quantity = parameter("N", "constant force", minimum=-1e9, maximum=1e9)
+
+    @property
+    def restores(self) -> bool:
+        """False: it pushes the same way at every place."""
+        return False
 
     @property
     def domain(self) -> Domain:

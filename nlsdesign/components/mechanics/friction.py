@@ -69,6 +69,11 @@ class TorqueRipple(Elastic):
     order: Quantity = parameter("1", "periods per turn", minimum=0.1, maximum=1e5)
 
     @property
+    def restores(self) -> bool:
+        """False: it has many places of rest."""
+        return False
+
+    @property
     def domain(self) -> Domain:
         """Angle and torque."""
         return ROTATION

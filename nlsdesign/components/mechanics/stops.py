@@ -143,6 +143,11 @@ class RigidStop(Elastic):
         _check_order(self.lower, self.upper)
 
     @property
+    def restores(self) -> bool:
+        """False: it leaves the body free between the stops."""
+        return False
+
+    @property
     def domain(self) -> Domain:
         """Angle and torque."""
         return ROTATION

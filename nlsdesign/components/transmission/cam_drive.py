@@ -112,6 +112,11 @@ class Through(Element):
         """True if the element behind the cam needs the rate."""
         return self.behind[1].needs_rate
 
+    @property
+    def restores(self) -> bool:
+        """Whether the element behind the cam restores."""
+        return self.behind[1].restores
+
     def children(self) -> Mapping[str, Part]:
         """Return cam and element."""
         return {"cam": self.cam, self.behind[0]: self.behind[1]}

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...errors import unknown_name
 from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_response import DrivenBlock
 from ...identification.equation_error.evidence import Bench, measured_inputs
 from ...identification.records.measurement import Record, RecordSet
 from ...model import Assembly
@@ -49,7 +48,7 @@ def predict(actuator: Assembly, records: RecordSet, name: str) -> Trace:
     bench = Bench(records, blocks)
     signals, units = {}, {}
     for block in blocks:
-        for each in bench.evidence(DrivenBlock(block, []), chosen, {}):
+        for each in bench.evidence(bench.driven(block, []), chosen, {}):
             shown = block.target or block.output
             signals[shown], units[shown] = each.predicted({}), block.model.outputs[0].unit
     found = [each for block in blocks for each in _range_warnings(block, chosen[0])]

@@ -130,7 +130,7 @@ def self_heating(assembly: Assembly) -> Sequence[Candidate]:
                     edited,
                     unknowns,
                     "force that falls while the rubber is worked hard, and comes back at rest",
-                    "first law; Medalia 1991",
+                    "first law of thermodynamics; Medalia 1991",
                 )
             )
     return found

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeAlias
 
 from ...components import Assembly, Element, Part
 from ...components.sensing.sensors import Sensor
+from ..fitting.strategies import Plain, Strategy
 
 SOURCE = "fitted to bench records"
 
@@ -54,9 +55,10 @@ class Candidate:
         What it leaves in records, in words.
     source
         Where the law comes from.
-    sketch
-        The same effect in a simpler form, fitted first where the assembly is hard to fit from afar: numbers
-        of the same name and declared value begin where it leaves them.
+    strategy
+        Where its fits begin.
+    explains_lag
+        Whether readings that lag what they read are what it leaves.
     """
 
     effect: str
@@ -65,7 +67,8 @@ class Candidate:
     unknowns: tuple[Unknown, ...]
     signature: str
     source: str
-    sketch: Assembly | None = None
+    strategy: Strategy = field(default_factory=Plain)
+    explains_lag: bool = False
 
 
 Effect: TypeAlias = Callable[[Assembly], Sequence[Candidate]]

@@ -25,6 +25,7 @@ from ...components import (
 from ...components.core.element import ROTATION
 from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
+from ..fitting.strategies import Continuation
 from .candidate import SOURCE, Candidate, Unknown, free_name, wrapped
 from .sliding import sliding_friction
 
@@ -146,7 +147,7 @@ def quadratic_drag(assembly: Assembly) -> Sequence[Candidate]:
                 edited,
                 unknowns,
                 "a torque against the motion that grows with the square of the speed",
-                "any text on fluids",
+                "Newton 1687, book II; Batchelor 1967",
             )
         )
     return found
@@ -204,7 +205,7 @@ def load_dependent_friction(assembly: Assembly) -> Sequence[Candidate]:
                 edited,
                 (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),),
                 "a torque against the motion in proportion to the load",
-                "Coulomb 1785; gear efficiency",
+                "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
             )
         )
     return found
@@ -259,8 +260,8 @@ def backlash(assembly: Assembly) -> Sequence[Candidate]:
                 ),
                 "a dead angle around zero, on both sides alike, and shocks where the load changes sign",
                 "Nordin and Gutman 2002",
-                # In slow motion what is behind the play has no inertia to speak of.
-                wrapped(assembly, name, "behind_play", _massless),
+                # In slow motion the inertia behind the backlash hardly shows.
+                Continuation(through=wrapped(assembly, name, "behind_play", _massless)),
             )
         )
     return found

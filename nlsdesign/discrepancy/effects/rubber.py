@@ -49,7 +49,7 @@ def second_relaxation(assembly: Assembly) -> Sequence[Candidate]:
                     Unknown(f"{inner}.dashpot.viscosity", (3e4, 3e5, 2e6), 1e2, 1e10),
                 ),
                 "force that creeps towards rest with a time constant of its own",
-                "Maxwell 1867; Prony series",
+                "Maxwell 1867; Wiechert 1893 (Prony series)",
             )
         )
     return [*found, *large_strain_relaxation(assembly)]

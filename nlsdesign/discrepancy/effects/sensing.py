@@ -44,7 +44,8 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
                 assembly.with_part(name, late),
                 (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
                 "force that follows the motion late, the more the faster; as much in the torque balance",
-                "Golub and Van Loan (Padé table)",
+                "Golub and Van Loan 2013 (Padé table)",
+                explains_lag=True,
             )
         )
     return found
@@ -144,7 +145,7 @@ def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
                     assembly.with_part(name, faulty),
                     tuple(unknowns),
                     "force, torque and inertia that are off together, as a sine of the angle",
-                    "geometry; data sheets of encoders",
+                    "geometry; data sheets",
                 )
             )
     return found

@@ -64,7 +64,7 @@ def constant_force(assembly: Assembly) -> Sequence[Candidate]:
                 assembly.with_part(part, tie(element, body)),
                 (Unknown(f"{part}.load", (0.0,), -1e3, 1e3),),
                 "a force that is the same forward and backward, at any speed and place",
-                "Janot, Gautier and Brunot 2019",
+                "Janot et al. 2019",
             )
         )
     return found

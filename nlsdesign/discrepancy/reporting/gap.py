@@ -14,7 +14,7 @@ from .verdict import Course, RecordGap
 
 
 def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tuple[RecordGap, ...]:
-    """Return the error of every block on every record.
+    """Return the error of every block on every record, the records in the order in which they were given.
 
     Parameters
     ----------
@@ -23,15 +23,16 @@ def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tu
     comparison
         Knows the records.
     """
-    found = []
+    gaps = []
     for then, now in zip(comparison.judged(before), comparison.judged(after), strict=True):
         first, last, floor = (
             float(np.sqrt(np.mean(np.square(r)))) for r in (then.error, now.error, then.floor.sigma)
         )
         name, record, unit = then.block.name, then.record, then.block.model.outputs[0].unit
         count = len(then.residual)
-        found.append(RecordGap(name, record.name, record.role, first, last, floor, count, unit))
-    return tuple(found)
+        gaps.append(RecordGap(name, record.name, record.role, first, last, floor, count, unit))
+    blocks, given = list(dict.fromkeys(g.block for g in gaps)), comparison.bench.given_order
+    return tuple(sorted(gaps, key=lambda gap: (blocks.index(gap.block), given[gap.record])))
 
 
 def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str) -> Course:
@@ -45,8 +46,8 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
         Name.
     """
     pairs = zip(comparison.judged(before), comparison.judged(after), strict=True)
-    mine = [(a, b) for a, b in pairs if a.block.name == block]
-    held = [pair for pair in mine if pair[0].record.role == "held_out"] or mine
+    own = [(a, b) for a, b in pairs if a.block.name == block]
+    held = [pair for pair in own if pair[0].record.role == "held_out"] or own
     then, now = max(held, key=lambda pair: float(np.mean(np.square(pair[0].error))))
     target, trace, output = then.block.target, then.record.trace, then.block.model.outputs[0]
     if target is None:
@@ -84,19 +85,21 @@ def shapes_of(
     before, after, comparison, block
         As above.
     """
-    found = [_shapes(h, comparison, block) for h in (before, after)]
-    return {name: (found[0][name], found[1][name]) for name in found[0] if name in found[1]}
+    first, last = (_shapes(h, comparison, block) for h in (before, after))
+    return {name: (first[name], last[name]) for name in first if name in last}
 
 
 def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[str, Binned]:
     bench = comparison.bench
-    mine = [e for e in comparison.judged(hypothesis) if e.block.name == block]
-    error = np.concatenate([e.error for e in mine])
+    judged = [e for e in comparison.judged(hypothesis) if e.block.name == block]
+    error = np.concatenate([e.error for e in judged])
 
     def gathered(signal: str, order: int) -> NDArray[np.float64]:
-        rows = [derivative(e.record.trace[signal], e.record.step, order=order)[e.floor.places] for e in mine]
+        rows = [
+            derivative(e.record.trace[signal], e.record.step, order=order)[e.floor.places] for e in judged
+        ]
         return np.concatenate(rows)
 
     signals = {s: gathered(s, 0) for s in bench.records.signals}
     motion = next((s for s in bench.records.signals if bench.noise.rounded[s]), bench.records.signals[0])
-    return shapes(error, signals, gathered(motion, 1), STRIDE * mine[0].record.step)
+    return shapes(error, signals, gathered(motion, 1), STRIDE * judged[0].record.step)

@@ -7,7 +7,6 @@ free, the whole model may be simulated over windows instead.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +21,7 @@ from ...identification.records.quality import Finding
 from ...model import Assembly
 from ..blocks.tearing import blocks_of
 from ..screening.other_rig import out_of_reach
-from ..screening.scale_check import suspicions_of, typical_sizes
+from ..screening.scale_check import scale_findings, typical_sizes
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
 from .advice import more_excitation
@@ -31,6 +30,7 @@ from .verdict import RecordGap
 from .window_refit import fitted_over_windows, window_gaps
 
 _FROM_SPREAD = 0.8
+"""Share of the variance of a declared spread above which the records have added next to nothing."""
 _AT_END = 1.96
 """Declared ranges from the declared value; a refit is stopped at two."""
 
@@ -105,14 +105,14 @@ class Refit:
             for n in self.numbers
             if abs(n.strain) >= _AT_END
         ]
-        silent = [n for n, share in self._told_by_spread().items() if share > _FROM_SPREAD]
-        open_ones = [
+        unknown = [
             f"The records say next to nothing of {name}: what is given as its error is its declared spread."
-            for name in silent
+            for name, share in self._known_by_spread().items()
+            if share > _FROM_SPREAD
         ]
-        return (*[f"suspect: {f}" for f in self.findings], *stuck, *open_ones, *more_excitation(self.fits))
+        return (*[f"suspect: {f}" for f in self.findings], *stuck, *unknown, *more_excitation(self.fits))
 
-    def _told_by_spread(self) -> dict[str, float]:
+    def _known_by_spread(self) -> dict[str, float]:
         """Return by name the share of what is known of a number that comes from its declared spread."""
         return {
             p.name: float(fit.covariance[i, i]) / p.sigma**2
@@ -147,7 +147,7 @@ def _mean(gaps: Sequence[RecordGap]) -> BlockError:
     total = sum(g.rows for g in gaps)
 
     def rms(which: str) -> float:
-        return math.sqrt(sum(getattr(g, which) ** 2 * g.rows for g in gaps) / total)
+        return math.sqrt(math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps) / total)
 
     first = gaps[0]
     return BlockError(first.block, first.role, rms("before"), rms("after"), rms("noise_floor"), first.unit)
@@ -187,24 +187,25 @@ def refit(
     """
     progress("refitting the declared numbers")
     bench = Bench(records, blocks_of(actuator, records.signals))
+    records = bench.records
     comparison = Comparison(bench, typical_sizes(actuator, records))
-    found = comparison.base(actuator)
-    if not any(fit.parameters for fit in found.fits.values()):
+    fitted = comparison.base(actuator)
+    if not any(fit.parameters for fit in fitted.fits.values()):
         raise MeasurementError(
             f"deck of '{actuator.name}'",
             "declares no spread for any number that these records show, so none is free",
             next_step="give what is uncertain a spread, for instance spread = 0.1",
         )
-    findings = (*records.findings, *out_of_reach(actuator, records), *suspicions_of(comparison, found))
-    fits, gaps = tuple(found.fits.values()), tuple[RecordGap, ...]()
+    findings = (*records.findings, *out_of_reach(actuator, records), *scale_findings(comparison, fitted))
+    fits, window_errors = tuple(fitted.fits.values()), tuple[RecordGap, ...]()
     if window is not None:
         progress(f"simulating windows of {window:g} s")
-        values, fit = fitted_over_windows(actuator, records, found.values, window)
-        found = comparison.on_all_samples(replace(found, values=values))
-        fits, gaps = (fit,), window_gaps(actuator, values, records, window)
+        values, fit = fitted_over_windows(actuator, records, fitted.values, window)
+        fitted = comparison.on_all_samples(replace(fitted, values=values))
+        fits, window_errors = (fit,), window_gaps(actuator, values, records, window)
     numbers = tuple(_number(fit, p) for fit in fits for p in fit.parameters)
-    gaps = (*gaps_of(comparison.declared(actuator), found, comparison), *gaps)
-    return Refit(sourced(found), fits, numbers, gaps, findings)
+    gaps = gaps_of(comparison.declared(actuator), fitted, comparison)
+    return Refit(sourced(fitted), fits, numbers, (*gaps, *window_errors), findings)
 
 
 def _number(fit: Fit, parameter: Parameter) -> FittedNumber:
@@ -233,16 +234,3 @@ def sourced(hypothesis: Hypothesis) -> Assembly:
             for n in rows
         }
     )
-
-
-def refit_text(found: Refit, model: str) -> str:
-    """Return the text of ``fit.json``.
-
-    Parameters
-    ----------
-    found
-        As fitted.
-    model
-        Path of the deck.
-    """
-    return json.dumps(found.to_dict(model), indent=2, ensure_ascii=False) + "\n"

@@ -18,10 +18,14 @@ from .sparse_formula import Formula, sparse_formula
 Array = NDArray[np.float64]
 
 _ENOUGH = 0.4
-"""A shape is told if it explains this share of the remainder on records that it was not taken from."""
+"""A shape is reported if it explains this share of the remainder on records that it was not taken from."""
 _BINS, _LEAST_IN_BIN = 24, 8
+"""Bins of a mean curve, and samples from which a bin counts: enough for a curve, few enough to be no fit."""
 _LOWEST, _NARROW = 0.3, 0.15
+"""Lowest frequency in Hz that is looked for, below which a record holds too few periods; and half width of
+the band around a resonance, relative to its frequency."""
 _CHUNK = 200
+"""Frequencies that are worked on at a time, to bound memory."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,12 @@ class Remainder:
 
     def words(self) -> str:
         """Return what is known of it in sentences."""
-        said = f"What is left is {self.kind}. It acts at `{self.block}` ({self.quantity}) "
-        said += f"and is {self.size:.3g} {self.unit} rms, the noise floor {self.floor:.3g} {self.unit}."
+        text = f"What is left is {self.kind}. It acts at `{self.block}` ({self.quantity}) "
+        text += f"and is {self.size:.3g} {self.unit} rms, the noise floor {self.floor:.3g} {self.unit}."
         if self.formula is not None:
-            said += f" Unnamed regression, no law: {self.formula.text} "
-            said += f"explains {100 * self.formula.share:.0f} % of it on records that it was not fitted to."
-        return said
+            text += f" Unnamed regression, no law: {self.formula.text} "
+            text += f"explains {100 * self.formula.share:.0f} % of it on records that it was not fitted to."
+        return text
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for ``verdict.json``."""
@@ -174,10 +178,10 @@ def _powers(rows: Sequence[_Rows], frequencies: Array) -> Array:
     for i, row in enumerate(rows):
         whole = float(row.error @ row.error)
         for begin in range(0, len(frequencies), _CHUNK):
-            few = frequencies[begin : begin + _CHUNK]
-            waves = np.exp(-2j * np.pi * np.outer(few, row.time))
-            found = np.abs(waves @ row.error) ** 2 * 2.0 / (len(row.error) * max(whole, 1e-300))
-            shares[i, begin : begin + _CHUNK] = np.minimum(found, 1.0)
+            chunk = frequencies[begin : begin + _CHUNK]
+            waves = np.exp(-2j * np.pi * np.outer(chunk, row.time))
+            power = np.abs(waves @ row.error) ** 2 * 2.0 / (len(row.error) * max(whole, 1e-300))
+            shares[i, begin : begin + _CHUNK] = np.minimum(power, 1.0)
     return shares
 
 
@@ -199,8 +203,8 @@ def _ringing(rows: Sequence[_Rows]) -> tuple[float, float]:
         step = float(np.median(np.diff(row.time)))
         even = np.arange(row.time[0], row.time[-1], step)
         signal = np.interp(even, row.time, row.error) * np.hanning(len(even))
-        found = np.abs(np.fft.rfft(signal)) ** 2
-        power += np.interp(grid, np.fft.rfftfreq(len(even), step), found) / max(float(found.sum()), 1e-300)
+        own = np.abs(np.fft.rfft(signal)) ** 2
+        power += np.interp(grid, np.fft.rfftfreq(len(even), step), own) / max(float(own.sum()), 1e-300)
     best = float(grid[int(np.argmax(power))])
     band = np.abs(grid - best) <= _NARROW * best
     return float(power[band].sum() / max(float(power.sum()), 1e-300)), best

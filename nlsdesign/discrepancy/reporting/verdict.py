@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
 from ...model import Assembly
+from ..selection.search import Skipped
 from .remainder import Remainder
 
 Array = NDArray[np.float64]
@@ -121,6 +123,8 @@ class Verdict:
         What is left without a name in the block that is furthest from its floor; ``None`` if nothing is.
     next_steps
         What to measure next to tell apart what these records cannot.
+    skipped
+        Effects that were left out of the comparison, and why: too expensive, or not converged.
     """
 
     verdict: str
@@ -137,6 +141,7 @@ class Verdict:
     fits: tuple[Fit, ...] = ()
     remainder: Remainder | None = None
     next_steps: tuple[str, ...] = ()
+    skipped: tuple[Skipped, ...] = ()
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.
@@ -150,11 +155,9 @@ class Verdict:
         """
         gaps = [g for g in self.gaps if g.block == self.block and g.role == role]
         total = sum(g.rows for g in gaps)
-        return (
-            float(np.sqrt(sum(getattr(g, which) ** 2 * g.rows for g in gaps) / total))
-            if total
-            else float("nan")
-        )
+        # An exact sum, so that the order of the records makes no difference.
+        squares = math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps)
+        return math.sqrt(squares / total) if total else float("nan")
 
     @property
     def held_out_ratio(self) -> float:
@@ -170,14 +173,14 @@ class Verdict:
 
     def words(self) -> str:
         """Return the verdict in a few sentences."""
-        said = {
+        text = {
             "none": "The refitted model explains the records down to their noise; nothing is missing.",
             "unknown": "Something is missing that no effect of the catalogue explains.",
             "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
             "named": "",
         }[self.verdict]
         if self.verdict == "none" and self.unidentified:
-            said += (
+            text += (
                 f" They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
                 "would not show all that could be missing."
             )
@@ -186,14 +189,18 @@ class Verdict:
                 f"{name.rpartition('.')[2]} = {value:.4g} ± {error:.2g} {unit}"
                 for name, (value, unit, error) in effect.parameters.items()
             )
-            said += f"`{effect.name}` at `{effect.location}`: {numbers}. "
-            said += f"It explains {100 * effect.share_held_out:.0f} % "
-            said += "of the excess over the noise on records that no fit has seen. "
+            text += f"`{effect.name}` at `{effect.location}`: {numbers}. "
+            text += f"It explains {100 * effect.share_held_out:.0f} % "
+            text += "of the excess over the noise on records that no fit has seen. "
             if effect.aliases:
-                said += f"As good an explanation: {', '.join(effect.aliases)}. "
+                text += f"As good an explanation: {', '.join(effect.aliases)}. "
         if self.remainder is not None:
-            said = f"{said.strip()} {self.remainder.words()}"
-        return said.strip()
+            text = f"{text.strip()} {self.remainder.words()}"
+        return text.strip()
+
+    def skipped_words(self) -> tuple[str, ...]:
+        """Return a sentence for each effect that was left out of the comparison."""
+        return tuple(f"not compared: {each}" for each in self.skipped)
 
     def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
         """Return the content of ``verdict.json``.
@@ -235,6 +242,10 @@ class Verdict:
                 },
             },
             "runners_up": [{"name": n, "share": s} for n, s in self.runners_up],
+            "skipped": [
+                {"name": s.effect, "location": s.location, "beside": list(s.beside), "reason": s.reason}
+                for s in self.skipped
+            ],
             "unidentified": list(self.unidentified),
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "next": list(self.next_steps),
@@ -256,4 +267,5 @@ class Verdict:
         ]
 
     def __str__(self) -> str:
-        return "\n".join([f"verdict: {self.verdict}", self.words(), *self.where, *self.next_steps])
+        sentences = (self.words(), *self.where, *self.skipped_words(), *self.next_steps)
+        return "\n".join([f"verdict: {self.verdict}", *sentences])

@@ -18,6 +18,7 @@ from ...model import Assembly, FlatModel, flatten
 from .verdict import RecordGap
 
 _PHASES = 4
+"""Windows begin at so many phases of one length, so that no sample is always near a beginning."""
 
 
 def fitted_over_windows(
@@ -44,12 +45,12 @@ def fitted_over_windows(
     model = flatten(actuator)
     free = [declared_parameter(model.variable(name), start) for name, start in starts.items()]
     wiring, shots = wiring_of(actuator, model, records.signals), Shots(length, False, phases=_PHASES)
-    seen = records.of("fit")
-    alone = fit_by_simulation(model, seen, free, shots=shots, wiring=wiring)
+    fitted = records.of("fit")
+    white = fit_by_simulation(model, fitted, free, shots=shots, wiring=wiring)
     # What a model leaves over is coloured; weighed as white it would drown the prior.
-    weights = Weights(coloured_sigma(alone))
-    found = fit_by_simulation(model, seen, free, shots=shots, wiring=wiring, weights=weights).fit
-    return dict(found.values), found
+    weights = Weights(coloured_sigma(white))
+    fit = fit_by_simulation(model, fitted, free, shots=shots, wiring=wiring, weights=weights).fit
+    return dict(fit.values), fit
 
 
 def window_gaps(
@@ -70,7 +71,7 @@ def window_gaps(
     """
     models = [flatten(actuator), flatten(actuator.with_values(values))]
     wiring = wiring_of(actuator, models[0], records.signals)
-    found = []
+    gaps = []
     for record in records.records:
         runs = [predict_in_windows(m, record, length, wiring=wiring) for m in models]
         for signal in wiring.outputs:
@@ -78,8 +79,8 @@ def window_gaps(
             floor, unit = record.resolution_of(signal).noise, record.trace.units[signal]
             name = f"{signal} over {length:g} s"
             rows = len(runs[0].time)
-            found.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))
-    return tuple(found)
+            gaps.append(RecordGap(name, record.name, record.role, before, after, floor, rows, unit))
+    return tuple(gaps)
 
 
 def wiring_of(actuator: Assembly, model: FlatModel, signals: Sequence[str]) -> Wiring:

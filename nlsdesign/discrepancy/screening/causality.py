@@ -1,4 +1,4 @@
-"""Forces that lag the extension they belong to: a sign that the data are wrong, seen before any fit."""
+"""Check of causality: forces that lag the extension they belong to, seen before any fit."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ Array = NDArray[np.float64]
 
 _MOTIONS = {"force": "extension", "torque": "angle"}
 _QUICK_OVER_SLOW = 3.0
+"""Ratio of paces of records from which a constant delay can be told from another cause."""
 
 
-class LateForces(NamedTuple):
+class LaggingForces(NamedTuple):
     """Forces that lag.
 
     Parameters
@@ -38,7 +39,7 @@ class LateForces(NamedTuple):
     testable: bool
 
 
-def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
+def lagging_forces(assembly: Assembly, records: RecordSet) -> LaggingForces:
     """Return measured forces that give work over closed paths and never take any: no passive piece can.
 
     Parameters
@@ -49,7 +50,7 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
         Of all roles.
     """
     model = flatten(assembly)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     pace: list[float] = []
     for signal in records.signals:
         piece, _, effort = _truth(assembly, signal).rpartition(".")
@@ -66,9 +67,9 @@ def late_forces(assembly: Assembly, records: RecordSet) -> LateForces:
         ]
         if any(loop.gives for _, loop in loops) and not any(loop.takes for _, loop in loops):
             head = records.column(signal).name
-            found += [_finding(r, head, motion, loop) for r, loop in loops if loop.gives]
+            findings += [_finding(r, head, motion, loop) for r, loop in loops if loop.gives]
             pace += [_pace(path, r.step) for r, path in paths]
-    return LateForces(tuple(found), bool(pace) and max(pace) > _QUICK_OVER_SLOW * min(pace))
+    return LaggingForces(tuple(findings), bool(pace) and max(pace) > _QUICK_OVER_SLOW * min(pace))
 
 
 def _pace(path: Array, step: float) -> float:
@@ -114,7 +115,7 @@ def _extension(
 
     def at(record: Record) -> Array:
         rows = np.array([record.trace[signal] for _, signal in known])
-        found: Array = function.map(rows.shape[1])(rows).full().ravel()
-        return found
+        values: Array = function.map(rows.shape[1])(rows).full().ravel()
+        return values
 
     return at

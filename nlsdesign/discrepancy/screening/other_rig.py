@@ -11,11 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...model import Assembly
 from ..selection.comparison import Comparison
-from ..selection.excess import DECLARED, Excess, excesses
+from ..selection.criteria import DECLARED
+from ..selection.excess import excesses
 from ..selection.hypothesis import Hypothesis
 
 _AT_END = 3.4
@@ -23,15 +25,19 @@ _AT_END = 3.4
 _FAR = 4.0
 """Declared ranges from the declared value beyond which a number is none of this rig; a refit stops at two."""
 _SHARE = 0.98
-"""Free numbers may take up most of an effect that the catalogue does not know, but not all of it."""
+"""Share of the excess that numbers let go must explain: of an effect that the catalogue does not know they
+may take up most, but not all."""
 _CLOSED = 0.05
 """An effect that leaves no more than this of the excess is the simpler explanation, even if its form is not
 quite right and many numbers let go come closer."""
 _OUT_OF_REACH = 1.2
+"""Multiple of the last declared angle of a cam beyond which records are not of this cam."""
+_MOST_SHOWN = 4
+"""So many numbers are listed in a message."""
 
 
 class OtherNumbers(NamedTuple):
-    """What is said of records that other numbers explain.
+    """What can be told of records that other numbers explain.
 
     Parameters
     ----------
@@ -57,38 +63,53 @@ def other_numbers(comparison: Comparison, base: Hypothesis, better: Hypothesis) 
     better
         With the effects that were added, if any.
     """
-    before, after = excesses(base, comparison.bench), excesses(better, comparison.bench)
-    stuck = [n for f in better.fits.values() for n, s in f.strain().items() if abs(s) >= _AT_END]
-    if len(stuck) < 2 or not _left(before):
+    before, after = _left(base, comparison.bench), _left(better, comparison.bench)
+    scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
+    stuck = [n for n, z in scores.items() if abs(z) >= _AT_END]
+    if len(stuck) < 2 or not before:
         return OtherNumbers("", False)
     free = comparison.freely(base)
-    far = _far_numbers(free, base)
-    let_go = excesses(free, comparison.bench)
-    explains = 1.0 - _left(let_go) / _left(before)
-    little = better is not base and _left(after) <= _CLOSED * _left(before)
-    if far and explains >= _SHARE and _left(let_go) < 0.5 * _left(after) and not little:
-        told = (
+    left, far = _left(free, comparison.bench), _far_numbers(free, base)
+    share = 1.0 - left / before
+    if far and numbers_explain(share, left=left, after=after, before=before, named=better is not base):
+        words = (
             f"the records may be of another rig: with its numbers free the declared model explains "
-            f"{100.0 * explains:.3g} % of the excess without any effect, but then {'; '.join(far)}"
+            f"{100.0 * share:.3g} % of the excess without any effect, but then {'; '.join(far)}"
         )
-        return OtherNumbers(told, True)
-    count = sum(len(f.strain()) for f in better.fits.values())
-    if 2 * len(stuck) < count:
+        return OtherNumbers(words, True)
+    if 2 * len(stuck) < len(scores):
         return OtherNumbers("", False)
-    told = (
-        f"{len(stuck)} of {count} refitted numbers stand at the end of what their declared spread allows "
-        f"({', '.join(stuck[:4])}{', ...' if len(stuck) > 4 else ''}): the records may be of another rig"
+    shown = ", ".join(stuck[:_MOST_SHOWN]) + (", ..." if len(stuck) > _MOST_SHOWN else "")
+    words = (
+        f"{len(stuck)} of {len(scores)} refitted numbers stand at the end of what their declared spread "
+        f"allows ({shown}): the records may be of another rig"
     )
-    return OtherNumbers(told, False)
+    return OtherNumbers(words, False)
 
 
-def _left(found: dict[str, Excess]) -> float:
-    return sum(sum(each.excess) for name, each in found.items() if name != DECLARED)
+def numbers_explain(share: float, *, left: float, after: float, before: float, named: bool) -> bool:
+    """Tell whether numbers let go explain records, and better than an effect.
+
+    Parameters
+    ----------
+    share
+        Of the excess that they explain.
+    left, after, before
+        Excess with numbers let go, with the effects that were added, and of the declared model.
+    named
+        Whether an effect was added at all.
+    """
+    effect_is_simpler = named and after <= _CLOSED * before
+    return share >= _SHARE and left < 0.5 * after and not effect_is_simpler
+
+
+def _left(hypothesis: Hypothesis, bench: Bench) -> float:
+    return sum(sum(e.excess) for name, e in excesses(hypothesis, bench).items() if name != DECLARED)
 
 
 def _far_numbers(free: Hypothesis, base: Hypothesis) -> list[str]:
     """Return in words the numbers that lie far outside their declared ranges, furthest first."""
-    found = []
+    far = []
     for fit in free.fits.values():
         for p in fit.parameters:
             value = fit.values[p.name]
@@ -97,9 +118,9 @@ def _far_numbers(free: Hypothesis, base: Hypothesis) -> list[str]:
             width = math.log1p(_spread(base, p.name))
             moved, error = math.log(value / p.centre), fit.standard_error(p.name) / value
             if abs(moved) - 2.0 * error > _FAR * width:
-                told = f"{p.name} is {value:.3g} {p.unit}, {abs(moved) / width:.0f} declared spreads away"
-                found.append((abs(moved) / width, told))
-    return [told for _, told in sorted(found, key=lambda pair: -pair[0])][:3]
+                words = f"{p.name} is {value:.3g} {p.unit}, {abs(moved) / width:.0f} declared spreads away"
+                far.append((abs(moved) / width, words))
+    return [words for _, words in sorted(far, key=lambda pair: -pair[0])][:3]
 
 
 def _spread(base: Hypothesis, name: str) -> float:
@@ -124,16 +145,16 @@ def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:
     if len(angles) != 1 or len(ends) != 1:
         return []
     ((name, end),) = ends.items()
-    column, found = records.column(angles[0]), []
+    column, findings = records.column(angles[0]), []
     for record in records.records:
         size = np.abs(record.trace[angles[0]])
         if float(size.max()) > _OUT_OF_REACH * end:
             outside = record.trace.time[size > end]
-            found.append(
+            findings.append(
                 Finding(
                     f"{record.source}: column '{column.name}', {outside[0]:.4g} s to {outside[-1]:.4g} s",
                     f"goes to {size.max():.3g} rad, the declared cam ends at {end:.3g} rad ({name}): "
                     "is the unit right, or are these records of another rig?",
                 )
             )
-    return found
+    return findings

@@ -1,4 +1,4 @@
-"""Signs that the data themselves are wrong, seen against the refitted model."""
+"""Check of scale: a measured signal many times as large as the refitted model says, or turned in sign."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
 
 _FACTOR = 4.0
+"""Factor between measured and predicted beyond which a unit or a sign is wrong: no effect is that large."""
 
 
 def typical_sizes(actuator: Assembly, records: RecordSet) -> dict[str, float]:
@@ -33,11 +34,11 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> dict[str, float]:
     }
     state = [truth.get(v.name, v.start) for v in model.states]
     inputs = [truth.get(v.name, v.start) for v in model.inputs]
-    found = {name: abs(value) for name, value in model.evaluate(state, inputs).items()}
-    return {name: value for name, value in (found | truth | measured).items() if value > 0.0}
+    computed = {name: abs(value) for name, value in model.evaluate(state, inputs).items()}
+    return {name: value for name, value in (computed | truth | measured).items() if value > 0.0}
 
 
-def suspicions_of(comparison: Comparison, base: Hypothesis) -> list[Finding]:
+def scale_findings(comparison: Comparison, base: Hypothesis) -> list[Finding]:
     """Return records whose measured signal is many times, or a small part of, what the model predicts.
 
     Parameters
@@ -47,30 +48,30 @@ def suspicions_of(comparison: Comparison, base: Hypothesis) -> list[Finding]:
     base
         Refitted declared model.
     """
-    found = []
-    for evidence in comparison.judged(base):
-        target = evidence.block.target
+    findings = []
+    for judged in comparison.judged(base):
+        target = judged.block.target
         if target is None:
             continue
-        measured, predicted = evidence.record.trace[target], evidence.predicted
+        measured, predicted = judged.record.trace[target], judged.predicted
         ratio = float(measured @ predicted) / max(float(predicted @ predicted), 1e-300)
         if not 1.0 / _FACTOR < ratio < _FACTOR:
             head = comparison.bench.records.column(target).name
-            found.append(
+            findings.append(
                 Finding(
-                    f"{evidence.record.source}: column '{head}'",
+                    f"{judged.record.source}: column '{head}'",
                     f"is {ratio:.3g} times what the refitted model predicts from the motion" + _hint(ratio),
                 )
             )
-    return found
+    return findings
 
 
 def _hint(ratio: float) -> str:
-    known: Mapping[str, float] = {
+    usual: Mapping[str, float] = {
         "the sign is turned": -1.0,
         "is it in thousandths of the stated unit?": 1e3,
         "is it in thousands of the stated unit?": 1e-3,
         "degrees for radians?": 180.0 / np.pi,
     }
-    close = [words for words, size in known.items() if 0.5 < ratio / size < 2.0]
+    close = [words for words, size in usual.items() if 0.5 < ratio / size < 2.0]
     return f"; {close[0]}" if close else "; are these records of another rig?"

@@ -5,29 +5,31 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ConvergenceError
 from ...identification.equation_error.block import Block
-from ...identification.equation_error.block_response import DrivenBlock
+from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import declared_parameter, fit
-from ...identification.estimation.parameters import free_parameter
+from ...identification.estimation.least_squares import fit
+from ...identification.estimation.parameters import declared_parameter, free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
 from ...model import Assembly, Variable
 from ...parallel import parallel_map
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
+from ..fitting.unpredictable import Tally
 from .hypothesis import Hypothesis
-from .hypothesis_fit import Trials
-from .unpredictable import astray, like_the_others
+from .hypothesis_fit import FreeBlock, HypothesisFit
 
 Array = NDArray[np.float64]
 
 _LONGEST_ROW = 12
+"""Points of a row of numbers beyond which it is the table of a shape, of which no point is refitted alone."""
 _FREE_REACH = 30.0
 """Factor to the bounds of a number of which nothing is taken as known."""
 
@@ -72,8 +74,13 @@ class Comparison:
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
         self.bench = bench
-        self._trials = Trials(bench, sizes)
-        self._known: list[tuple[Hypothesis, tuple[Judged, ...]]] = []
+        self._fit = HypothesisFit(bench, sizes)
+        self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
+
+    @property
+    def keys(self) -> tuple[tuple[str, str], ...]:
+        """Names of the blocks and records that are compared, in a fixed order."""
+        return tuple(self.bench.floors)
 
     def base(self, assembly: Assembly) -> Hypothesis:
         """Refit the declared assembly, so that a wrong number is not taken for a wrong structure.
@@ -83,8 +90,8 @@ class Comparison:
         assembly
             As declared.
         """
-        blank = Hypothesis(assembly, (), {}, {}, {}, {}, {})
-        return self._refitted(blank, _groups(self._driven(blank)))
+        blank = Hypothesis(assembly)
+        return self._refitted(blank, self._groups(blank))
 
     def declared(self, assembly: Assembly) -> Hypothesis:
         """Return the declared assembly as it is, nothing fitted.
@@ -94,7 +101,7 @@ class Comparison:
         assembly
             As declared.
         """
-        return self.on_all_samples(Hypothesis(assembly, (), {}, {}, {}, {}, {}))
+        return self.on_all_samples(Hypothesis(assembly))
 
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis as the coarse look sees it.
@@ -104,7 +111,7 @@ class Comparison:
         hypothesis
             Fitted.
         """
-        return self._refitted(replace(hypothesis, coarse=True), _groups(self._driven(hypothesis)))
+        return self._refitted(replace(hypothesis, coarse=True), self._groups(hypothesis))
 
     def with_effect(
         self, hypothesis: Hypothesis, candidate: Candidate, wanted: Collection[str] = ()
@@ -121,8 +128,9 @@ class Comparison:
             Names of blocks; ``None`` is returned for an effect that touches none of them.
         """
         before = _edited(hypothesis, candidate)
-        groups = self._touched(before, candidate.unknowns)
-        if wanted and not any(b.block.name in wanted for g in groups for b in g):
+        names = {u.name for u in candidate.unknowns}
+        groups = [g for g in self._groups(before) if any(names & set(each.free) for each in g)]
+        if wanted and not any(each.block.name in wanted for g in groups for each in g):
             return None
         return self._refitted(before, groups, candidate.unknowns)
 
@@ -134,7 +142,7 @@ class Comparison:
         hypothesis
             Fitted coarsely.
         """
-        return self._refitted(replace(hypothesis, coarse=False), _groups(self._driven(hypothesis)))
+        return self._refitted(replace(hypothesis, coarse=False), self._groups(hypothesis))
 
     def freely(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis with its declared numbers fitted as if nothing were known of them.
@@ -145,23 +153,23 @@ class Comparison:
             Fitted, without effects. A fit that does not converge leaves its numbers as they are.
         """
         fits, values = dict(hypothesis.fits), dict(hypothesis.values)
-        fitted = self.bench.records.of("fit")
-        for group in _groups(self._driven(hypothesis)):
-            variables = {v.name: v for b in group for v in b.block.model.parameters}
-            free = [n for n in dict.fromkeys(n for b in group for n in b.free)]
+        records = self.bench.records.of("fit")
+        for group in self._groups(hypothesis):
+            variables = {v.name: v for each in group for v in each.block.model.parameters}
             parameters = [
                 free_parameter(variables[n], reach=_FREE_REACH)
                 if variables[n].start > 0.0
                 else declared_parameter(variables[n])
-                for n in free
+                for n in dict.fromkeys(n for each in group for n in each.free)
             ]
             start = {p.name: p.start for p in parameters}
+            driven = [self.bench.driven(each.block, each.free, start) for each in group]
             try:
-                found = fit([e for b in group for e in self.bench.evidence(b, fitted, start)], parameters)
+                best = fit([e for d in driven for e in self.bench.evidence(d, records, start)], parameters)
             except ConvergenceError:
                 continue
-            fits[tuple(b.block.name for b in group)] = found
-            values |= found.values
+            fits[tuple(each.block.name for each in group)] = best
+            values |= best.values
         return self.on_all_samples(replace(hypothesis, fits=fits, values=values))
 
     def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
@@ -172,13 +180,13 @@ class Comparison:
         hypothesis
             Fitted.
         """
-        chi2, rows, worth = {}, {}, {}
-        for each in self.judged(hypothesis):
-            key = each.block.name, each.record.name
-            chi2[key], rows[key] = float(each.residual @ each.residual), len(each.residual)
-            worth[key] = effective_size(each.residual)
-        chi2 = like_the_others(chi2, rows, hypothesis.astray)
-        return replace(hypothesis, chi2=chi2, rows=rows, worth=worth, coarse=False)
+        tallies = {
+            (each.block.name, each.record.name): Tally(
+                float(each.residual @ each.residual), len(each.residual), effective_size(each.residual)
+            )
+            for each in self.judged(hypothesis)
+        }
+        return replace(hypothesis.judged_by(tallies), coarse=False)
 
     def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
         """Return what all records say about all blocks of a hypothesis, on all samples.
@@ -186,55 +194,56 @@ class Comparison:
         Parameters
         ----------
         hypothesis
-            Fitted; the answer is remembered.
+            Fitted; the answer is remembered as long as the hypothesis is.
         """
-        if not any(known is hypothesis for known, _ in self._known):
-            fitted = [DrivenBlock(b, ()) for b in blocks_of(hypothesis.fitted, self.bench.records.signals)]
-            seen = [e for b in fitted for e in self.bench.evidence(b, self.bench.records.records, {})]
-            found = tuple(parallel_map(lambda k: _judged(seen[k]), len(seen)))
-            told = tuple(
-                Judged(e.driven.block, e.record, e.floor, *pair) for e, pair in zip(seen, found, strict=True)
+        if hypothesis not in self._judged:
+            signals, records = self.bench.records.signals, self.bench.records.records
+            driven = [self.bench.driven(block, ()) for block in blocks_of(hypothesis.fitted, signals)]
+            evidence = [e for each in driven for e in self.bench.evidence(each, records, {})]
+            pairs = parallel_map(lambda k: _prediction(evidence[k]), len(evidence))
+            self._judged[hypothesis] = tuple(
+                Judged(e.driven.block, e.record, e.floor, *pair)
+                for e, pair in zip(evidence, pairs, strict=True)
             )
-            self._known.append((hypothesis, told))
-        return next(told for known, told in self._known if known is hypothesis)
+        return self._judged[hypothesis]
 
-    def _driven(self, hypothesis: Hypothesis) -> list[DrivenBlock]:
-        found = []
+    def _groups(self, hypothesis: Hypothesis) -> list[list[FreeBlock]]:
+        """Return the blocks of a hypothesis in groups that share no free number."""
+        blocks = []
         for block in blocks_of(hypothesis.assembly, self.bench.records.signals):
             spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
-            found.append(DrivenBlock(block, list(dict.fromkeys([*spread, *own]))))
-        return found
-
-    def _touched(self, hypothesis: Hypothesis, unknowns: Sequence[Unknown]) -> list[list[DrivenBlock]]:
-        names = {u.name for u in unknowns}
-        return [g for g in _groups(self._driven(hypothesis)) if any(names & set(b.free) for b in g)]
+            blocks.append(FreeBlock(block, free_in(block, list(dict.fromkeys([*spread, *own])))))
+        return _groups(blocks)
 
     def _refitted(
-        self, before: Hypothesis, groups: Sequence[Sequence[DrivenBlock]], new: Sequence[Unknown] = ()
+        self, before: Hypothesis, groups: Sequence[Sequence[FreeBlock]], new: Sequence[Unknown] = ()
     ) -> Hypothesis:
-        values, fits = dict(before.values), dict(before.fits)
-        chi2, rows, worth = dict(before.chi2), dict(before.rows), dict(before.worth)
-        done = parallel_map(lambda k: self._trials.settled(before, groups[k], new), len(groups))
-        rough, gone = before.rough, before.astray
-        for group, (best, told, quick) in zip(groups, done, strict=True):
-            if isinstance(best, ConvergenceError):
-                raise best
-            values |= best.values
-            rough |= quick is not None
-            names = tuple(b.block.name for b in group)
-            fits = {k: f for k, f in fits.items() if not set(k) & set(names)} | {names: best}
-            for key, (square, count, size) in told.items():
-                chi2[key], rows[key], worth[key] = square, count, size
-            if quick is not None and before.coarse and new:
-                mine = {k: told[k][0] for k in told}, {k: told[k][1] for k in told}
-                gone = frozenset(k for k in gone if k not in told) | astray(before.chi2, *mine, quick)
-        chi2 = like_the_others(chi2, rows, gone)
-        told_of = replace(before, chi2=chi2, rows=rows, worth=worth, rough=rough, astray=gone)
-        return replace(told_of, values=values, fits=fits)
+        values, fits, tallies = dict(before.values), dict(before.fits), dict(before.tallies)
+        has_free_flight, unpredictable = before.has_free_flight, before.unpredictable
+        results = parallel_map(lambda k: self._fit.fitted(before, groups[k], new), len(groups))
+        for group, result in zip(groups, results, strict=True):
+            if isinstance(result, ConvergenceError):
+                raise result
+            values |= result.fit.values
+            names = tuple(each.block.name for each in group)
+            fits = {k: f for k, f in fits.items() if not set(k) & set(names)} | {names: result.fit}
+            tallies |= result.tallies
+            has_free_flight |= result.has_free_flight
+            others = frozenset(key for key in unpredictable if key not in result.tallies)
+            unpredictable = others | result.unpredictable
+        after = replace(
+            before,
+            values=values,
+            fits=fits,
+            has_free_flight=has_free_flight,
+            unpredictable=unpredictable,
+        )
+        return after.judged_by(tallies)
 
 
-def _judged(evidence: Evidence) -> tuple[Array, Array]:
+def _prediction(evidence: Evidence) -> tuple[Array, Array]:
+    """Return the unfiltered output, and the filtered error in units of the noise floor."""
     output = evidence.predicted({})
     target = evidence.driven.block.target
     error = (evidence.record.trace[target] if target else 0.0) - output
@@ -261,9 +270,9 @@ def _refittable(parameters: Sequence[Variable]) -> list[Variable]:
     return [v for v in parameters if v.spread > 0.0 and lengths[v.name.partition("[")[0]] <= _LONGEST_ROW]
 
 
-def _groups(blocks: Sequence[DrivenBlock]) -> list[list[DrivenBlock]]:
+def _groups(blocks: Sequence[FreeBlock]) -> list[list[FreeBlock]]:
     """Return blocks in groups that share no free parameter."""
-    groups: list[list[DrivenBlock]] = []
+    groups: list[list[FreeBlock]] = []
     for block in blocks:
         joined = [g for g in groups if any(set(b.free) & set(block.free) for b in g)]
         groups = [g for g in groups if g not in joined] + [[*(b for g in joined for b in g), block]]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from ...identification.estimation.least_squares import Fit
 from ...model import Assembly
 from ..effects.candidate import Candidate, Unknown
+from ..fitting.unpredictable import Key, Tally, like_the_others
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,31 +25,30 @@ class Hypothesis:
         Fitted numbers by name.
     fits
         One for each group of blocks that share parameters, by the names of the blocks.
-    chi2
-        Sum of squared residuals in units of the noise floor by block and record.
-    rows
-        Number of residuals by block and record.
-    worth
-        How many independent residuals these are worth, coloured as they are.
+    tallies
+        What is left over by block and record; empty where nothing was fitted yet.
     coarse
         Whether it was fitted to thinned records only.
-    rough
-        Whether a body coasts in it between contacts: one contact at the wrong moment, and the prediction
-        stays wrong for a while, however right the effect.
-    astray
+    has_free_flight
+        Whether a body flies freely in it between contacts: one contact at the wrong moment, and the
+        prediction stays wrong for a while, however right the effect.
+    unpredictable
         Blocks and records that such a body makes unpredictable; they count as the others do.
     """
 
     assembly: Assembly
-    added: tuple[Candidate, ...]
-    values: Mapping[str, float]
-    fits: Mapping[tuple[str, ...], Fit]
-    chi2: Mapping[tuple[str, str], float]
-    rows: Mapping[tuple[str, str], int]
-    worth: Mapping[tuple[str, str], float]
+    added: tuple[Candidate, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
+    fits: Mapping[tuple[str, ...], Fit] = field(default_factory=dict)
+    tallies: Mapping[Key, Tally] = field(default_factory=dict)
     coarse: bool = False
-    rough: bool = False
-    astray: frozenset[tuple[str, str]] = frozenset()
+    has_free_flight: bool = False
+    unpredictable: frozenset[Key] = frozenset()
+
+    @property
+    def newest(self) -> Candidate:
+        """The effect that was added last."""
+        return self.added[-1]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -63,9 +63,19 @@ class Hypothesis:
     @property
     def prior(self) -> float:
         """Sum of squared departures from declared numbers, in standard deviations of their spread."""
-        return float(sum(s**2 for f in self.fits.values() for s in f.strain().values()))
+        return float(sum(z**2 for f in self.fits.values() for z in f.prior_z_scores().values()))
 
     @property
     def fitted(self) -> Assembly:
         """The assembly with the fitted numbers."""
         return self.assembly.with_values(self.values)
+
+    def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
+        """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do.
+
+        Parameters
+        ----------
+        tallies
+            By block and record, as they are.
+        """
+        return replace(self, tallies=like_the_others(tallies, self.unpredictable))

@@ -1,33 +1,36 @@
-"""The search for what is missing: effects are added while a block stays open, dropped when superfluous."""
+"""The search for what is missing: effects are added while a block stays open, dropped when superfluous.
+
+What is tried, and in which order; :mod:`.criteria` decides.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 from ...errors import ConvergenceError
 from ...parallel import parallel_map
 from ..effects.candidate import Candidate, Effect
 from .comparison import Comparison
-from .excess import DECLARED, Excess, excesses, explained, total_excess
+from .criteria import (
+    DECLARED,
+    Excesses,
+    Rival,
+    best_shares,
+    choose,
+    is_explained,
+    is_superfluous,
+    lacking,
+    most_effects,
+    total_excess,
+)
+from .excess import excesses
 from .hypothesis import Hypothesis
 
-LEAST_SHARE = 0.5
-"""An effect must explain this share of the excess of some open block, on fit and on held-out records."""
-LEAST_SECOND = 0.05
-"""A further effect must explain this share of what that block lacked at first: forms are never exact."""
-CLOSED_SHARE = 0.75
-"""A block of which so much is explained counts as named, even if its form is not quite right."""
-SAME = 0.02
-"""A simpler hypothesis is taken if its excess is more by less than this share of the first excess."""
-ALIAS = 0.003
-"""Hypotheses whose excess differs by less than this share of the first excess cannot be told apart."""
-_NOISE = 50.0
-_MOST_EFFECTS, _MOST_ROUGH = 3, 2
-"""Where a body coasts a third effect takes minutes to look for, and would rest on what is not quite right."""
 _PAIRED = 4
-"""Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice."""
+"""Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice. Six pairs
+take about as long as the catalogue did."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,31 @@ class Step:
     @property
     def effect(self) -> str:
         """Identifier of what was added."""
-        return self.chosen.added[-1].effect
+        return self.chosen.newest.effect
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A candidate that was left out of the comparison.
+
+    Parameters
+    ----------
+    effect, location
+        Which.
+    beside
+        Effects that had been added before.
+    reason
+        Too expensive, or not converged.
+    """
+
+    effect: str
+    location: str
+    beside: tuple[str, ...]
+    reason: str
+
+    def __str__(self) -> str:
+        beside = f" beside {' and '.join(self.beside)}" if self.beside else ""
+        return f"{self.effect} at {self.location}{beside}: {self.reason}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,19 +89,22 @@ class Outcome:
     Parameters
     ----------
     last
-        Hypothesis with everything that was found, fitted to all samples.
+        Hypothesis with everything that was named, fitted to all samples.
     steps
         One for each effect.
     ranking
         What was tried first, with the share of the whole excess that each explains alone.
     explained
         Whether that accounts for every block that was open.
+    skipped
+        What could not be compared, and why.
     """
 
     last: Hypothesis
-    steps: tuple[Step, ...]
-    ranking: tuple[tuple[Candidate, float], ...]
-    explained: bool
+    steps: tuple[Step, ...] = ()
+    ranking: tuple[tuple[Candidate, float], ...] = ()
+    explained: bool = False
+    skipped: tuple[Skipped, ...] = ()
 
 
 def search(
@@ -93,102 +123,110 @@ def search(
     progress
         Told what is being tried.
     """
-    seeker = _Seeker(comparison, catalogue, progress)
-    start = comparison.coarsely(base)
-    first = excesses(start, comparison.bench)
-    steps, ranking = seeker.forward(start)
-    steps = seeker.backward(start, steps)
-    if not steps:
-        return Outcome(base, (), ranking, not any(e.open for e in first.values()))
-    progress("fitting what was found to all samples")
-    last = comparison.polished(steps[-1].chosen)
-    found = excesses(steps[-1].chosen, comparison.bench)
-    return Outcome(last, tuple(steps), ranking, is_explained(first, found))
+    return _Search(comparison, catalogue, progress).outcome(base)
 
 
-class _Seeker:
-    """Tries candidates on hypotheses, on all cores."""
+@dataclass(eq=False)
+class _Search:
+    """Tries candidates on hypotheses, on all cores, and keeps account of what could not be tried."""
 
-    def __init__(
-        self, comparison: Comparison, catalogue: Sequence[Effect], progress: Callable[[str], None]
-    ) -> None:
-        self._comparison, self._catalogue, self._progress = comparison, catalogue, progress
+    comparison: Comparison
+    catalogue: Sequence[Effect]
+    progress: Callable[[str], None]
+    skipped: list[Skipped] = field(default_factory=list)
+    ranking: tuple[tuple[Candidate, float], ...] = ()
 
-    def forward(self, start: Hypothesis) -> tuple[list[Step], tuple[tuple[Candidate, float], ...]]:
-        """Return the effects that help, one after the other, and how far each goes alone."""
-        bench = self._comparison.bench
-        first = before = excesses(start, bench)
-        steps: list[Step] = []
-        ranking: tuple[tuple[Candidate, float], ...] = ()
-        present = start
-        while (lacking := self._lacking(start, present)) and len(steps) < _most(present):
+    def outcome(self, base: Hypothesis) -> Outcome:
+        start = self.comparison.coarsely(base)
+        first = self._excesses(start)
+        steps = self._backward(start, self._forward(start))
+        if not steps:
+            return Outcome(base, (), self.ranking, not any(e.open for e in first.values()), self._skipped())
+        self.progress("fitting what was named to all samples")
+        last = self.comparison.polished(steps[-1].chosen)
+        done = is_explained(first, self._excesses(steps[-1].chosen))
+        return Outcome(last, tuple(steps), self.ranking, done, self._skipped())
+
+    def _excesses(self, hypothesis: Hypothesis) -> Excesses:
+        return excesses(hypothesis, self.comparison.bench)
+
+    def _skipped(self) -> tuple[Skipped, ...]:
+        return tuple(dict.fromkeys(self.skipped))
+
+    def _forward(self, start: Hypothesis) -> list[Step]:
+        """Return the effects that help, one after the other."""
+        first, present, steps = self._excesses(start), start, list[Step]()
+        while len(steps) < most_effects(has_free_flight=present.has_free_flight):
+            open_blocks = self._lacking(start, present)
+            if not open_blocks:
+                break
             tried: list[Hypothesis] = []
             step = None
-            for block in lacking:
+            for block in open_blocks:
                 # Effects elsewhere wait for their turn: most blocks have an effect of their own.
                 fresh = self._tried(present, block, tried)
                 tried += fresh
                 step = self._step(start, present, fresh, block)
                 if step is not None:
                     break
-            ranking = ranking or _ranked(self._comparison, before, tried)
-            steps += [step] if step else self._pair(tried, (first, before), lacking[0])
-            if not steps or steps[-1].chosen is present:
+            before = self._excesses(present)
+            self.ranking = self.ranking or self._ranked(before, tried)
+            further = [step] if step else self._pair(tried, first, before, open_blocks[0])
+            if not further:
                 break
+            steps += further
             present = steps[-1].chosen
-            before = excesses(present, bench)
-        return steps, ranking
+        return steps
 
-    def _step(
-        self, start: Hypothesis, present: Hypothesis, fresh: Sequence[Hypothesis], block: str
-    ) -> Step | None:
-        """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
-        bench = self._comparison.bench
-        first, before = excesses(start, bench), excesses(present, bench)
-        if before[block].open:
-            return _best_step(self._comparison, (first, before), fresh, block)
-        full = self._comparison.on_all_samples
-        best = sorted(fresh, key=lambda h: sum(excesses(h, bench)[block].chi2))[:_PAIRED]
-        sharp = [full(h) for h in best]
-        seen = {id(f): h for f, h in zip(sharp, best, strict=True)}
-        known = excesses(full(start), bench), excesses(full(present), bench)
-        found = _best_step(self._comparison, known, sharp, block)
-        return replace(found, chosen=seen[id(found.chosen)]) if found else None
-
-    def backward(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
+    def _backward(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
         """Drop the effects that later ones have made superfluous, the first added first."""
-        bench, place = self._comparison.bench, 0
-        first = excesses(start, bench)
+        first, place = self._excesses(start), 0
         while len(steps) > 1 and place < len(steps) - 1:
-            self._progress(f"trying without {steps[place].effect}")
-            rest = [s for k, s in enumerate(steps) if k != place]
-            fewer = self._rebuilt(start, rest)
-            enough = total_excess(excesses(steps[-1].chosen, bench)) + SAME * total_excess(first) + _NOISE
-            if fewer and total_excess(excesses(fewer[-1].chosen, bench)) <= enough:
+            self.progress(f"trying without {steps[place].effect}")
+            fewer = self._rebuilt(start, [s for k, s in enumerate(steps) if k != place])
+            if fewer and is_superfluous(
+                first, self._excesses(fewer[-1].chosen), self._excesses(steps[-1].chosen)
+            ):
                 steps = fewer
             else:
                 place += 1
         return steps
 
     def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
-        """Return the blocks that lack enough for a further effect to count, the largest excess first.
+        """Return the blocks in which all samples ask for a further effect."""
+        full = self.comparison.on_all_samples
+        first, now = self._excesses(full(start)), self._excesses(full(present))
+        return lacking(first, now, has_free_flight=present.has_free_flight)
 
-        Strained numbers count only where no block does.
-        """
-        bench, full = self._comparison.bench, self._comparison.on_all_samples
-        first, now = excesses(full(start), bench), excesses(full(present), bench)
-        # Where a body coasts, predictions are never exact: what is closed is not searched for more.
-        least = 1.0 - CLOSED_SHARE if present.rough else LEAST_SECOND
-        lack = [n for n, e in now.items() if e.open and sum(e.excess) >= least * sum(first[n].excess)]
-        blocks = sorted((n for n in lack if n != DECLARED), key=lambda n: -sum(now[n].excess))
-        return blocks or lack
+    def _step(
+        self, start: Hypothesis, present: Hypothesis, fresh: Sequence[Hypothesis], block: str
+    ) -> Step | None:
+        """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
+        first, before = self._excesses(start), self._excesses(present)
+        if before[block].open:
+            return self._chosen(first, before, {h: self._excesses(h) for h in fresh}, block)
+        full = self.comparison.on_all_samples
+        best = sorted(fresh, key=lambda h: sum(self._excesses(h)[block].chi2))[:_PAIRED]
+        on_all = {h: self._excesses(full(h)) for h in best}
+        return self._chosen(self._excesses(full(start)), self._excesses(full(present)), on_all, block)
+
+    def _chosen(
+        self, first: Excesses, before: Excesses, tried: dict[Hypothesis, Excesses], block: str
+    ) -> Step | None:
+        """Return the best of some hypotheses, by what each leaves."""
+        rivals = [Rival(h, h.newest.effect, len(h.newest.unknowns), after) for h, after in tried.items()]
+        choice = choose(first, before, rivals, block)
+        if choice is None:
+            return None
+        shares = best_shares(before, choice.taken.excesses)
+        return Step(choice.taken.hypothesis, *shares, tuple(r.hypothesis for r in choice.equals))
 
     def _candidates(self, present: Hypothesis) -> list[Candidate]:
-        return [c for effect in self._catalogue for c in effect(present.assembly)]
+        return [c for effect in self.catalogue for c in effect(present.assembly)]
 
     def _tried(self, present: Hypothesis, block: str, done: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return fits of the candidates that act on a block and were not tried before."""
-        known = {(h.added[-1].effect, h.added[-1].location) for h in done}
+        known = {(h.newest.effect, h.newest.location) for h in done}
         tasks = [(present, c) for c in self._candidates(present) if (c.effect, c.location) not in known]
         return self._fits(tasks, () if block == DECLARED else (block,))
 
@@ -196,43 +234,41 @@ class _Seeker:
         self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
     ) -> list[Hypothesis]:
         # What takes longest begins first, so that no core waits for it at the end.
-        order = sorted(range(len(tasks)), key=lambda number: tasks[number][1].sketch is None)
+        order = sorted(range(len(tasks)), key=lambda number: not tasks[number][1].strategy.takes_long)
 
         def fitted(place: int) -> Hypothesis | ConvergenceError | None:
             try:
-                return self._comparison.with_effect(*tasks[order[place]], wanted)
+                return self.comparison.with_effect(*tasks[order[place]], wanted)
             except ConvergenceError as error:
-                return error  # no response anywhere near its starts, or too dear: it explains nothing
+                return error  # no response anywhere near its starts, or too expensive: it explains nothing
 
-        found = {}
-        for number, one in zip(order, parallel_map(fitted, len(tasks)), strict=True):
-            candidate = tasks[number][1]
-            self._progress(f"trying {candidate.effect} at {candidate.location}")
-            if isinstance(one, ConvergenceError):
-                self._progress(f"left out: {one}")
-            elif one:
-                found[number] = one
-        return [found[number] for number in sorted(found)]
+        results: dict[int, Hypothesis] = {}
+        skipped: dict[int, Skipped] = {}
+        for number, result in zip(order, parallel_map(fitted, len(tasks)), strict=True):
+            before, candidate = tasks[number]
+            self.progress(f"trying {candidate.effect} at {candidate.location}")
+            if isinstance(result, ConvergenceError):
+                skipped[number] = Skipped(candidate.effect, candidate.location, before.names, result.rule)
+                self.progress(f"left out: {result}")
+            elif result:
+                results[number] = result
+        self.skipped += [skipped[number] for number in sorted(skipped)]
+        return [results[number] for number in sorted(results)]
 
-    def _pair(
-        self, tried: Sequence[Hypothesis], known: tuple[dict[str, Excess], dict[str, Excess]], block: str
-    ) -> list[Step]:
+    def _pair(self, tried: Sequence[Hypothesis], first: Excesses, before: Excesses, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""
-        bench = self._comparison.bench
-        best = sorted(tried, key=lambda h: total_excess(excesses(h, bench)))[:_PAIRED]
+        best = sorted(tried, key=lambda h: total_excess(self._excesses(h)))[:_PAIRED]
         tasks = [
             (one, again)
             for one, other in itertools.combinations(best, 2)
-            for again in [self._again(one, other.added[-1])]
-            if again is not None
+            if (again := self._again(one, other.newest)) is not None
         ]
-        pairs = self._fits(tasks)
-        step = _best_step(self._comparison, known, pairs, block)
+        pairs = {h: self._excesses(h) for h in self._fits(tasks)}
+        step = self._chosen(first, before, pairs, block)
         if step is None:
             return []
-        lone = next(h for h in best if h.added[-1].effect == step.chosen.added[-2].effect)
-        before = known[1]
-        return [Step(lone, *_best_shares(before, excesses(lone, bench))), step]
+        alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)
+        return [Step(alone, *best_shares(before, self._excesses(alone))), step]
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
         """Return the same effect at the same kind of place of another assembly."""
@@ -245,100 +281,24 @@ class _Seeker:
 
     def _rebuilt(self, start: Hypothesis, steps: Sequence[Step]) -> list[Step]:
         """Return the steps anew on another beginning; nothing if one of them no longer fits."""
-        bench, present, found = self._comparison.bench, start, []
+        present, rebuilt = start, list[Step]()
         for step in steps:
-            candidate = self._again(present, step.chosen.added[-1])
+            candidate = self._again(present, step.chosen.newest)
             if candidate is None:
                 return []
             try:
-                later = self._comparison.with_effect(present, candidate)
+                later = self.comparison.with_effect(present, candidate)
             except ConvergenceError:
                 return []
             if later is None:
                 return []
-            before, after = excesses(present, bench), excesses(later, bench)
-            found.append(Step(later, *_best_shares(before, after), step.equals))
+            shares = best_shares(self._excesses(present), self._excesses(later))
+            rebuilt.append(Step(later, *shares, step.equals))
             present = later
-        return found
+        return rebuilt
 
-
-def _best_step(
-    comparison: Comparison,
-    known: tuple[dict[str, Excess], dict[str, Excess]],
-    tried: Sequence[Hypothesis],
-    block: str,
-) -> Step | None:
-    """Return the simplest of the hypotheses that leave least in a block, without spoiling another."""
-    first, before = known
-    looks = [(h, excesses(h, comparison.bench)) for h in tried]
-    able = [(h, after) for h, after in looks if _helps(first, before, after)]
-    if not able:
-        return None
-
-    def left(after: dict[str, Excess]) -> float:
-        spoilt = sum(max(0.0, sum(e.excess) - sum(before[n].excess)) for n, e in after.items() if n != block)
-        return sum(after[block].excess) + spoilt
-
-    least, whole = min(left(after) for _, after in able), sum(before[block].excess)
-    equal = [(h, after) for h, after in able if left(after) <= least + SAME * whole + _NOISE]
-    chosen, after = min(equal, key=lambda pair: (len(pair[0].added[-1].unknowns), total_excess(pair[1])))
-    size = len(chosen.added[-1].unknowns)
-    limits = left(after) + ALIAS * whole + _NOISE, total_excess(after) + ALIAS * whole + _NOISE
-    alike = {
-        h.added[-1].effect: (h, other)
-        for h, other in reversed(equal)
-        if len(h.added[-1].unknowns) <= size and left(other) <= limits[0] and total_excess(other) <= limits[1]
-    }
-    # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
-    chosen, after = alike.pop(next(reversed(alike)))
-    return Step(chosen, *_best_shares(before, after), tuple(h for h, _ in alike.values()))
-
-
-def _most(present: Hypothesis) -> int:
-    return _MOST_ROUGH if present.rough else _MOST_EFFECTS
-
-
-def _best_shares(before: dict[str, Excess], after: dict[str, Excess]) -> tuple[float, float]:
-    """Return the share explained on fitted and on held-out records, of the block that gains most."""
-    shares = explained(before, after)
-    if not shares:
-        return 0.0, 0.0
-    block = max(shares, key=lambda name: shares[name])
-    pairs = zip(before[block].excess, after[block].excess, strict=True)
-    fitted, held = (1.0 - b / a if a > 0.0 else 1.0 for a, b in pairs)
-    return fitted, held
-
-
-def _helps(first: dict[str, Excess], before: dict[str, Excess], after: dict[str, Excess]) -> bool:
-    """Tell whether an effect explains enough of some open block without spoiling the whole."""
-    if total_excess(after) >= total_excess(before):
-        return False
-    for name, share in explained(before, after).items():
-        gone = sum(before[name].excess) - sum(after[name].excess)
-        if share >= LEAST_SHARE and gone >= LEAST_SECOND * sum(first[name].excess):
-            return True
-    return False
-
-
-def _ranked(
-    comparison: Comparison, before: dict[str, Excess], tried: Sequence[Hypothesis]
-) -> tuple[tuple[Candidate, float], ...]:
-    whole = max(total_excess(before), 1.0)
-    shares = [(h.added[-1], 1.0 - total_excess(excesses(h, comparison.bench)) / whole) for h in tried]
-    return tuple(sorted(shares, key=lambda pair: -pair[1]))
-
-
-def is_explained(first: dict[str, Excess], last: dict[str, Excess]) -> bool:
-    """Tell whether what was found accounts for every block that was open.
-
-    Declared numbers that stay strained are no objection where a block was open: they are said in ``where``.
-
-    Parameters
-    ----------
-    first, last
-        Of the refitted declared model and of the last hypothesis.
-    """
-    shares = explained(first, last)
-    if len(shares) > 1:
-        shares.pop(DECLARED, None)
-    return all(not last[name].open or share >= CLOSED_SHARE for name, share in shares.items())
+    def _ranked(self, before: Excesses, tried: Sequence[Hypothesis]) -> tuple[tuple[Candidate, float], ...]:
+        """Return how far each effect goes alone, the best first."""
+        whole = max(total_excess(before), 1.0)
+        shares = [(h.newest, 1.0 - total_excess(self._excesses(h)) / whole) for h in tried]
+        return tuple(sorted(shares, key=lambda pair: -pair[1]))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import ConvergenceError, unknown_name
 from ...symbolic import Expression, depends
 from ..records.measurement import Record
-from ..statistics.filters import calmed, derivative
+from ..statistics.filters import derivative, without_rounding
 from .batch import Batch
 from .block import Block, Drive
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
@@ -89,6 +89,11 @@ class DrivenBlock:
     free
         Names of the parameters with respect to which derivatives are taken; those on which the output does
         not depend are left out, see :attr:`free`.
+    records
+        Every record to which the block will be fitted: together, in whatever order, they decide which states
+        move faster than the samples and take short implicit steps. Without records none do.
+    values
+        Free parameters by name at which that is decided; those of the model by default.
 
     Raises
     ------
@@ -96,25 +101,29 @@ class DrivenBlock:
         If the model has no such parameter.
     """
 
-    def __init__(self, block: Block, free: Sequence[str]) -> None:
-        names = [v.name for v in block.model.parameters]
-        for name in free:
-            if name not in names:
-                raise unknown_name("parameter", name, names)
+    def __init__(
+        self,
+        block: Block,
+        free: Sequence[str],
+        *,
+        records: Sequence[Record],
+        values: Mapping[str, float] | None = None,
+    ) -> None:
         self.block = block
-        self.free = _influential(block, free)
+        self.free = free_in(block, free)
         self._fixed = block.model.values
         e = _equations(block, self.free)
         self._digest, self._size = Batch(e.digest), e.state.numel()
         self._late = [str(d.late_by) for d in _late_drives(block, self.free)]
         self._output = Batch(_output_function(e))
         self._equations = e
+        self._walk: _Walk | None = None
         if self._size:
             self._stages = stages_of(e.derivative, e.state, e.digested)
             arguments = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
             slope = ca.jacobian(e.derivative, e.state)
             self._rate = ca.Function("rate", arguments, [e.derivative, ca.densify(slope)])
-        self._walk: _Walk | None = None
+            self._walk = self._made_walk(records, {**self._fixed, **(values or {})})
 
     def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
         """Return the inputs of the block from a record.
@@ -126,6 +135,9 @@ class DrivenBlock:
         values
             Free parameters by name; a late signal is advanced by what stands there.
         """
+        return self._samples(record, values, smooth=self.stiff)
+
+    def _samples(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> Samples:
         model, n = self.block.model, len(record.trace)
         inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
         rates = np.zeros_like(inputs)
@@ -135,8 +147,8 @@ class DrivenBlock:
                 continue
             signal = record.trace[drive.signal]
             late = {**self._fixed, **values}[drive.late_by] if drive.late_by else 0.0
-            if self.stiff and drive.order == 0 and self._moves(drive.signal):
-                signal = calmed(signal)
+            if smooth and drive.order == 0 and self._moves(drive.signal):
+                signal = without_rounding(signal)
             inputs[i] = derivative(signal, record.step, order=drive.order)
             if drive.late_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], late)
@@ -152,26 +164,14 @@ class DrivenBlock:
         """Whether the samples depend on free parameters, that is, whether a free delay advances a signal."""
         return bool(self._late)
 
-    def prepare(self, given: Samples, values: Mapping[str, float]) -> None:
-        """Make the functions of a step, if there are none yet; they suit all records.
-
-        Parameters
-        ----------
-        given, values
-            As for :meth:`respond`.
-        """
-        if self._size and self._walk is None:
-            p = np.array([values[name] for name in (*self.free, *self._late)])
-            self._walk = self._made_walk(self._rest(given.begin[:, 0], p), given, p)
-
     @property
     def stiff(self) -> bool:
-        """Whether some states move faster than the samples, as contact does; known once prepared."""
+        """Whether some states move faster than the samples of some record, as contact does."""
         return self._walk is not None and self._walk.stiff
 
     @property
     def instructions(self) -> int:
-        """How many operations one step with all its derivatives takes; known once prepared."""
+        """How many operations one step with all its derivatives takes."""
         return self._walk.instructions if self._walk is not None else 0
 
     def respond(self, given: Samples, values: Mapping[str, float]) -> Response:
@@ -191,45 +191,56 @@ class DrivenBlock:
         """
         p = np.array([values[name] for name in (*self.free, *self._late)])
         n = given.at.shape[1]
-        states, mean = self._states(given, p) if self._size else (np.zeros((0, n)), None)
-        found = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
-        if not np.all(np.isfinite(found)):
+        states, mean = (np.zeros((0, n)), None) if self._walk is None else self._states(self._walk, given, p)
+        result = self._output(n, [states, given.at, p]) if mean is None else _centred(mean)
+        if not np.all(np.isfinite(result)):
             raise ConvergenceError(
                 f"block '{self.block.name}'",
                 "its response is not finite",
                 next_step="narrow the bounds of the parameters",
             )
-        return Response(found[0], found[1:].T)
+        return Response(result[0], result[1:].T)
 
-    def _states(self, given: Samples, p: Array) -> tuple[Array, Array | None]:
+    def _states(self, walk: _Walk, given: Samples, p: Array) -> tuple[Array, Array | None]:
         """Return states and sensitivities, and the mean output over each step where the walk takes it."""
         (n, size), begin, end = (given.at.shape[1], self._size), given.begin, given.end
-        rest = self._rest(begin[:, 0], p)
-        walk, many = self._walk or self._made_walk(rest, given, p), size * (1 + len(self.free))
-        self._walk = walk
+        rest, many = self._rest(begin[:, 0], p), size * (1 + len(self.free))
         start = np.zeros(many + (1 + len(self.free) if walk.mean else 0))
         start[:size] = rest
         slope = self._rate(rest, begin.mean(axis=1), p)[1].full()
         near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
         tables = walk.tables(p, given.step).full().ravel(order="F")
         constant = np.concatenate([p, tables, *near, [given.step]])
-        found = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
-        return found[:many], found[many:] if walk.mean else None
+        path = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
+        return path[:many], path[many:] if walk.mean else None
 
-    def _made_walk(self, rest: Array, given: Samples, p: Array) -> _Walk:
+    def _made_walk(self, records: Sequence[Record], values: Mapping[str, float]) -> _Walk:
         """Return the functions of a step, with short implicit steps for what is faster than a sample."""
-        few = given.begin[:, :: max(1, given.begin.shape[1] // _PROBES)].T
-        slopes = [self._rate(rest, column, p)[1].full() for column in few]
-        steepest = [
-            max(float(np.linalg.norm(m[np.ix_(g.states, g.states)], 2)) for m in slopes) for g in self._stages
+        p = np.array([values[name] for name in (*self.free, *self._late)])
+        stretches = np.zeros(len(self._stages))
+        for record in records:
+            stretches = np.maximum(stretches, self._stretches(self._samples(record, values, smooth=False), p))
+        stiff = [
+            not stage.linear and bool(size > STIFF)
+            for stage, size in zip(self._stages, stretches, strict=True)
         ]
-        stiff = [not g.linear and s * given.step > STIFF for g, s in zip(self._stages, steepest, strict=True)]
         # What jumps within a step is not seen at its ends; a balance of efforts counts the impulse.
         mean = any(stiff) and self.block.target is None
         tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
         rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
         near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
         return _Walk(tables, Batch(step, chained=True), near, any(stiff), mean, step.n_instructions())
+
+    def _stretches(self, given: Samples, p: Array) -> Array:
+        """Return for each stage the largest norm of its derivative along a record, times the step."""
+        rest = self._rest(given.begin[:, 0], p)
+        probes = given.begin[:, :: max(1, given.begin.shape[1] // _PROBES)].T
+        slopes = [self._rate(rest, column, p)[1].full() for column in probes]
+        # Where there is no derivative there is no response either, and a fit is told so.
+        slopes = [slope for slope in slopes if np.all(np.isfinite(slope))]
+        inside = [np.ix_(stage.states, stage.states) for stage in self._stages]
+        steepest = [max((float(np.linalg.norm(m[k], 2)) for m in slopes), default=0.0) for k in inside]
+        return given.step * np.array(steepest)
 
     def _ends(self, inputs: Array, rates: Array, at: Array, step: float) -> tuple[Array, Array]:
         """Return what is known at both ends of every step; rates are those of the line in between."""
@@ -279,10 +290,26 @@ def _late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
     return [d for d in block.drives.values() if d.late_by in free]
 
 
-def _influential(block: Block, free: Sequence[str]) -> tuple[str, ...]:
-    """Return the names that the output depends on, directly, through the states, or as a delay."""
+def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
+    """Return the parameters that the output depends on, directly, through the states, or as a delay.
+
+    Parameters
+    ----------
+    block
+        Model, drives and output.
+    free
+        Names of parameters.
+
+    Raises
+    ------
+    UnknownNameError
+        If the model has no such parameter.
+    """
     s = block.model.symbols()
     names = [v.name for v in block.model.parameters]
+    for name in free:
+        if name not in names:
+            raise unknown_name("parameter", name, names)
     together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
     late = {d.late_by for d in block.drives.values()}
     return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))

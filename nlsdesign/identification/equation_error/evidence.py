@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from ...errors import MeasurementError
 from ...simulation import Trace
+from ..records.canonical_order import in_canonical_order
 from ..records.measurement import Record, RecordSet
 from ..statistics.filters import derivative, noise_gain, rate_noise_gain, smoothing
 from .block import Block
@@ -142,13 +143,13 @@ def _variances(block: Block, record: Record, noise: Noise, inputs: Array) -> tup
     slope = ca.Function(
         "slope", [s.state, s.input, s.parameter, s.table], [ca.densify(ca.jacobian(s.output, s.input))]
     )
-    few = np.arange(0, inputs.shape[1], STRIDE)
+    places = np.arange(0, inputs.shape[1], STRIDE)
     start, values = model.start(model.states), model.start(model.parameters)
-    flat = slope.map(len(few))(start, inputs[:, few], values, np.zeros(0)).full()
-    gains = flat.reshape(len(few), -1).T
+    flat = slope.map(len(places))(start, inputs[:, places], values, np.zeros(0)).full()
+    gains = flat.reshape(len(places), -1).T
     own = noise.level[block.target] if block.target else 0.0
-    variance = np.full(len(few), (own * noise_gain(block.width, 0)) ** 2)
-    raw = np.full(len(few), own**2)
+    variance = np.full(len(places), (own * noise_gain(block.width, 0)) ** 2)
+    raw = np.full(len(places), own**2)
     for i, variable in enumerate(model.inputs):
         drive = block.drives.get(variable.name)
         if drive is None:
@@ -159,7 +160,7 @@ def _variances(block: Block, record: Record, noise: Noise, inputs: Array) -> tup
         gain = 1.0 if constant else noise_gain(block.width, drive.order) / record.step**drive.order
         variance += (gains[i] * level * gain) ** 2
         raw += (gains[i] * level) ** 2 if drive.order == 0 else 0.0
-    every = np.minimum(np.arange(inputs.shape[1]) // STRIDE, len(few) - 1)
+    every = np.minimum(np.arange(inputs.shape[1]) // STRIDE, len(places) - 1)
     return variance[every], raw[every]
 
 
@@ -186,11 +187,11 @@ class Evidence:
             Shapes (rows,) and (rows, free parameters of the block).
         """
         samples = self.driven.samples(self.record, values) if self.driven.needs_new_samples else self.samples
-        found = self.driven.respond(samples, values)
+        response = self.driven.respond(samples, values)
         target = self.driven.block.target
-        error = (self.record.trace[target] if target else 0.0) - found.output
+        error = (self.record.trace[target] if target else 0.0) - response.output
         sigma = self.floor.sigma
-        return (self.floor.filter @ error) / sigma, -(self.floor.filter @ found.slope) / sigma[:, None]
+        return (self.floor.filter @ error) / sigma, -(self.floor.filter @ response.slope) / sigma[:, None]
 
     def predicted(self, values: Mapping[str, float]) -> Array:
         """Return the unfiltered output over the record.
@@ -205,25 +206,31 @@ class Evidence:
 
 
 class Bench:
-    """The records as every hypothesis sees them: same filter, same rows, same noise floor.
+    """The records as every hypothesis sees them: same order, same filter, same rows, same noise floor.
 
     Parameters
     ----------
     records
-        All records.
+        All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
     blocks
         Of the declared model; they fix rows and noise floor.
+
+    Raises
+    ------
+    MeasurementError
+        If no record moves enough to say anything about a block.
     """
 
     def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
-        self.records = records
-        self.noise = estimate_noise(records)
+        self.records = in_canonical_order(records)
+        self.given_order = {record.name: place for place, record in enumerate(records.records)}
+        self.noise = estimate_noise(self.records)
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
         for block in blocks:
             self._check_alive(block)
-            for record in records.records:
+            for record in self.records.records:
                 floor = noise_floor(block, record, self.noise)
                 if len(floor.sigma) >= _LEAST_ROWS:
                     self.floors[block.name, record.name] = floor
@@ -238,12 +245,12 @@ class Bench:
         if block.target is None or self.noise.level[block.target] > 0.0:
             return
         head = self.records.column(block.target).name
-        told = [
+        reasons = [
             f for f in self.records.findings if f.place.partition(", row")[0].endswith(f"column '{head}'")
         ]
         raise MeasurementError(
-            told[0].place if told else f"column '{head}'",
-            f"{told[0].text if told else 'has no noise'}, so block '{block.name}' cannot be judged",
+            reasons[0].place if reasons else f"column '{head}'",
+            f"{reasons[0].text if reasons else 'has no noise'}, so block '{block.name}' cannot be judged",
             next_step="check that the channel was connected, or leave its column out of records.toml",
         )
 
@@ -258,6 +265,20 @@ class Bench:
         return (
             f"record a motion in which {signal} changes faster than {least:.3g} {unit}/s, for seconds on end"
         )
+
+    def driven(
+        self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
+    ) -> DrivenBlock:
+        """Return a block ready for evaluation on these records.
+
+        Parameters
+        ----------
+        block, free, values
+            As for :class:`~.block_response.DrivenBlock`. The records that fits may see decide what is stiff;
+            if there are none, as where a finished model is only looked at, all do.
+        """
+        records = self.records.of("fit") or self.records.records
+        return DrivenBlock(block, free, records=records, values=values)
 
     def evidence(
         self,
@@ -282,19 +303,15 @@ class Bench:
             quick look, less sharp by the square root of the number of samples left out. Blocks that are
             faster than a sample are simulated on all.
         """
-        name = driven.block.name
-        found = []
+        name, thin = driven.block.name, coarse and driven.block.target is not None
+        result = []
         for record in records:
             if (name, record.name) in self.floors:
                 seen, floor = record, self.floors[name, record.name]
-                given = driven.samples(record, values)
-                driven.prepare(given, values)
-                given = driven.samples(record, values) if driven.stiff else given  # now it is known to be
-                if coarse and driven.block.target is not None:
+                if thin:
                     seen, floor = self._thinned(name, record, whole=driven.stiff)
-                    given = given if driven.stiff else driven.samples(seen, values)
-                found.append(Evidence(driven, seen, floor, given))
-        return found
+                result.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
+        return result
 
     def typical_floor(self, block: str) -> float:
         """Return the noise floor of a block over all records, root mean square, in its unit.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import ConvergenceError
 from ..equation_error.evidence import Evidence
-from ..statistics.losses import bent, saturated
+from ..statistics.losses import bounded_total, huber_rows
 from ..statistics.residuals import autocorrelation
 from .levenberg_marquardt import Minimum, minimise
 from .parameters import Parameter as Parameter
@@ -21,13 +21,15 @@ from .parameters import declared_parameter as declared_parameter
 Array = NDArray[np.float64]
 
 _EVALUATIONS = 40
-_OPEN_END = 1e-6
-"""Least information on the fitted scale."""
-_WILD = 1e3
-"""Where a body coasts, a response to a number that is steeper than this, in standard deviations of the noise,
-is that of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
-_BEND = 3.0
-"""Standard deviations beyond which, where a body coasts, a residual counts as Huber says."""
+"""Bound of evaluations: a fit that has not ended by then is not going to."""
+_LEAST_INFORMATION = 1e-6
+"""Information on the fitted scale that is taken for granted, so that a covariance is never infinite."""
+_OUTLYING_SLOPE = 1e3
+"""Where a body flies freely, a slope that is steeper than this, in standard deviations of the noise, is that
+of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
+_HUBER = 3.0
+"""Standard deviations beyond which, where a body flies freely, a residual counts as Huber says: noise stays
+within."""
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
 
@@ -49,7 +51,7 @@ class Fit:
     misfit
         Half the sum of squares of the residuals alone, per block and record.
     converged
-        Whether the descent ended by itself.
+        Whether the fit ended by itself.
     """
 
     parameters: tuple[Parameter, ...]
@@ -76,7 +78,7 @@ class Fit:
         result: Array = self.covariance / np.outer(deviation, deviation)
         return result
 
-    def strain(self) -> dict[str, float]:
+    def prior_z_scores(self) -> dict[str, float]:
         """Return how far each parameter has moved from its declared value, in prior standard deviations."""
         return {
             p.name: (p.inward(self.values[p.name]) - p.inward(p.centre)) / p.sigma
@@ -87,7 +89,7 @@ class Fit:
     def unidentified(self) -> list[str]:
         """Return in words what the records cannot tell: combinations of parameters that they leave open."""
         spread, axes = np.linalg.eigh(self.covariance)
-        found = []
+        sentences = []
         for deviation, axis in zip(np.sqrt(np.maximum(spread, 0.0)), axes.T, strict=True):
             if deviation < _WEAK:
                 continue
@@ -96,8 +98,8 @@ class Fit:
             first = np.sign(named[0][1])
             words = [f"{n} {'up' if a * first > 0 else 'down'}" for n, a in named]
             known = f"known to {100 * deviation:.0f} % only" if deviation < 3.0 else "not known at all"
-            found.append(f"{' with '.join(words)}: {known}")
-        return found
+            sentences.append(f"{' with '.join(words)}: {known}")
+        return sentences
 
 
 def fit(
@@ -125,8 +127,8 @@ def fit(
         Ends too when the predicted gain is below this.
     known
         Sum of squares by block and record that another model reaches. If this is given, then where a body
-        coasts far residuals count as Huber says, and a record that is worse than what is known counts ever
-        less, see :func:`~.losses.saturated`. Without it every residual counts alike.
+        flies freely outlying residuals count as Huber says, and a record that is worse than what is known
+        counts ever less, see :func:`~.losses.bounded_total`. Without it every residual counts alike.
 
     Raises
     ------
@@ -137,19 +139,19 @@ def fit(
     low, high, start = box(parameters)
     if not parameters:
         fixed = rows(start)[0]
-        found = Minimum(start, 0.5 * float(fixed @ fixed), True)
+        ended = Minimum(start, 0.5 * float(fixed @ fixed), True)
     else:
-        found = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
-    if not np.isfinite(found.cost):
+        ended = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
+    if not np.isfinite(ended.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
-    residual, slope = rows(found.x)
+    residual, slope = rows(ended.x)
     misfit, place = {}, len(parameters)
     for each in evidence:
         own = residual[place : place + len(each.floor.sigma)]
         misfit[each.driven.block.name, each.record.name] = 0.5 * float(own @ own)
         place += len(own)
     covariance = covariance_of(residual[len(parameters) :], slope, len(parameters))
-    return Fit(tuple(parameters), rows.values(found.x), covariance, found.cost, misfit, found.converged)
+    return Fit(tuple(parameters), rows.values(ended.x), covariance, ended.cost, misfit, ended.converged)
 
 
 def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
@@ -202,11 +204,11 @@ class _Rows:
                 j = self._names.index(name)
                 wide[:, j] = slope[:, k] * self._parameters[j].slope(values[name])
             if each.driven.stiff:
-                wide[np.abs(wide).max(axis=1) > _WILD] = 0.0
+                wide[np.abs(wide).max(axis=1) > _OUTLYING_SLOPE] = 0.0
             if each.driven.stiff and self._known is not None:
-                residual, wide = bent(residual, wide, _BEND)
+                residual, wide = huber_rows(residual, wide, _HUBER)
                 bound = self._known.get((each.driven.block.name, each.record.name), math.inf)
-                residual, wide = saturated(residual, wide, max(bound, float(len(residual))))
+                residual, wide = bounded_total(residual, wide, max(bound, float(len(residual))))
             rows.append(residual)
             slopes.append(wide)
         return np.concatenate(rows), np.vstack(slopes)
@@ -225,5 +227,5 @@ def covariance_of(residual: Array, slope: Array, priors: int) -> Array:
     information = data.T @ data / (colour * size) + slope[:priors].T @ slope[:priors]
     # What the records leave open altogether gets a large variance, not an infinite one.
     strength, axes = np.linalg.eigh(information)
-    result: Array = np.asarray((axes / np.maximum(strength, _OPEN_END)) @ axes.T, dtype=np.float64)
+    result: Array = np.asarray((axes / np.maximum(strength, _LEAST_INFORMATION)) @ axes.T, dtype=np.float64)
     return result

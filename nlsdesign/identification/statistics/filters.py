@@ -43,12 +43,12 @@ def derivative(signal: Array, step: float, *, order: int) -> Array:
     return second
 
 
-def calmed(signal: Array) -> Array:
+def without_rounding(signal: Array) -> Array:
     """Return a motion without most of its rounding: cubics through eleven samples (Savitzky and Golay 1964).
 
     A motion that is a cubic over eleven samples passes unchanged, so amplitudes and stops keep their place.
-    The speed of a straight line between two samples is rounded to one quantum per step; what coasts on with
-    that speed after a contact goes astray.
+    The speed of a straight line between two samples is rounded to one quantum per step; a body that flies
+    freely with that speed after a contact takes a wrong course.
 
     Parameters
     ----------

@@ -52,30 +52,32 @@ class Squares(Loss):
 
 @dataclass(frozen=True)
 class Huber(Loss):
-    """Squares up to some standard deviations, lines beyond: a few wild samples do not decide.
+    """Squares up to some standard deviations, lines beyond: a few outliers do not decide.
 
     ρ(r) = ½·r² for |r| ≤ k, k·|r| − ½·k² beyond. Source: Huber 1964.
 
     Parameters
     ----------
-    bend
+    limit
         k in standard deviations; 1.345 keeps 95 % of the efficiency on normal noise.
     """
 
-    bend: float = 1.345
+    limit: float = 1.345
 
     def value(self, residual: Array) -> float:
         """Return Σρ(r)."""
         size = np.abs(residual)
-        return float(np.sum(np.where(size <= self.bend, 0.5 * size**2, self.bend * (size - 0.5 * self.bend))))
+        return float(
+            np.sum(np.where(size <= self.limit, 0.5 * size**2, self.limit * (size - 0.5 * self.limit)))
+        )
 
     def weight(self, residual: Array) -> Array:
         """Return √(min(1, k/|r|))."""
-        result: Array = np.sqrt(np.minimum(1.0, self.bend / np.maximum(np.abs(residual), 1e-300)))
+        result: Array = np.sqrt(np.minimum(1.0, self.limit / np.maximum(np.abs(residual), 1e-300)))
         return result
 
 
-def bent(residual: Array, slope: Array, bend: float) -> tuple[Array, Array]:
+def huber_rows(residual: Array, slope: Array, limit: float) -> tuple[Array, Array]:
     """Return residuals and slopes scaled so that half the sum of squares is Huber's loss.
 
     Parameters
@@ -84,17 +86,17 @@ def bent(residual: Array, slope: Array, bend: float) -> tuple[Array, Array]:
         In standard deviations, shape (n,).
     slope
         Its derivatives, shape (n, parameters).
-    bend
+    limit
         Beyond so many standard deviations the loss is a line.
     """
     size = np.abs(residual)
-    far = size > bend
-    scaled = np.where(far, np.sqrt(np.maximum(2.0 * bend * size - bend**2, 0.0)), size)
-    steepness = np.where(far, bend / np.maximum(scaled, 1e-300), 1.0)
+    far = size > limit
+    scaled = np.where(far, np.sqrt(np.maximum(2.0 * limit * size - limit**2, 0.0)), size)
+    steepness = np.where(far, limit / np.maximum(scaled, 1e-300), 1.0)
     return np.sign(residual) * scaled, steepness[:, None] * slope
 
 
-def saturated(residual: Array, slope: Array, bound: float) -> tuple[Array, Array]:
+def bounded_total(residual: Array, slope: Array, bound: float) -> tuple[Array, Array]:
     """Return residuals and slopes scaled so that their sum of squares c counts as ρ(c) < 2·bound.
 
     ρ(c) = c up to the bound, bound·(2 − bound/c) beyond: smooth, and rising ever more slowly. For a whole
@@ -115,5 +117,5 @@ def saturated(residual: Array, slope: Array, bound: float) -> tuple[Array, Array
     share = bound / total
     scale = math.sqrt(share * (2.0 - share))
     # The derivative of the scale with respect to c = Σr², for the exact slope of scale·r.
-    bent = share * (share - 1.0) / (total * scale)
-    return scale * residual, scale * slope + np.outer(2.0 * bent * residual, residual @ slope)
+    steepness = share * (share - 1.0) / (total * scale)
+    return scale * residual, scale * slope + np.outer(2.0 * steepness * residual, residual @ slope)

@@ -17,8 +17,8 @@ _MEDIAN_OF_NORMAL = 0.6744897501960817
 def noise_of(signal: Array) -> float:
     """Estimate the standard deviation of the white noise in a sampled signal.
 
-    The fourth difference removes everything smooth; its median size is that of the noise. Source: the idea of
-    von Neumann et al. 1941, robust form e.g. in Gasser, Sroka and Jennen-Steinmetz 1986.
+    The fourth difference removes everything smooth; its median size is that of the noise. Source:
+    von Neumann et al. 1941 (the idea); Gasser et al. 1986 (a robust form).
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ def autocorrelation(residual: Array, lags: int) -> Array:
     centred = residual - residual.mean()
     size = 1 << int(np.ceil(np.log2(2 * len(centred))))
     power: Array = np.abs(np.fft.rfft(centred, size)) ** 2
-    found = np.fft.irfft(power, size)[: lags + 1]
-    result: Array = found / found[0] if found[0] > 0.0 else np.eye(1, lags + 1)[0]
+    covariance = np.fft.irfft(power, size)[: lags + 1]
+    result: Array = covariance / covariance[0] if covariance[0] > 0.0 else np.eye(1, lags + 1)[0]
     return result
 
 
 def effective_size(residual: Array) -> float:
-    """Return how many independent samples a coloured residual is worth.
+    """Return how many independent samples a coloured residual is equivalent to.
 
     n/(1 + 2Σρₖ²), the size for the variance of a mean square (Bartlett 1946), summed while ρ is above its
     own noise.
@@ -79,7 +79,7 @@ def effective_size(residual: Array) -> float:
 
 
 class Whiteness(NamedTuple):
-    """Ljung–Box statistic relative to its expectation, and the size the residual is worth."""
+    """Ljung–Box statistic relative to its expectation, and its effective size."""
 
     ratio: float
     effective_size: float

@@ -1,0 +1,246 @@
+"""Which part of a machine plays which role, decided from its structure and never from its names.
+
+A command that needs the series spring, the driven body or the load asks here. Where the structure leaves the
+answer open, one sentence says which role was looked for, what there is, and how to name the part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+from ..errors import ArrangementError, unknown_name
+from .flat import FlatModel
+from .structure import CamNames, MotorNames, MovingBody, SpringNames
+
+Named = TypeVar("Named")
+
+
+def series_spring(model: FlatModel, name: str | None = None) -> SpringNames:
+    """Return the spring between drive and load: the only one with a cam, or else the only one.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    name
+        Path of the spring; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no spring of that name.
+    ArrangementError
+        If the structure does not decide.
+    """
+    if name is not None:
+        return _named("spring", name, {spring.name: spring for spring in model.springs})
+    with_cam = [spring for spring in model.springs if spring.cams]
+    candidates = with_cam or list(model.springs)
+    if len(candidates) == 1:
+        return candidates[0]
+    raise _undecided(
+        model,
+        "the series spring (the only spring with a cam, or else the only spring)",
+        _listed("spring", [spring.name for spring in candidates], "with a cam" if with_cam else ""),
+        _choice(
+            "spring", [spring.name for spring in candidates], "tie an elastic element between two bodies"
+        ),
+    )
+
+
+def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
+    """Return the cam of the series spring.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    name
+        Path of a spring with one cam, or of the part in it that holds the cam.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no cam spring of that name.
+    ArrangementError
+        If the structure does not decide.
+    """
+    cams = {cam.drive: cam for spring in model.springs for cam in spring.cams}
+    if name is not None:
+        cams |= {spring.name: spring.cams[0] for spring in model.springs if len(spring.cams) == 1}
+        return _named("cam spring", name, cams)
+    if len(cams) == 1:
+        return next(iter(cams.values()))
+    raise _undecided(
+        model,
+        "the cam spring (the only cam with an element behind it)",
+        _listed("cam spring", list(cams)),
+        _choice("spring", list(cams), "declare the spring with through(cam, ...)"),
+    )
+
+
+def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
+    """Return the body that the drive moves: the only one with a motor, or else the only one that is free.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    name
+        Path of the body; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no free body of that name.
+    ArrangementError
+        If the structure does not decide.
+    """
+    free = [body for body in model.bodies if not body.prescribed]
+    if name is not None:
+        return _named("body", name, {body.name: body for body in free})
+    motors = [body for body in free if body.motor]
+    candidates = motors or free
+    if len(candidates) == 1:
+        return candidates[0]
+    raise _undecided(
+        model,
+        "the driven body (the only one with a motor, or else the only one that moves freely)",
+        _listed(
+            "body", [body.name for body in candidates], "with a motor" if motors else "that moves freely"
+        ),
+        _choice(
+            "measured", [body.motion for body in candidates], "declare a body that moves, such as a motor"
+        ),
+    )
+
+
+def measured_motion(model: FlatModel, name: str | None = None) -> str:
+    """Return the state that is measured and swept: the motion of the driven body.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    name
+        Name of the state; decided from the structure if it is left out.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not decide.
+    """
+    return driven_body(model).motion if name is None else name
+
+
+def spring_torque(model: FlatModel, name: str | None = None) -> str:
+    """Return the signal of the torque (or force) of the series spring.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    name
+        Name of the signal; decided from the structure if it is left out.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not decide.
+    """
+    return series_spring(model).effort if name is None else name
+
+
+def motor_of(model: FlatModel) -> tuple[MovingBody, MotorNames]:
+    """Return the driven body and the motor in it.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not decide, or the driven body has no motor.
+    """
+    body = driven_body(model)
+    if body.motor is None:
+        raise _undecided(
+            model, "the motor", f"there is none in '{body.name}', the driven body",
+            "declare it as a motor, for instance a GearedMotor",
+        )  # fmt: skip
+    return body, body.motor
+
+
+def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
+    """Return the load whose motion is prescribed: at the far end of the series spring, or else the only one.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    name
+        Path of the body; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no body of that name with a prescribed motion.
+    ArrangementError
+        If the structure does not decide.
+    """
+    prescribed = {body.name: body for body in model.bodies if body.prescribed}
+    if name is not None:
+        return _named("driven load", name, prescribed)
+    ends = {
+        end for spring in model.springs if spring.cams or len(model.springs) == 1 for end in spring.between
+    }
+    candidates = [body for body in prescribed.values() if body.name in ends] or list(prescribed.values())
+    if len(candidates) == 1:
+        return candidates[0]
+    raise _undecided(
+        model,
+        "the moved load (the body with a prescribed motion at the end of the series spring)",
+        _listed("body", [body.name for body in candidates], "with a prescribed motion"),
+        _choice("load", [body.name for body in candidates], "declare the load as Driven()"),
+    )
+
+
+def is_actuator(model: FlatModel) -> bool:
+    """Tell whether a model has a spring and a motor, as a series elastic actuator does.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    """
+    return bool(model.springs) and any(body.motor for body in model.bodies)
+
+
+def _named(kind: str, name: str, parts: dict[str, Named]) -> Named:
+    if name not in parts:
+        raise unknown_name(kind, name, parts)
+    return parts[name]
+
+
+def _undecided(model: FlatModel, role: str, present: str, next_step: str) -> ArrangementError:
+    return ArrangementError(f"model '{model.name}'", f"needs {role}, but {present}", next_step=next_step)
+
+
+def _listed(kind: str, names: Sequence[str], which: str = "") -> str:
+    if not names:
+        return f"there is no {kind} {which}".rstrip()
+    plural = "bodies" if kind == "body" else f"{kind}s"
+    return f"there are {len(names)} {plural} {which}".rstrip() + ": " + _quoted(names)
+
+
+def _choice(argument: str, names: Sequence[str], otherwise: str) -> str:
+    if not names:
+        return otherwise
+    return f"say which with {argument}='{names[0]}' (--{argument} {names[0]})"
+
+
+def _quoted(names: Iterable[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)

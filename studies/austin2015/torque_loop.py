@@ -1,0 +1,67 @@
+"""Generated code of the published actuator: C, FMUs, and the closed torque loop that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import nlsdesign as nls
+from nlsdesign.export import CSource
+from nlsdesign.observer import ObserverDesign
+
+from .._published import Array
+
+READING = "plant.motor_encoder.reading"
+FROM_ENCODER = {"observer.motor.angle": READING, "controller.motor.angle": READING}
+WIRES = {
+    **FROM_ENCODER,
+    "observer.motor.current": "controller.motor.current",
+    "controller.spring.torque": "observer.spring.torque",
+    "plant.motor.current": nls.Late("controller.motor.current"),  # one sample to compute
+}
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueLoop:
+    """Generated files, and the closed loop co-simulated and in one piece.
+
+    Parameters
+    ----------
+    source
+        C files of the observer.
+    fmus
+        Of plant, observer and controller, and of the plant in FMI 2.
+    cosimulated
+        The loop of FMUs.
+    whole
+        The same loop simulated in one piece.
+    """
+
+    source: CSource
+    fmus: tuple[Path, ...]
+    cosimulated: nls.Trace
+    whole: nls.Trace
+
+    @property
+    def difference(self) -> Array:
+        """Torque of the co-simulated plant less that of the plant in one piece, in N·m, shape (n,)."""
+        torque = np.interp(self.cosimulated.time, self.whole.time, self.whole["plant.spring.torque"])
+        return self.cosimulated["plant.spring.torque"] - torque
+
+
+def export_and_cosimulate(
+    model: nls.FlatModel, observer: ObserverDesign, out: Path, stop: float
+) -> TorqueLoop:
+    """Write C and FMUs, co-simulate the closed loop, and simulate the same loop in one piece."""
+    controller = nls.torque_controller(model)
+    parts = {"plant": model, "observer": observer.model, "controller": controller}
+    source = nls.export_c(observer.model, out / "c", name="observer")
+    fmus = {name: nls.export_fmu(each, out / "fmu" / f"{name}.fmu") for name, each in parts.items()}
+    second = nls.export_fmu(model, out / "fmu" / "plant_fmi2.fmu", version="2.0")
+    desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
+    order = ("observer", "controller", "plant")
+    run = nls.cosimulate(fmus=fmus, wires=WIRES, order=order, stop=stop, inputs=desired)
+    loop = nls.ClosedLoop(plant=model, observer=observer.model, controller=controller, wires=FROM_ENCODER)
+    return TorqueLoop(source, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))

@@ -1,0 +1,51 @@
+"""The Python that the documents show runs as it stands."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PYTHON = re.compile(r"^```python\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
+
+
+def run_blocks(document: Path) -> list[dict[str, Any]]:
+    """Run each block of Python in a document; returns the names that each has bound."""
+    ran = []
+    for text in PYTHON.findall(document.read_text(encoding="utf-8")):
+        names: dict[str, Any] = {"__name__": "documented"}
+        exec(compile(text, document.name, "exec"), names)
+        ran.append(names)
+    return ran
+
+
+def test_the_readme_designs_observes_and_exports(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (names,) = run_blocks(root / "README.md")
+    assert "cam" in capsys.readouterr().out, "the circuit is not printed"
+    assert names["design"].rms < 1e-3, "N·m, of a target of 5 N·m"
+    written = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
+    assert "out/plant.fmu" in written
+    assert {name.rpartition(".")[2] for name in written if name.startswith("out/controller/")} == {"c", "h"}
+
+
+def test_the_code_in_the_other_documents_runs(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for document in sorted((root / "docs").glob("*.md")):
+        shown = document.read_text(encoding="utf-8").count("```python")
+        assert len(run_blocks(document)) == shown, document.name
+
+
+def test_a_block_that_fails_is_noticed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "```sh\nfalse\n```\n```python\nx = 1\n```\n```python\nassert x == 1\n```\n", encoding="utf-8"
+    )
+    with pytest.raises(NameError):
+        run_blocks(page)
