@@ -132,10 +132,12 @@ class Builder:
 
         Parameters
         ----------
-        name, table
-            As for :meth:`part`.
+        name
+            Of the table.
         element
             The element; its ends are checked even where it could not be made.
+        table
+            As read.
         """
         ends = table.get("between")
         if not isinstance(ends, list) or not all(isinstance(end, str) for end in ends):

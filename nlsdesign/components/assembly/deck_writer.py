@@ -153,8 +153,10 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
 
     Raises
     ------
+    DeckError
+        If the table is missing or is another component.
     NlsError
-        If the table is missing or is another component, or a number is missing, unknown or not valid.
+        If a number is missing, unknown or not valid.
     """
     table: Any = deck.tables
     for step in path.split("."):

@@ -31,6 +31,11 @@ class Assembly:
         Pairs of name and body, gear, tie or sensor, in written order.
     description
         One sentence.
+
+    Raises
+    ------
+    ArrangementError
+        If parts do not fit together, or there is no body.
     """
 
     name: str
@@ -121,6 +126,11 @@ class Assembly:
             Existing path, or a new name at the top or inside a combination.
         new
             The part; a bare element in place of a tie keeps the bodies.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no part to add it to.
         """
         head, _, tail = path.partition(".")
         parts = dict(self.parts)
@@ -144,6 +154,11 @@ class Assembly:
         ----------
         path
             For instance ``"spring"`` or ``"spring.rubber"``.
+
+        Raises
+        ------
+        ArrangementError
+            If the part is not an element.
         """
         part = self[path]
         element = part.element if isinstance(part, Tie) else part
@@ -158,6 +173,11 @@ class Assembly:
         ----------
         name
             Name of the part.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such part.
         """
         if name not in dict(self.parts):
             raise unknown_name("part", name, dict(self.parts))
