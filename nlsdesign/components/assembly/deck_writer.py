@@ -23,7 +23,7 @@ from .named_parts import Assembly, arrangement_problems
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:
-    """Return everything that is wrong with a deck, each with file, line and column.
+    """Return all problems of a deck, each with file, line and column.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def _loads(model: FlatModel, real: Real, following: Sequence[str]) -> list[str]:
 
 
 def _stores(model: FlatModel, name: str, real: Real) -> list[str]:
-    """Return what is done with the results: stored when all are finite, else the last good ones stay."""
+    """Return the assignments of the results: stored if all are finite, else the last good ones are kept."""
     lines: list[str] = []
     states, outputs = member_paths(model.states), member_paths(model.outputs)
     if states:

@@ -1,11 +1,11 @@
 """Several FMUs as one system: wired by name, stepped together, recorded.
 
 Order. Without ``order`` all inputs are read before any instance steps (Jacobi): the result does not depend on
-how the instances are listed, and whatever a *sampled* instance computes at a communication point reaches the
-others one step later. With ``order`` each instance sees what those before it have computed in the same step
-(Gauss-Seidel): sensors, observer and controller before the plant give a loop without computing delay; a wire
-from a :class:`Late` source keeps it, as when the plant gets the current of one sample
-ago. The result says for every wire by how many steps it is late.
+how the instances are listed, and the output that a *sampled* instance computes at a communication point
+reaches the others one step later. With ``order`` each instance reads what earlier ones have computed in the
+same step (Gauss-Seidel): sensors, observer and controller before the plant give a loop without computing
+delay; a wire from a :class:`Late` source keeps it, for instance when the plant gets the current of the
+previous sample. The result lists the delay of every wire in steps.
 """
 
 from __future__ import annotations
