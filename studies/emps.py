@@ -27,7 +27,7 @@ MISSING = ("dry_friction", "offset")
 FITTED = {
     "mass_kg": ("carriage.mass", "kg"),
     "viscous_Ns_per_m": ("guide.damping", "N*s/m"),
-    "coulomb_N": ("dry_friction.sliding_force", "N"),
+    "coulomb_N": ("dry_friction.sliding_effort", "N"),
     "offset_N": ("offset.load", "N"),
 }
 """Claimed number: name of the parameter in the model, and unit."""

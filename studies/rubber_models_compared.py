@@ -16,10 +16,11 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.components import (
-    DrivenPoint,
+    TRANSLATION,
+    Driven,
     Element,
     LinearElastic,
-    SmoothStrainStiffening,
+    Rounded,
     StrainStiffening,
     Yeoh,
     burgers,
@@ -124,7 +125,7 @@ def laws() -> dict[str, Element]:
     q, one_time = nls.quantity, {"modulus": 1e6, "viscosity": 2e4}
     moduli, knots = q((2.0, 1.5, 2.0, 2.0), "MPa"), q((0.0, 0.016, 0.0848, 0.212), "1")
     stiffening = StrainStiffening(modulus=moduli, knots=knots)
-    rounded = SmoothStrainStiffening(modulus=moduli, knots=knots, width=q(0.01, "1"))
+    rounded = StrainStiffening(modulus=moduli, knots=knots, contact=Rounded(width=q(0.01, "1")))
     yeoh = Yeoh(c1=q(0.5, "MPa"), c2=q(0.1, "MPa"), c3=q(0.01, "MPa"))
     return {
         "Hooke": LinearElastic(modulus=q(3.0, "MPa")),
@@ -145,7 +146,7 @@ def element(actuator: nls.Assembly, law: Element) -> nls.Assembly:
     """Return one rubber element of the actuator with another law, pulled by a grip."""
     size = {name: actuator.quantities()[f"spring.rubber.{name}"] for name in ("area", "rest_length")}
     piece = nls.specimen(area=size["area"], rest_length=size["rest_length"], law=law)
-    return nls.assembly("element", grip=DrivenPoint(), rubber=nls.tie(piece, "grip"))
+    return nls.assembly("element", grip=Driven(domain=TRANSLATION), rubber=nls.tie(piece, "grip"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ class EquationBuilder:
 
     def _declare(self, path: str, part: Part) -> None:
         inner = part.element if isinstance(part, Tie) else part
-        for field_name, info in inner.parameter_infos().items():
+        for field_name, info in inner.infos().items():
             given = part.parameters()[field_name]
             for name, value in zip(number_names(path, inner, field_name), given.values, strict=True):
                 variable = Variable(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.components import Driven, DrivenPoint
+from nlsdesign.components import TRANSLATION, Driven
 from nlsdesign.identification import Agreement, agreement
 
 from .._published import Array, element_loop, figure_points
@@ -104,7 +104,9 @@ def compare_element(actuator: nls.Assembly, degrees: int) -> ElementLoop:
     """Simulate one element over the two stretches of Fig. 6; its extension over time is taken as a sine."""
     extension, force = element_loop(degrees)
     rubber = nls.tie(actuator.element("spring.rubber"), "grip")
-    model = nls.flatten(nls.assembly("element", grip=DrivenPoint(), rubber=rubber), outputs=["rubber.force"])
+    model = nls.flatten(
+        nls.assembly("element", grip=Driven(domain=TRANSLATION), rubber=rubber), outputs=["rubber.force"]
+    )
     turn, half = 2.0 * np.pi * FIG6_FREQUENCY, 0.5 * extension.max()
     time = np.linspace(0.0, 2.0 / FIG6_FREQUENCY, 801)
     path, speed = half * (1.0 - np.cos(turn * time)), half * turn * np.sin(turn * time)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ...components import Assembly, DelayedMotor, GearedMotor, SaturatingMotor
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, numbers_of
+from .effect import ranked
 
 
 def _ideal_motors(assembly: Assembly) -> list[tuple[str, GearedMotor]]:
@@ -14,6 +15,7 @@ def _ideal_motors(assembly: Assembly) -> list[tuple[str, GearedMotor]]:
     return [(n, p) for n, p in assembly.parts if isinstance(p, GearedMotor) and type(p) is GearedMotor]
 
 
+@ranked(160)
 def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
     """A motor whose torque follows the measured current late.
 
@@ -36,6 +38,7 @@ def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(170)
 def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
     """A motor whose iron saturates.
 

@@ -71,9 +71,9 @@ def export_fmu(
 
     Examples
     --------
-    >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+    >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
     >>> from nlsdesign.model import flatten
-    >>> wheel, spring = Inertia(inertia=1e-3), tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> wheel, spring = Inertia(inertia=1e-3), tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
     >>> swing = assembly("swing", wheel=wheel, spring=spring)
     >>> export_fmu(flatten(swing), "out/swing.fmu").name  # doctest: +SKIP
     'swing.fmu'

@@ -1,71 +1,32 @@
-"""Laws that know temperature: self-heating, and relaxation times that a temperature shifts."""
+"""Laws by which a temperature shifts relaxation times."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
 from ...errors import ArrangementError, ValueRangeError
 from ...quantity import Quantity
 from ...symbolic import Expression
-from ..core.element import UNBOUNDED, Scope
-from ..core.part import parameter, walk
+from ..core.domain import MATERIAL, Domain
+from ..core.element import Combination, Scope
+from ..core.parameters import parameter
+from ..core.part import walk
 from ..core.reduced_time import ReducedTime
-from .stress_softening import MaterialCombination
-
-_ROOM = 293.15
+from .self_heating import SelfHeating
 
 
 @dataclass(frozen=True, kw_only=True)
-class SelfHeating(MaterialCombination):
-    """Rubber that softens by its own heat: σ = g·Σσ with g = 1 − b·T', T' the rise over the ambient T₀.
-
-    C·dT'/dt = g·D − b·T·(P − D) − h·T' with the power P put into the laws inside, what they lose D, and
-    T = T₀ + T'. The middle term is the heat that a spring takes up whose modulus depends on temperature; with
-    it energy is conserved exactly. b = −1/T₀ is the entropy spring of unfilled rubber, b > 0 filled. One
-    temperature for the whole piece: thinner than about a centimetre. Valid while T' < 1/(2·b).
-    Sources: Schapery 1964; Holzapfel 2000, ch. 7.
-
-    Examples
-    --------
-    >>> from nlsdesign.components import LinearElastic
-    >>> law = (("law", LinearElastic(modulus=1e6)),)
-    >>> SelfHeating(members=law, heat_capacity=1.8e6, cooling=4e4, softening=3e-3).ambient.number
-    293.15
-    """
-
-    heat_capacity: Quantity = parameter("J/m^3/K", "heat capacity C per volume", minimum=1e3, maximum=1e8)
-    cooling: Quantity = parameter(
-        "W/m^3/K", "heat h given off per volume and kelvin", minimum=0.0, maximum=1e9
-    )
-    softening: Quantity = parameter("1/K", "fall b of the modulus per kelvin", minimum=-0.02, maximum=0.1)
-    ambient: Quantity = parameter(
-        "K", "temperature T₀ around it", minimum=150.0, maximum=600.0, default=_ROOM
-    )
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the stress at the present temperature."""
-        names = ("heat_capacity", "cooling", "softening", "ambient")
-        capacity, cooling, softening, ambient = (scope.parameter(name) for name in names)
-        warming = scope.state("warming", "K", f"temperature of {scope.path} above the ambient")
-        b = self.softening.number
-        scope.signal("warming", warming, "K", "", valid=(-math.inf, 0.5 / b) if b > 0.0 else UNBOUNDED)
-        scope.signal("temperature", ambient + warming, "K", f"temperature of {scope.path}")
-        stress = self.stress_inside(scope, motion, rate)
-        factor, lost = 1 - softening * warming, scope.losses()
-        heat = factor * lost - softening * (ambient + warming) * (stress * rate - lost)
-        scope.derive(warming, (heat - cooling * warming) / capacity)
-        scope.loss((factor - 1) * lost)
-        scope.signal("lost_power", factor * lost, "W/m^3", f"power that {scope.path} loses per volume")
-        return factor * stress
-
-
-@dataclass(frozen=True, kw_only=True)
-class TimeShift(MaterialCombination):
+class TimeShift(Combination):
     """Base of laws by which a temperature multiplies every relaxation time inside with one factor a_T."""
+
+    takes: ClassVar[tuple[Domain, ...]] = (MATERIAL,)
+    placing: ClassVar[str | None] = "put it inside a specimen"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"temperature shift"})
 
     temperature: Quantity = parameter("K", "temperature T", minimum=100.0, maximum=700.0)
     reference: Quantity = parameter(
@@ -96,7 +57,7 @@ class TimeShift(MaterialCombination):
         """Return the stress of the laws inside, whose clock runs slower by a_T."""
         factor = self.shift(scope)
         scope.signal("time_shift", factor, "1", f"factor on the relaxation times of {scope.path}")
-        return self.stress_inside(ReducedTime(scope, factor), motion, factor * rate)
+        return self.inside(ReducedTime(scope, factor), motion, factor * rate)
 
 
 @dataclass(frozen=True, kw_only=True)
