@@ -16,7 +16,7 @@ from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
 from .readings import ReadingNames
-from .structure import MovingBody, SpringNames, Structure
+from .structure import MovingBody, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -187,11 +187,11 @@ class FlatModel:
         return np.array([v.start for v in of], dtype=float)
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> ModelParts:
         """Bodies, springs and readings together."""
-        return Structure(self.bodies, self.springs, self.readings)
+        return ModelParts(self.bodies, self.springs, self.readings)
 
-    def with_structure(self, structure: Structure) -> FlatModel:
+    def with_structure(self, structure: ModelParts) -> FlatModel:
         """Return a copy made of other bodies, springs and readings; what has no variables here is left out.
 
         Parameters

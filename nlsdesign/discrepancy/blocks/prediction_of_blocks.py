@@ -5,11 +5,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench, measured_inputs
 from ...identification.records.measurement import Record, RecordSet
-from ...model import Assembly, flatten
+from ...model import flatten
 from ...simulation import RangeWarning, Trace, range_warnings, simulate
 from ...symbolic import depends
 from .tearing import blocks_of

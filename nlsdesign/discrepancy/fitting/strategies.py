@@ -13,11 +13,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeAlias
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import ConvergenceError
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.estimation.least_squares import Fit, fit, predicted_cost
 from ...identification.estimation.parameters import Parameter
-from ...model import Assembly, flatten
+from ...model import flatten
 from ..blocks.tearing import blocks_of
 from .unpredictable import Key, Tally, quickest, unpredictable
 
