@@ -22,7 +22,7 @@ from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, Hidden, make_records, truth, write_set
 
 TRUE_SIZES: dict[str, tuple[str, Callable[[Hidden], float]]] = {
-    "coulomb_friction": ("sliding_torque", lambda h: h.friction),
+    "coulomb_friction": ("sliding_effort", lambda h: h.friction),
     "load_dependent_friction": ("ratio", lambda h: h.load_friction),
     "quadratic_drag": ("drag", lambda h: h.drag),
     "torque_ripple": ("order", lambda h: h.ripple_order),

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from nlsdesign.components import DryFriction, Inertia, Play, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Backlash, CoulombFriction, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
@@ -39,10 +39,13 @@ Array = NDArray[np.float64]
 def bench() -> FlatModel:
     """The published actuator with sticking friction, play and encoder."""
     made = declare(load_deck(DECK))
-    contact = (("spring", TorsionSpring(stiffness=500.0)), ("damper", TorsionDashpot(damping=0.02)))
-    made = made.with_part("dry_friction", DryFriction(sliding_torque=0.02))
+    contact = (
+        ("spring", Spring(stiffness=500.0, domain=ROTATION)),
+        ("damper", Dashpot(damping=0.02, domain=ROTATION)),
+    )
+    made = made.with_part("dry_friction", CoulombFriction(sliding_effort=0.02))
     made = made.with_part("shaft", Inertia(inertia=5e-5))
-    made = made.with_part("play", tie(Play(gap=0.01, members=contact), "motor", "shaft"))
+    made = made.with_part("play", tie(Backlash(gap=0.01, members=contact), "motor", "shaft"))
     made = made.with_part("spring", tie(made.element("spring"), "shaft"))
     return flatten(made, inputs=["motor.current"], outputs=["motor_encoder.reading"])
 

@@ -71,7 +71,7 @@ def by_hand(model: FlatModel) -> Callable[[float, Array], list[float]]:
     push = p["motor.gear_ratio"] * p["motor.torque_constant"]
     inertia, viscous = p["motor.inertia"], p["bearing.damping"]
     coulomb, creep, elements = (
-        p["dry_friction.sliding_torque"],
+        p["dry_friction.sliding_effort"],
         p["dry_friction.creep_speed"],
         p["spring.cam.elements"],
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from nlsdesign.components import Dashpot, Mass, SlidingFriction, Spring, tie
+from nlsdesign.components import TRANSLATION, CoulombFriction, Dashpot, Mass, Smooth, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
 from nlsdesign.model import FlatModel, flatten
@@ -28,7 +28,7 @@ TRUE = {
     "a.mass": 1.0, "b.mass": 0.6, "c.mass": 1.5,
     "ground_a.stiffness": 120.0, "a_b.stiffness": 80.0, "b_c.stiffness": 60.0, "c_ground.stiffness": 90.0,
     "damp_a.damping": 0.8, "damp_a_b.damping": 0.5, "damp_b_c.damping": 0.4, "damp_c.damping": 1.1,
-    "dry.sliding_force": 0.5,
+    "dry.sliding_effort": 0.5,
 }  # fmt: skip
 MEASURED = ("a.position", "b.position", "c.position")
 START_OFF = 1.6
@@ -52,7 +52,14 @@ def chain() -> FlatModel:
             damp_a_b=tie(Dashpot(damping=value["damp_a_b.damping"]), "a", "b"),
             damp_b_c=tie(Dashpot(damping=value["damp_b_c.damping"]), "b", "c"),
             damp_c=tie(Dashpot(damping=value["damp_c.damping"]), "c"),
-            dry=tie(SlidingFriction(sliding_force=value["dry.sliding_force"], creep_speed=CREEP), "a"),
+            dry=tie(
+                CoulombFriction(
+                    sliding_effort=value["dry.sliding_effort"],
+                    contact=Smooth(creep_speed=CREEP),
+                    domain=TRANSLATION,
+                ),
+                "a",
+            ),
         )
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from nlsdesign.components import (
     Assembly,
     CoulombFriction,
+    Dashpot,
     Encoder,
     Fixed,
     GearedMotor,
@@ -12,7 +13,6 @@ from nlsdesign.components import (
     Specimen,
     StrainStiffening,
     Through,
-    TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
     series,
@@ -60,7 +60,7 @@ def cam_rubber_actuator(deck: Deck) -> Assembly:
         motor=GearedMotor(**numbers_of(deck, "motor", GearedMotor)),
         load=Fixed(),
         spring=tie(through(cam, rubber=rubber, **numbers_of(deck, "spring", Through)), "motor", "load"),
-        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing", TorsionDashpot)), "motor"),
+        bearing=tie(Dashpot(**numbers_of(deck, "bearing", Dashpot)), "motor"),
         dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "motor"),
         motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder", Encoder)),
     )

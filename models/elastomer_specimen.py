@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
-    DrivenPoint,
-    FixedPoint,
+    Driven,
+    Fixed,
     ForceSensor,
     InextensibleCable,
     LinearElastic,
@@ -54,8 +55,8 @@ def elastomer_specimen(deck: Deck) -> Assembly:
     found = assembly(
         deck.name,
         description=deck.description,
-        grip=DrivenPoint(),
-        clamp=FixedPoint(),
+        grip=Driven(domain=TRANSLATION),
+        clamp=Fixed(domain=TRANSLATION),
         strip=tie(InextensibleCable(members=(("rubber", rubber),)), "grip", "clamp"),
         load_cell=ForceSensor(of="strip.force", **numbers_of(deck, "load_cell", ForceSensor)),
     )

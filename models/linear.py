@@ -5,11 +5,11 @@ from __future__ import annotations
 from nlsdesign.components import (
     Assembly,
     CoulombFriction,
+    Dashpot,
     Encoder,
     Fixed,
     GearedMotor,
-    TorsionDashpot,
-    TorsionSpring,
+    Spring,
     tie,
 )
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
@@ -35,8 +35,8 @@ def linear_spring_actuator(deck: Deck) -> Assembly:
         description=deck.description,
         motor=GearedMotor(**numbers_of(deck, "motor", GearedMotor)),
         load=Fixed(),
-        spring=tie(TorsionSpring(**numbers_of(deck, "spring", TorsionSpring)), "motor", "load"),
-        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing", TorsionDashpot)), "motor"),
+        spring=tie(Spring(**numbers_of(deck, "spring", Spring)), "motor", "load"),
+        bearing=tie(Dashpot(**numbers_of(deck, "bearing", Dashpot)), "motor"),
         dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "motor"),
         motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder", Encoder)),
     )

@@ -7,6 +7,7 @@ from nlsdesign.components import (
     CapstanFriction,
     CurrentDrivenMotor,
     CurrentSensor,
+    Dashpot,
     Fixed,
     ForceSensor,
     Inertia,
@@ -15,10 +16,9 @@ from nlsdesign.components import (
     LossyGear,
     OneSidedCam,
     SampledEncoder,
-    SmoothStrainStiffening,
     Specimen,
+    StrainStiffening,
     Through,
-    TorsionDashpot,
     ViscousMaterial,
     series,
     specimen,
@@ -71,7 +71,7 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
         gear=gear,
         load=Fixed(),
         spring=tie(through(cam, cable=cable, **numbers_of(deck, "spring", Through)), "drum", "load"),
-        bearing=tie(TorsionDashpot(**numbers_of(deck, "bearing", TorsionDashpot)), "drum"),
+        bearing=tie(Dashpot(**numbers_of(deck, "bearing", Dashpot)), "drum"),
         motor_encoder=encoder,
         current_sensor=ammeter,
         load_cell=ForceSensor(of="spring.cable.rope.force", **cell),
@@ -82,7 +82,7 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
 def _rubber(deck: Deck) -> Specimen:
     inside = f"{RUBBER}.relaxing"
     return specimen(
-        stiff=SmoothStrainStiffening(**numbers_of(deck, f"{RUBBER}.stiff", SmoothStrainStiffening)),
+        stiff=StrainStiffening(**numbers_of(deck, f"{RUBBER}.stiff", StrainStiffening)),
         relaxing=series(
             spring=LinearElastic(**numbers_of(deck, f"{inside}.spring", LinearElastic)),
             dashpot=ViscousMaterial(**numbers_of(deck, f"{inside}.dashpot", ViscousMaterial)),

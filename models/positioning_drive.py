@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import Assembly, ConstantForce, Dashpot, LinearDrive, SlidingFriction, tie
+from nlsdesign.components import Assembly, ConstantForce, CoulombFriction, Dashpot, LinearDrive, tie
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import Deck
@@ -32,7 +32,7 @@ def positioning_drive(deck: Deck) -> Assembly:
         description=deck.description,
         carriage=LinearDrive(**numbers_of(deck, "carriage", LinearDrive)),
         guide=tie(Dashpot(**numbers_of(deck, "guide", Dashpot)), "carriage"),
-        dry_friction=tie(SlidingFriction(**numbers_of(deck, "dry_friction", SlidingFriction)), "carriage"),
+        dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "carriage"),
         offset=tie(ConstantForce(**numbers_of(deck, "offset", ConstantForce)), "carriage"),
     )
     return require_same_numbers(found, deck)

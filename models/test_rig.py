@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
     CurrentSensor,
+    Dashpot,
     Encoder,
     Fixed,
     ForceSensor,
@@ -21,7 +23,6 @@ from nlsdesign.components import (
     LinearElastic,
     Specimen,
     StrainStiffening,
-    TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
     control_values,
@@ -78,7 +79,10 @@ def test_rig_deck(rig_toml: Path, cam_csv: Path) -> Assembly:
         load=Fixed(),
         spring=tie(through(_cam(cam_csv), cable=pull_only(rubber=_rubber(numbers))), "motor", "load"),
         bearing=tie(
-            TorsionDashpot(damping=numbers("drivetrain", "b_Nm_s_per_rad", "N*m*s/rad", _SPREAD_OF_BEARING)),
+            Dashpot(
+                damping=numbers("drivetrain", "b_Nm_s_per_rad", "N*m*s/rad", _SPREAD_OF_BEARING),
+                domain=ROTATION,
+            ),
             "motor",
         ),
         motor_encoder=Encoder(of="motor.angle", quantum=numbers("sensors", "theta_quantum_rad", "rad")),

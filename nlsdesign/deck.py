@@ -1,4 +1,4 @@
-"""Decks: TOML files in which every number has value, unit, source and spread, and every place has a line."""
+"""Decks: TOML files in which every number has value, unit, source and spread; errors name line and column."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .errors import DeckError, NlsError, UnitError, nearest, unknown_name
 from .locations import folder
 from .quantity import Quantity, parse_unit
 
-_WORD = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
-_NAME = rf"{_WORD}(?:\s*\.\s*{_WORD})*"
+_KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
+_NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
 _HEADER = re.compile(rf"^\s*\[\[?\s*({_NAME})\s*\]")
 _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
 
 
 class Written(float):
-    """A number that still knows how it was written, so that it is rounded once, in SI, and not twice."""
+    """A number with its decimal text, so that it is rounded only once, in SI."""
 
     text: str
 
@@ -72,7 +72,7 @@ class Deck:
     head: Mapping[str, Any] = field(default_factory=dict)
 
     def place(self, full_name: str) -> str:
-        """Return ``file:line:column: name``; the place of the nearest owner where the name has none.
+        """Return ``file:line:column: name``, with the place of the nearest table above if it has none.
 
         Parameters
         ----------
@@ -98,12 +98,12 @@ class Deck:
         UnknownNameError
             With the nearest name in the deck.
         """
-        found: Any = self.tables
+        node: Any = self.tables
         for step in full_name.split("."):
-            if not isinstance(found, Mapping) or step not in found:
+            if not isinstance(node, Mapping) or step not in node:
                 raise unknown_name(f"{self.path.name}: number", full_name, self.places)
-            found = found[step]
-        return self.number(full_name, found)
+            node = node[step]
+        return self.number(full_name, node)
 
     def numbers(self) -> list[str]:
         """Return the full names of all numbers in the deck, in written order."""
@@ -217,6 +217,11 @@ def read_deck(text: str, path: Path) -> Deck:
         TOML.
     path
         Where it came from, for messages.
+
+    Raises
+    ------
+    DeckError
+        If the text is no TOML, or ``deck`` is not a table.
     """
     try:
         tables = tomllib.loads(text, parse_float=Written)
@@ -232,11 +237,11 @@ def read_deck(text: str, path: Path) -> Deck:
 
 
 def _not_toml(text: str, path: Path, message: str) -> DeckError:
-    found = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
+    match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
     lines = text.splitlines() or [""]
-    place = f"{found[1]}:{found[2]}" if found else f"{len(lines)}:{len(lines[-1]) + 1}"
-    rule = message.replace(found[0], "") if found else message
-    return DeckError(f"{path.name}:{place}", f"is not valid TOML: {rule}", next_step="mend that line")
+    place = f"{match[1]}:{match[2]}" if match else f"{len(lines)}:{len(lines[-1]) + 1}"
+    rule = message.replace(match[0], "") if match else message
+    return DeckError(f"{path.name}:{place}", f"is not valid TOML: {rule}", next_step="correct that line")
 
 
 def _places(text: str) -> dict[str, tuple[int, int]]:

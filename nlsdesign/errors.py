@@ -20,17 +20,17 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
     for candidate in candidates:
         if candidate.lower() == name.lower():
             return candidate
-    found = difflib.get_close_matches(name, candidates, n=1, cutoff=0.5)
-    if found:
-        return found[0]
+    matches = difflib.get_close_matches(name, candidates, n=1, cutoff=0.5)
+    if matches:
+        return matches[0]
     last = name.rsplit(".", 1)[-1]
     tails = {candidate.rsplit(".", 1)[-1]: candidate for candidate in candidates}
-    found = difflib.get_close_matches(last, list(tails), n=1, cutoff=0.6)
-    return tails[found[0]] if found else None
+    matches = difflib.get_close_matches(last, list(tails), n=1, cutoff=0.6)
+    return tails[matches[0]] if matches else None
 
 
 class NlsError(Exception):
-    """Base of every error that a user can cause and mend.
+    """Base of every error that a user can cause and correct.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class UnitError(NlsError):
 
 
 class ValueRangeError(NlsError):
-    """A number lies outside what the law or the field can hold."""
+    """A number lies outside the range of the law or the field."""
 
 
 class UnknownNameError(NlsError):
@@ -110,7 +110,7 @@ class MeasurementError(NlsError):
 
 
 class MissingLibraryError(NlsError):
-    """A library that is asked for on demand is not installed."""
+    """An optional library is not installed."""
 
 
 class ConvergenceError(NlsError):

@@ -1,9 +1,9 @@
-"""Where the folders stand that travel with the package, and which release this is.
+"""Location of the folders that are distributed with the package, and its version.
 
 The rule: in a wheel the top-level folders ``models`` and ``studies`` are packed into ``nlsdesign/_bundled/``,
 so that they do not spread over site-packages. In a checkout (also an editable install) there is no
-``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is asked for as well,
-because next to an *installed* package a folder named ``models`` belongs to somebody else.
+``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is checked too,
+because a folder named ``models`` next to an *installed* package belongs to another project.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _PACKAGE: Final = Path(__file__).resolve().parent
 
 
 def folder(name: Literal["models", "studies"], *, package: Path = _PACKAGE) -> Path:
-    """Return the folder of that name that travels with the package.
+    """Return the folder of that name that is distributed with the package.
 
     Parameters
     ----------
@@ -50,16 +50,16 @@ def folder(name: Literal["models", "studies"], *, package: Path = _PACKAGE) -> P
         return beside
     raise UnknownNameError(
         f"folder '{name}'",
-        f"it travels with nlsdesign, but is neither {bundled} nor, in a checkout, {beside}",
+        f"it is distributed with nlsdesign, but is neither {bundled} nor, in a checkout, {beside}",
         next_step="install nlsdesign again, or run it from a complete checkout",
     )
 
 
 def bundled(name: Literal["models", "studies"], module: str = "") -> ModuleType:
-    """Return a folder that travels with the package as a Python package, or one module in it.
+    """Return a distributed folder as a Python package, or one module in it.
 
-    It goes by the name ``nlsdesign_models`` or ``nlsdesign_studies``, so that it is found alike in a checkout
-    and in a wheel, and never collides with somebody else's ``models``.
+    Its name is ``nlsdesign_models`` or ``nlsdesign_studies`` both in a checkout and in a wheel, which never
+    collides with a package ``models`` of another project.
 
     Parameters
     ----------
@@ -67,6 +67,11 @@ def bundled(name: Literal["models", "studies"], module: str = "") -> ModuleType:
         Folder.
     module
         Module inside; the package itself where none is given.
+
+    Raises
+    ------
+    UnknownNameError
+        If the folder holds no package that can be loaded.
     """
     alias = f"nlsdesign_{name}"
     if alias not in sys.modules:

@@ -13,18 +13,18 @@ from rich.status import Status
 
 
 class Progress(Protocol):
-    """What long work tells while it runs."""
+    """Receives messages of long work while it runs."""
 
     def note(self, text: str) -> None:
-        """Say what is being done now."""
+        """Show the present activity."""
         ...
 
 
 class Quiet:
-    """Progress that nobody watches."""
+    """Progress that is not shown."""
 
     def note(self, text: str) -> None:
-        """Say nothing."""
+        """Show nothing."""
 
 
 class Steps:
@@ -42,7 +42,7 @@ class Steps:
         self._label = ""
 
     def note(self, text: str) -> None:
-        """Show what is being done within the present step."""
+        """Show the present activity within the step."""
         if self._status is not None:
             self._status.update(f"{self._label}: {text}")
 
@@ -53,7 +53,7 @@ class Steps:
         Parameters
         ----------
         label
-            What the step does, in a few words.
+            Name of the step.
         """
         begin = time.perf_counter()
         self._label = label

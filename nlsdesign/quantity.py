@@ -199,6 +199,11 @@ class Quantity:
         Citation, data-sheet page, bench file with date, or "assumed" with a reason.
     spread
         One-sided relative spread; 0.06 means ± 6 %.
+
+    Raises
+    ------
+    ValueRangeError
+        If the row is empty, a value is not finite, or the spread is negative.
     """
 
     value: float | tuple[float, ...]

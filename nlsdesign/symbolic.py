@@ -1,8 +1,7 @@
-"""Symbolic building blocks; every expression of the house is CasADi SX.
+"""Symbolic building blocks; every expression of the package is CasADi SX.
 
-SX was chosen over MX once and for all: models are small scalar networks, SX gives flat C code, cheap
-exact derivatives and free substitution. What SX lacks (splines with symbolic coefficients, implicit
-scalar equations) stands here.
+Models are small scalar networks, for which SX gives flat C code, cheap exact derivatives and free
+substitution. This module adds what SX lacks: splines with symbolic coefficients, implicit scalar equations.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import casadi as ca
 Expression: TypeAlias = ca.SX
 
 NEWTON_STEPS = 24
-"""Bound on the work of an implicit scalar equation; bracketed Newton halves at worst."""
+"""Number of iterations of an implicit scalar equation; the worst one halves the bracket."""
 
 
 def symbol(name: str) -> Expression:
@@ -59,7 +58,7 @@ def positive_part(value: Expression, width: Expression | float) -> Expression:
 
 
 def smooth_sign(value: Expression, width: Expression | float) -> Expression:
-    """Return tanh(v/w), the C∞ stand-in of the sign function.
+    """Return tanh(v/w), a C∞ approximation of the sign function.
 
     Parameters
     ----------
@@ -72,7 +71,7 @@ def smooth_sign(value: Expression, width: Expression | float) -> Expression:
 
 
 def _selected(hits: Sequence[Expression], rows: Sequence[Sequence[Expression]]) -> list[Expression]:
-    """Return the row whose hit is 1, item by item; SX knows no indexing by an expression."""
+    """Return the row whose hit is 1, item by item; SX cannot be indexed by an expression."""
     return [
         sum((ca.if_else(hit, item, 0) for hit, item in zip(hits, items, strict=True)), start=ca.SX(0))
         for items in zip(*rows, strict=True)
@@ -80,7 +79,7 @@ def _selected(hits: Sequence[Expression], rows: Sequence[Sequence[Expression]]) 
 
 
 def _windows(values: Sequence[Expression], width: int, at: Expression) -> list[Expression]:
-    """Return the ``width`` values from number ``at`` on, found in two stages: first the block, then inside.
+    """Return the ``width`` values from number ``at`` on, selected in two stages: block, then inside.
 
     Two stages of about √n choices take far fewer operations than one of n.
     """
@@ -117,7 +116,7 @@ def uniform_spline(
     step
         Distance of the knots.
     at
-        Argument in [lower, lower + (n − 3)·step]; beyond, the polynomial of the last span goes on.
+        Argument in [lower, lower + (n − 3)·step]; beyond, the polynomial of the last span continues.
     """
     number, r = _span(coefficients, (at - lower) / step)
     a, b, c, d = _windows(coefficients, 4, number)
@@ -138,7 +137,7 @@ def uniform_spline_integral(
     number, r = _span(coefficients, (at - lower) / step)
     a, b, c, d = _windows(coefficients, 4, number)
     q = 1 - r
-    # Sums of the coefficients whose bumps lie wholly to the left of the span.
+    # Sums of the coefficients whose basis functions lie completely to the left of the span.
     sums = [ca.SX(0)]
     for each in coefficients[: len(coefficients) - 4]:
         sums.append(sums[-1] + each)
@@ -167,9 +166,9 @@ def solve_monotone(
 
     Otherwise a bracketed Newton iteration of fixed length is written out, so that the result is a plain
     expression with a fixed bound of work: it differentiates and becomes C like any other. A Newton step that
-    does not fall strictly inside the bracket is replaced by its middle, or steps would go to and fro between
-    the two ends for ever where g is flat, steep and flat again. The last step starts from the best point
-    found and is never replaced: so the derivative is that of the implicit function, whatever came before.
+    does not fall strictly inside the bracket is replaced by bisection, because Newton's method can cycle
+    where g is flat, steep and flat again. The last step starts from the best point and is never replaced, so
+    the derivative is that of the implicit function.
 
     Parameters
     ----------
@@ -194,7 +193,7 @@ def solve_monotone(
         best, least = ca.if_else(closer, z, best), ca.if_else(closer, ca.fabs(value), least)
         low, high = ca.if_else(value <= 0, z, low), ca.if_else(value >= 0, z, high)
         newton = z - value / _not_zero(slope)
-        # A finite middle even while one side of the bracket is still open.
+        # A finite middle while one side of the bracket is still open.
         middle = (ca.fmax(low, -1e30) + ca.fmin(high, 1e30)) / 2
         z = ca.if_else(ca.logic_and(newton > low, newton < high), newton, middle)
     value, slope = value_and_slope.call([best, *free])

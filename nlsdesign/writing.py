@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: every file of the package is written through here."""
+"""Atomic writing: a file appears whole or not at all. Every file of the package is written here."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .errors import ExportError
 
 @contextmanager
 def draft(target: Path) -> Iterator[Path]:
-    """Give a temporary sibling to write to; it takes the place of the target when all went well.
+    """Yield a temporary file in the same folder; it replaces the target if no error occurs.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def draft(target: Path) -> Iterator[Path]:
     os.close(handle)
     try:
         yield Path(name)
-        # A temporary file is for its owner only.
+        # A temporary file can be read by its owner only.
         os.chmod(name, 0o644)
         os.replace(name, target)
     except OSError as error:
@@ -70,7 +70,7 @@ def write_bytes(path: Path, content: bytes) -> None:
     path
         File; its folder is made if needed.
     content
-        What it holds.
+        Content.
 
     Raises
     ------

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import CurrentSensor, ForceSensor, InextensibleCable, Through
-from nlsdesign.identification import RecordSet
-from nlsdesign.model import Assembly
 
 Array = NDArray[np.float64]
 
@@ -24,10 +22,9 @@ FIG6_SAMPLE = 0.4e-3  # s; distance of the points of Fig. 6 on its time axis
 _HERE = Path(__file__).parent
 
 
-def declared_actuator() -> Assembly:
+def declared_actuator() -> nls.Assembly:
     """Return the actuator with the numbers that agree with the figures of the paper."""
-    actuator: Assembly = nls.models.cam_rubber_actuator(nls.load_deck("austin2015_figure_consistent"))
-    return actuator
+    return nls.models.cam_rubber_actuator(nls.load_deck("austin2015_figure_consistent"))
 
 
 def figure_points(name: str) -> Array:
@@ -41,7 +38,7 @@ def element_loop(degrees: int, kind: str = "measured") -> tuple[Array, Array]:
     return extension * 1e-3, force
 
 
-def with_bench_sensors(actuator: Assembly) -> Assembly:
+def with_bench_sensors(actuator: nls.Assembly) -> nls.Assembly:
     """Return the actuator as it stands on the bench: its cable only pulls, load cell and ammeter are read."""
     spring = actuator.element("spring")
     assert isinstance(spring, Through)
@@ -64,6 +61,6 @@ def _is_dimension(name: str) -> bool:
     return name.startswith("spring.cam.") or name.rpartition(".")[2] in ("area", "rest_length", "knots")
 
 
-def bench_records(bench: Assembly) -> RecordSet:
+def bench_records(bench: nls.Assembly) -> nls.RecordSet:
     """Return the records of the actuator with its bench sensors."""
     return nls.load_records(_HERE / "austin2015_bench", nls.flatten(bench))

@@ -11,7 +11,8 @@ from nlsdesign.components import (
     Fixed,
     GearedMotor,
     LinearElastic,
-    SmoothStrainStiffening,
+    Rounded,
+    StrainStiffening,
     TwoSidedCam,
     ViscousMaterial,
     series,
@@ -55,10 +56,10 @@ class NeoHooke(Elastic):
 CONCAVE = NeoHooke(modulus=quantity(0.8456, "MPa", spread=0.15))
 """Modulus times area is 84.56 N: the neo-Hookean reading of the tensile curve of 2014."""
 
-CONVEX = SmoothStrainStiffening(
+CONVEX = StrainStiffening(
     modulus=quantity((0.92, 0.58, 0.74, 0.77), "MPa", spread=0.06),
     knots=(0.0, 0.016, 0.0848, 0.212),
-    width=0.01,
+    contact=Rounded(width=0.01),
 )
 """The printed moduli of 2015 up to 9 mm extension, with rounded knots."""
 

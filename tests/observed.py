@@ -9,16 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
     Body,
     CoulombFriction,
+    Dashpot,
     Driven,
     Encoder,
     Fixed,
     GearedMotor,
     LinearElastic,
+    Smooth,
     StrainStiffening,
-    TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
     control_values,
@@ -73,11 +75,13 @@ def actuator(
         "motor": GearedMotor(inertia=INERTIA, gear_ratio=4.0, torque_constant=CONSTANT / 4.0),
         "load": load or Fixed(),
         "spring": tie(through(cam, rubber=rubber), "motor", "load"),
-        "bearing": tie(TorsionDashpot(damping=DAMPING), "motor"),
+        "bearing": tie(Dashpot(damping=DAMPING, domain=ROTATION), "motor"),
         "motor_encoder": Encoder(of="motor.angle", quantum=COUNT),
     }
     if friction:
-        parts["dry_friction"] = tie(CoulombFriction(sliding_torque=friction), "motor")
+        parts["dry_friction"] = tie(
+            CoulombFriction(sliding_effort=friction, contact=Smooth(creep_speed=0.02)), "motor"
+        )
     return assembly("published", **parts)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -131,6 +132,115 @@ def headings(document: Path) -> set[str]:
     """The anchors that a Markdown viewer makes of the headings."""
     found = re.findall(r"^#+\s+(.*?)\s*$", document.read_text(encoding="utf-8"), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in found}
+
+
+def mismatched(file: Path, exceptions: Mapping[str, str]) -> Iterator[str]:
+    """Docstrings of public definitions that disagree with the code about parameters or exceptions.
+
+    Parameters are compared where a docstring has the section: the same names in the same order. ``Raises``
+    must list every class that the body itself raises, and only classes that exist.
+
+    Parameters
+    ----------
+    file
+        Module.
+    exceptions
+        What may be raised: name of a class, or of a function that returns an exception, and the class.
+    """
+    for definition in public_definitions(parse(file)):
+        text = ast.get_docstring(definition.node)
+        if not text or _speaks_for_another(definition.node) or _is_command(definition.node):
+            continue
+        where = f"line {definition.line}: {definition.name}"
+        written, actual = documented(text, "Parameters"), signature(definition.node)
+        if written and written != actual:
+            yield f"{where} documents the parameters {written}, the signature has {actual}"
+        listed, raised = documented(text, "Raises"), raises(definition.node, exceptions)
+        for name in raised:
+            if name not in listed:
+                yield f"{where} raises {name}, which its docstring does not list"
+        for name in listed:
+            if name not in exceptions.values():
+                yield f"{where} lists {name}, which is no exception"
+
+
+def documented(text: str, section: str) -> list[str]:
+    """Return the names in a section of a docstring in numpy's style."""
+    found = re.search(rf"^{section}\n-+\n(.*?)(?:\n\n[^\n]+\n---|\Z)", text, flags=re.MULTILINE | re.DOTALL)
+    lines = found[1].splitlines() if found else []
+    heads = [line.partition(" : ")[0] for line in lines if line[:1].strip()]
+    return [name.strip().lstrip("*") for head in heads for name in head.split(",")]
+
+
+def signature(node: Function | ast.ClassDef) -> list[str]:
+    """Return the names that a call may give; of a class those of ``__init__``, or its fields."""
+    if isinstance(node, Function):
+        every = [*node.args.posonlyargs, *node.args.args, node.args.vararg, *node.args.kwonlyargs]
+        names = [argument.arg for argument in (*every, node.args.kwarg) if argument]
+        return names[1:] if names[:1] in (["self"], ["cls"]) else names
+    for inner in node.body:
+        if isinstance(inner, Function) and inner.name == "__init__":
+            return signature(inner)
+    fields = (inner for inner in node.body if isinstance(inner, ast.AnnAssign))
+    return [
+        field.target.id
+        for field in fields
+        if isinstance(field.target, ast.Name)
+        and not is_private(field.target.id)
+        and "ClassVar" not in ast.unparse(field.annotation)
+        and "init=False" not in ast.unparse(field)
+        and not _describes_itself(field)
+    ]
+
+
+def raises(node: Function | ast.ClassDef, exceptions: Mapping[str, str]) -> list[str]:
+    """Return the classes that a body raises itself; of a class those that making an object raises."""
+    if isinstance(node, ast.ClassDef):
+        made = [n for n in node.body if isinstance(n, Function) and n.name in ("__init__", "__post_init__")]
+        return sorted({name for inner in made for name in raises(inner, exceptions)})
+    names = set()
+    for inner in _own_statements(node):
+        if isinstance(inner, ast.Raise) and isinstance(inner.exc, ast.Call):
+            name = ast.unparse(inner.exc.func)
+            if name in exceptions:
+                names.add(exceptions[name])
+    return sorted(names)
+
+
+def exceptions_of(files: Iterable[Path]) -> dict[str, str]:
+    """Built-in exceptions, those of the files, and the functions there that return one, with its class."""
+    names = {name: name for name, kind in vars(builtins).items() if _is_exception(kind)}
+    trees = [parse(file) for file in files]
+    for node in (node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)):
+        if any(ast.unparse(base) in names for base in node.bases):
+            names[node.name] = node.name
+    for node in (node for tree in trees for node in tree.body if isinstance(node, Function)):
+        if node.returns and ast.unparse(node.returns) in names:
+            names[node.name] = ast.unparse(node.returns)
+    return names
+
+
+def _is_exception(kind: object) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseException)
+
+
+def _is_command(node: ast.AST) -> bool:
+    """The docstring of a command is what ``--help`` shows."""
+    names = {ast.unparse(decorator) for decorator in getattr(node, "decorator_list", ())}
+    return any(re.match(r"(\w+\.)?(command|group)\(", name) for name in names)
+
+
+def _describes_itself(field: ast.AnnAssign) -> bool:
+    """The numbers of a part carry unit, range and meaning in their declaration."""
+    return isinstance(field.value, ast.Call) and ast.unparse(field.value.func) == "parameter"
+
+
+def _own_statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Everything below a function but what stands in functions and classes inside it."""
+    for inner in ast.iter_child_nodes(node):
+        if not isinstance(inner, Function | ast.ClassDef | ast.Lambda):
+            yield inner
+            yield from _own_statements(inner)
 
 
 def _speaks_for_another(node: ast.AST) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nlsdesign.components import DrivenPoint, Element, specimen, tie
+from nlsdesign.components import TRANSLATION, Driven, Element, specimen, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
@@ -19,7 +19,8 @@ def pulled(**laws: Element) -> FlatModel:
     """The flat model of a piece with laws in parallel; its output is the force."""
     rubber = specimen(area=AREA, rest_length=LENGTH, **laws)
     return flatten(
-        assembly("pulled", grip=DrivenPoint(), rubber=tie(rubber, "grip")), outputs=["rubber.force"]
+        assembly("pulled", grip=Driven(domain=TRANSLATION), rubber=tie(rubber, "grip")),
+        outputs=["rubber.force"],
     )
 
 

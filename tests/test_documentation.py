@@ -93,6 +93,12 @@ def test_everything_public_is_typed(root: Path) -> None:
     expect_none(root, public_files(root), source.untyped)
 
 
+def test_docstrings_agree_with_signatures_and_exceptions(root: Path) -> None:
+    exceptions = source.exceptions_of(python_files(root, "nlsdesign"))
+    assert exceptions["unknown_name"] == "UnknownNameError"
+    expect_none(root, python_files(root, *PRODUCT), lambda file: source.mismatched(file, exceptions))
+
+
 def test_nothing_has_outgrown_its_shape(root: Path) -> None:
     expect_none(root, python_files(root, *PRODUCT), source.misshapen)
 
@@ -163,6 +169,87 @@ def test_a_missing_type_is_caught(sample: Path) -> None:
         "line 5: bad has no type for a, b, d, the result",
         "line 9: Law has no type for a, the result",
     ]
+
+
+DOCUMENTED = '''
+class Law(Base):
+    """Law.
+
+    Parameters
+    ----------
+    name, of
+        What.
+
+    Raises
+    ------
+    ValueError
+        Where it is made.
+    """
+    name: str
+    stiffness: Quantity = parameter("N/m", "Described here.")
+    of: str = ""
+    kind: ClassVar[str] = "law"
+    _hidden: int = 0
+    def __post_init__(self):
+        if self.name:
+            raise ValueError("name")
+def force(a, /, b: int, *rest: int, c=1, **more):
+    """Force.
+
+    Parameters
+    ----------
+    a, b
+        Numbers.
+    *rest : int
+        More.
+    c
+        Last.
+    **more
+        Others.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    UnknownNameError
+        By a function that returns it.
+    OSError
+        From below.
+    """
+    def inner():
+        raise KeyError("not of force itself")
+    raise unknown_name("b")
+@click.command()
+def shown(a):
+    """Its docstring is a help text."""
+    raise ValueError("a")
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("", "", None),
+        ("name, of", "of, name", "Law documents the parameters ['of', 'name'], the signature has ['name',"),
+        ("    name, of", "    name", "Law documents the parameters ['name'], the signature has ['name',"),
+        ("    a, b\n", "    a, d\n", "force documents the parameters ['a', 'd', 'rest', 'c', 'more'], "
+                                   "the signature has ['a', 'b', 'rest', 'c', 'more']"),
+        ("    ValueError\n", "    TypeError\n", "Law raises ValueError, which its docstring does not list"),
+        ("    OSError", "    OSEror", "force lists OSEror, which is no exception"),
+        ('raise unknown_name("b")', "raise RuntimeError(b)", "force raises RuntimeError, which its"),
+        ("    UnknownNameError", "    NlsError", "force raises UnknownNameError, which its"),
+    ],
+)  # fmt: skip
+def test_a_docstring_that_disagrees_is_caught(
+    root: Path, sample: Path, old: str, new: str, complaint: str | None
+) -> None:
+    assert old in DOCUMENTED
+    sample.write_text(DOCUMENTED.replace(old, new, 1), encoding="utf-8")
+    exceptions = source.exceptions_of([root / "nlsdesign" / "errors.py"])
+    caught = [line.partition(": ")[2] for line in source.mismatched(sample, exceptions)]
+    assert [line[: len(complaint)] for line in caught] == [complaint] if complaint else caught == []
 
 
 @pytest.mark.parametrize(

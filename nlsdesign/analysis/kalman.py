@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 def discrete_noise(a: Array, density: Array, sample_time: float) -> tuple[Array, Array]:
     """Return Φ = e^(AT) and the covariance ∫₀ᵀ e^(At)·W·e^(Aᵀt) dt of white noise over one sample.
 
-    Source: Van Loan, Computing integrals involving the matrix exponential, 1978.
+    Source: Van Loan 1978.
 
     Parameters
     ----------
@@ -101,7 +101,15 @@ class EstimateDeviation(View):
     sample_time: float = 1e-3
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If an output or a state has another name in the model.
+        ValueRangeError
+            If a standard deviation of the measurement is not positive.
+        """
         outputs, states = {v.name for v in model.outputs}, {v.name for v in model.states}
         estimate = spring_torque(model, self.estimate)
         for name in (estimate, *self.measurement):

@@ -53,7 +53,13 @@ class Observability(View):
     measured: tuple[str, ...] = ()
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If something measured is neither a state nor an output of the model.
+        """
         known = {v.name for v in model.states + model.outputs}
         for name in (*self.nominal, *self.measured):
             if name not in known:

@@ -33,7 +33,13 @@ class Stability(View):
     torque: str | None = None
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
-        """Return the columns."""
+        """Return the columns.
+
+        Raises
+        ------
+        UnknownNameError
+            If the torque is no output of the model.
+        """
         torque = spring_torque(model, self.torque)
         if torque not in {v.name for v in model.outputs}:
             raise unknown_name("output", torque, (v.name for v in model.outputs))

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from ..quantity import typeset_unit
 from .output import deck_option, json_option, out_option, show_json, show_table
 from .units import Number
+
+if TYPE_CHECKING:
+    from ..model import Variable
 
 
 @click.command()
@@ -41,6 +46,17 @@ def analyse(deck_name: str, last: float, count: int, measured: str, out: Path, a
         [f"{np.degrees(at):.1f}", *(f"{v:.4g}" for v in row)]
         for at, row in zip(chart.at, chart.values, strict=True)
     ]
-    units = [f"{v.name} [{v.unit}]" for v in chart.columns]
-    show_table(f"{model.name} over {measured}", (f"{measured} [deg]", *units), rows)
+    headings = [with_unit_of(v) for v in chart.columns]
+    show_table(f"{model.name} over {measured}", (f"{measured} [deg]", *headings), rows)
     click.echo(f"written: {out / 'over_angle.csv'}")
+
+
+def with_unit_of(variable: Variable) -> str:
+    """Return the heading of a column: name and unit.
+
+    Parameters
+    ----------
+    variable
+        Shown in the column.
+    """
+    return f"{variable.name} [{typeset_unit(variable.unit) or '1'}]"

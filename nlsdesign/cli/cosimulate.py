@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from ..errors import ValueRangeError
+from ..quantity import typeset_unit
 from .output import json_option, show_json, show_table
 from .units import Number
 
@@ -22,12 +23,12 @@ _LATE = "late:"
 @click.command("cosimulate")
 @click.option("--fmu", "fmus", multiple=True, required=True, metavar="INSTANCE=FILE", help="Repeatable.")
 @click.option("--wire", "wires", multiple=True, metavar="TO=FROM",
-              help="Input and output as instance.variable; TO=late:FROM reads what is one communication "
-                   "step old; repeatable.")  # fmt: skip
+              help="Input and output as instance.variable; TO=late:FROM reads the value of one "
+                   "communication step before; repeatable.")  # fmt: skip
 @click.option("--input", "inputs", multiple=True, metavar="INPUT=NUMBER|AMPLITUDE@HERTZ",
               help="A constant or a sine; repeatable.")  # fmt: skip
 @click.option("--set", "parameters", multiple=True, metavar="PARAMETER=NUMBER", help="Repeatable.")
-@click.option("--order", multiple=True, metavar="INSTANCE", help="Who steps first, second, ...; repeatable.")
+@click.option("--order", multiple=True, metavar="INSTANCE", help="Order in which the FMUs step; repeatable.")
 @click.option("--stop", type=Number("s"), required=True, help="End, for instance '5 s'.")
 @click.option("--step", type=Number("ms"), default=None, help="Communication step, for instance '1 ms'.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
@@ -54,32 +55,30 @@ def cosimulation(stop: float, step: float | None, out: Path, as_json: bool, **gi
                 for n, v in run.trace.signals.items()}  # fmt: skip
         show_json({"file": out, "step": run.step, "delays": dict(run.delays), "signals": ends})
         return
-    rows = [(to, str(joined[to]), str(late)) for to, late in run.delays.items()]
-    show_table("Wires", ("input", "reads", "late by steps"), rows)
+    rows = [(to, str(joined[to]), str(delay)) for to, delay in run.delays.items()]
+    show_table("Wires", ("input", "reads", "delay in steps"), rows)
     signals = [
-        (n, f"{v.min():.4g}", f"{v.max():.4g}", f"{v[-1]:.4g}", run.trace.units[n])
+        (n, f"{v.min():.4g}", f"{v.max():.4g}", f"{v[-1]:.4g}", typeset_unit(run.trace.units[n]))
         for n, v in run.trace.signals.items()
     ]
-    show_table("Signals", ("name", "least", "largest", "last", "unit"), signals)
+    show_table("Signals", ("name", "smallest", "largest", "last", "unit"), signals)
     click.echo(f"written: {out}, {len(run.time)} rows {1e3 * run.step:g} ms apart")
 
 
 def _pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
-    found: dict[str, T] = {}
+    values: dict[str, T] = {}
     for text in given:
         name, sign, value = (part.strip() for part in text.partition("="))
         if not (name and sign and value):
             raise ValueRangeError(f"{option} '{text}'", "is not NAME=VALUE", next_step="write NAME=VALUE")
-        if name in found:
+        if name in values:
             raise ValueRangeError(f"{option} '{text}'", f"'{name}' is given twice", next_step="remove one")
         try:
-            found[name] = read(value)
+            values[name] = read(value)
         except ValueError:
-            wanted = "give a number, or for an input amplitude@frequency in Hz, for instance 1.5@2"
-            raise ValueRangeError(
-                f"{option} '{text}'", f"'{value}' is not understood", next_step=wanted
-            ) from None
-    return found
+            hint = "give a number, or for an input amplitude@frequency in Hz, for instance 1.5@2"
+            raise ValueRangeError(f"{option} '{text}'", f"'{value}' cannot be read", next_step=hint) from None
+    return values
 
 
 def _source(text: str) -> str:

@@ -9,7 +9,7 @@ import click
 
 from ..deck import deck_names, load_deck
 from ..locations import bundled
-from ..quantity import Quantity, sources
+from ..quantity import Quantity, sources, with_unit
 from .output import json_option, show_json, show_table
 
 _file = click.Path(path_type=Path, dir_okay=False, exists=True)
@@ -85,4 +85,4 @@ def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
 
 
 def _short(given: Quantity) -> str:
-    return str(given) if len(given.values) < 8 else f"{len(given.values)} numbers in {given.unit}"
+    return str(given) if len(given.values) < 8 else with_unit(f"{len(given.values)} numbers in", given.unit)

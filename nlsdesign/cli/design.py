@@ -13,7 +13,7 @@ from .units import Number
 
 @click.command()
 @deck_option
-@click.option("--maximum", type=Number("N*m"), required=True, help='Torque at the end, for instance "5 N*m".')
+@click.option("--maximum", type=Number("N*m"), required=True, help='Torque at the end, for instance "5 N·m".')
 @click.option("--angle", type=Number("deg"), required=True, help='Angle at the end, for instance "53 deg".')
 @click.option(
     "--shape", type=float, default=1.0, show_default=True, help="Exponent c of the target in 1/rad."
@@ -23,14 +23,14 @@ from .units import Number
     multiple=True,
     default=("spring.cam.contour",),
     show_default=True,
-    help="What may change; repeatable.",
+    help="Quantity that may change; repeatable.",
 )
 @click.option(
     "--minimum-radius",
     type=Number("mm"),
     default="1 mm",
     show_default=True,
-    help="Least radius of curvature.",
+    help="Smallest radius of curvature.",
 )
 @click.option(
     "--maximum-radius", type=Number("mm"), default="20 mm", show_default=True, help="Largest cam radius."
@@ -62,15 +62,21 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     ]
     target = ExponentialTorque(maximum=given["maximum"], angle=given["angle"], shape=given["shape"])
     with Steps().step("design"):
-        found = design_cam(declare(load_deck(deck_name)), target=target, free=list(given["free"]), keep=keep)
+        designed = design_cam(
+            declare(load_deck(deck_name)), target=target, free=list(given["free"]), keep=keep
+        )
     out.mkdir(parents=True, exist_ok=True)
-    write_deck(found.actuator, out / "model.toml")
-    files = [out / "model.toml", *write_drawings(out, found.contour, note=f"design {found.fingerprint}")]
+    write_deck(designed.actuator, out / "model.toml")
+    files = [
+        out / "model.toml",
+        *write_drawings(out, designed.contour, note=f"design {designed.fingerprint}"),
+    ]
     if as_json:
-        show_json({"torque_error_rms": found.rms, "values": {n: q.value for n, q in found.values.items()},
-                   "active_limits": found.active_limits, "files": files})  # fmt: skip
+        values = {n: q.value for n, q in designed.values.items()}
+        show_json({"torque_error_rms": designed.rms, "values": values,
+                   "active_limits": designed.active_limits, "files": files})  # fmt: skip
         return
     show_table(
-        "Design", ("what", "value"), [*found.rows(), *(("limit", str(state)) for state in found.limits)]
+        "Design", ("what", "value"), [*designed.rows(), *(("limit", str(state)) for state in designed.limits)]
     )
     click.echo("written: " + ", ".join(str(path) for path in files))

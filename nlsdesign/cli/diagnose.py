@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..quantity import typeset_unit
 from .output import deck_option, json_option, out_option, show_json, show_table
 
 if TYPE_CHECKING:
@@ -19,14 +20,14 @@ _mapping = click.option("--mapping", type=_file, default=None, help="TOML that m
 @click.command()
 @deck_option
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of CSV files.")
-@click.option("--hold-out", multiple=True, help="Glob of record names that no fit may see; repeatable.")
+@click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
 @_mapping
 @out_option("out/diagnosis")
 @json_option
 def diagnose(
     deck_name: str, records: Path, hold_out: tuple[str, ...], mapping: Path | None, out: Path, as_json: bool
 ) -> None:
-    """Refit, locate, name and add what the deck lacks; judge it on held-out records."""
+    """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..discrepancy import diagnose as find_what_is_missing
@@ -59,7 +60,7 @@ def diagnose(
 @click.option("--out", type=_file, required=True, help="CSV file to write.")
 @json_option
 def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
-    """Drive the model with a measured record and write what it predicts of the measured signals."""
+    """Drive the model with a measured record and write its predictions of the measured signals."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..discrepancy import predict
@@ -67,9 +68,9 @@ def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_j
     from ..model import flatten
 
     actuator = declare(load_deck(deck_name))
-    found = load_record(record, flatten(actuator), mapping=mapping)
-    (measured,) = found.records
-    predicted = predict(actuator, found, measured.name)
+    records = load_record(record, flatten(actuator), mapping=mapping)
+    (measured,) = records.records
+    predicted = predict(actuator, records, measured.name)
     predicted.write_csv(out)
     rows = agreement_rows(measured.trace, predicted)
     if as_json:
@@ -83,7 +84,7 @@ def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_j
 
 
 def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
-    """Return name, rms error and unit of each predicted signal; one that must vanish is its own error.
+    """Return name, rms error and unit of each predicted signal; a signal that is not measured should be zero.
 
     Parameters
     ----------
@@ -95,5 +96,5 @@ def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
     rows = []
     for name, values in predicted.signals.items():
         error = values - measured[name] if name in measured else values
-        rows.append((name, f"{float(np.sqrt(np.mean(error**2))):.4g}", predicted.units[name]))
+        rows.append((name, f"{float(np.sqrt(np.mean(error**2))):.4g}", typeset_unit(predicted.units[name])))
     return rows

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ..quantity import typeset_unit
 from .output import deck_option, json_option, out_option, show_json, show_table
 from .units import Number
 
@@ -15,7 +16,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.command()
 @deck_option
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
-@click.option("--hold-out", multiple=True, help="Glob of record names that no fit may see; repeatable.")
+@click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
 @click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
 @click.option("--window", type=Number("s"), default=None,
               help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
@@ -42,20 +43,27 @@ def fit(
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
     with steps.step("fit"):
-        found = refit(actuator, measured, window=window, progress=steps.note)
-    file, deck = write_refit(found, out)
+        result = refit(actuator, measured, window=window, progress=steps.note)
+    file, deck = write_refit(result, out)
     if as_json:
-        show_json(found.to_dict(str(deck)))
+        show_json(result.to_dict(str(deck)))
         return
     numbers = [
-        (n.name, f"{n.declared:.4g}", f"{n.fitted:.4g} ± {n.standard_error:.2g}", n.unit, f"{n.strain:+.2f}")
-        for n in found.numbers
+        (
+            n.name,
+            f"{n.declared:.4g}",
+            f"{n.fitted:.4g} ± {n.standard_error:.2g}",
+            typeset_unit(n.unit),
+            f"{n.strain:+.2f}",
+        )
+        for n in result.numbers
     ]
-    show_table("Numbers", ("name", "declared", "fitted", "unit", "moved, in spreads"), numbers)
+    show_table("Numbers", ("name", "declared", "fitted", "unit", "change in spreads"), numbers)
     errors = [
-        (e.block, e.role.replace("_", " "), *(f"{v:.3g}" for v in e[2:5]), e.unit) for e in found.errors()
+        (e.block, e.role.replace("_", " "), *(f"{v:.3g}" for v in e[2:5]), typeset_unit(e.unit))
+        for e in result.errors()
     ]
     show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
-    for words in found.words():
-        click.echo(words)
+    for sentence in result.words():
+        click.echo(sentence)
     click.echo(f"written: {file} and {deck}; next: nlsdesign diagnose --deck {deck} --records {records}")

@@ -37,8 +37,8 @@ def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
     try:
         program(standalone_mode=False)
-    except click.exceptions.Exit as leaving:
-        sys.exit(leaving.exit_code)
+    except click.exceptions.Exit as exit_:
+        sys.exit(exit_.exit_code)
     except click.ClickException as error:
         error.show()
         sys.exit(2)

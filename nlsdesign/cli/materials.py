@@ -1,4 +1,4 @@
-"""``nlsdesign materials``: what is known of rubbers that a spring could be made of."""
+"""``nlsdesign materials``: rubbers of the library and their properties."""
 
 from __future__ import annotations
 
@@ -41,5 +41,5 @@ def materials(name: str | None, as_json: bool) -> None:
 def _loss(material: Material) -> str:
     if "loss_tangent" not in material:
         return "not known"
-    found = material["loss_tangent"]
-    return f"{found.shown} ({found.evidence})"
+    tangent = material["loss_tangent"]
+    return f"{tangent.shown} ({tangent.evidence})"

@@ -1,4 +1,4 @@
-"""What commands print: a short table for people, JSON for scripts."""
+"""Output of commands: a short table for people, JSON for scripts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
         table.add_column(column, overflow="fold")
     for row in rows:
         table.add_row(*row)
-    # A table that is piped should not be squeezed into 80 columns.
+    # A piped table is not wrapped at 80 columns.
     width = None if Console().is_terminal else 160
     Console(highlight=False, markup=False, width=width).print(table)
 
@@ -65,8 +65,8 @@ def out_option(default: str = "out") -> Callable[[F], F]:
         Folder if none is given.
     """
     kind = click.Path(path_type=Path, file_okay=False)
-    told = "Folder for everything that is written."
-    return click.option("--out", type=kind, default=default, show_default=True, help=told)
+    text = "Folder for all files that are written."
+    return click.option("--out", type=kind, default=default, show_default=True, help=text)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")

@@ -1,4 +1,4 @@
-"""``nlsdesign parts``: what a deck can be made of."""
+"""``nlsdesign parts``: the components that a deck can name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..bibliography import cited
 from ..errors import unknown_name
+from ..quantity import typeset_unit
 from .output import json_option, show_json, show_table
 
 if TYPE_CHECKING:
@@ -33,13 +35,17 @@ def parts(name: str | None, as_json: bool) -> None:
         return
     if name not in known:
         raise unknown_name("part", name, known)
-    infos = known[name].parameter_infos()
+    infos, law = known[name].parameter_infos(), inspect.getdoc(known[name]) or ""
+    publications = [str(reference) for reference in cited(law)]
     if as_json:
-        show_json({"kind": _kind(known[name]), "law": inspect.getdoc(known[name]), "numbers": _plain(infos)})
+        content = {"law": law, "references": publications, "numbers": _plain(infos)}
+        show_json({"kind": _kind(known[name]), **content})
         return
-    click.echo(f"{name} ({_kind(known[name])})\n\n{inspect.getdoc(known[name])}\n")
+    click.echo("\n".join([f"{name} ({_kind(known[name])})", "", law, "", *publications, ""]))
     columns = ("name", "unit", "from", "to", "meaning")
-    numbers = [(n, i.unit, f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()]
+    numbers = [
+        (n, typeset_unit(i.unit), f"{i.minimum:g}", f"{i.maximum:g}", _meaning(i)) for n, i in infos.items()
+    ]
     show_table("Numbers", columns, numbers)
 
 
@@ -61,7 +67,7 @@ def _meaning(info: ParameterInfo) -> str:
 
 
 def _plain(infos: dict[str, ParameterInfo]) -> dict[str, dict[str, object]]:
-    # JSON knows no infinity.
+    # JSON has no infinity.
     return {
         n: {
             "unit": i.unit,

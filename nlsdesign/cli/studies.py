@@ -1,4 +1,4 @@
-"""``nlsdesign study``: list and run design studies, and hold their numbers against what they claim."""
+"""``nlsdesign study``: list and run design studies, and compare their numbers with the claimed ones."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ import click
 
 from ..errors import NlsError, unknown_name
 from ..locations import bundled, folder
+from ..quantity import with_unit
 from .output import json_option, show_json, show_table
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A number that a study claims: value, unit, and how far off it may be.
+    """A number that a study claims, with unit and tolerance.
 
     Parameters
     ----------
@@ -78,6 +79,8 @@ def load_study(name: str) -> ModuleType:
     ------
     UnknownNameError
         If there is no such study.
+    NlsError
+        If there is no such file, or it cannot be loaded as Python.
     """
     path = Path(name)
     if path.suffix != ".py":
@@ -96,7 +99,7 @@ def load_study(name: str) -> ModuleType:
 
 
 def claims(name: str) -> dict[str, Claim]:
-    """Return what a study claims in ``expected.toml``.
+    """Return the claims of a study in ``expected.toml``.
 
     Parameters
     ----------
@@ -182,7 +185,7 @@ def list_studies() -> None:
 @click.option("--fast", is_flag=True, help="Coarser and shorter, for a first look.")
 @json_option
 def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
-    """Run a study; exit status 1 if one of its numbers is not the one that it claims."""
+    """Run a study; exit status 1 if a number differs from its claim."""
     target = out if out is not None else Path("out") / Path(name).stem
     target.mkdir(parents=True, exist_ok=True)
     results, expected = run_study(name, target, fast=fast), claims(Path(name).stem)
@@ -202,6 +205,6 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
 
 
 def _row(key: str, value: float, claim: Claim | None) -> tuple[str, str, str]:
-    unit = f" {claim.unit}" if claim and claim.unit != "1" else ""
-    claimed = f"{claim.value:.4g} ± {claim.tolerance:.2g}{unit}" if claim else ""
-    return key, f"{value:.4g}{unit}", claimed
+    unit = claim.unit if claim else "1"
+    claimed = with_unit(f"{claim.value:.4g} ± {claim.tolerance:.2g}", unit) if claim else ""
+    return key, with_unit(f"{value:.4g}", unit), claimed

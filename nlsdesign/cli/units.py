@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import UnitError
-from ..quantity import Quantity, quantity, same_dimension
+from ..quantity import Quantity, quantity, same_dimension, typeset_unit, with_unit
 
 if TYPE_CHECKING:
     _Kind = click.ParamType[float]
@@ -21,7 +21,7 @@ class Number(_Kind):
     Parameters
     ----------
     unit
-        A unit of the dimension that is wanted.
+        A unit of the expected dimension.
     """
 
     name = "number unit"
@@ -37,14 +37,14 @@ class Number(_Kind):
 
 
 def parse_number(text: str, unit: str) -> Quantity:
-    """Read ``"5 N*m"``.
+    """Read ``"5 N·m"`` or ``"5 N*m"``.
 
     Parameters
     ----------
     text
-        Number, blank, unit.
+        Number, space, unit.
     unit
-        A unit of the dimension that is wanted.
+        A unit of the expected dimension.
 
     Raises
     ------
@@ -55,10 +55,16 @@ def parse_number(text: str, unit: str) -> Quantity:
     try:
         number = float(head)
     except ValueError:
-        raise UnitError(f"'{text}'", "does not start with a number", next_step=f"write '1 {unit}'") from None
+        raise UnitError(
+            f"'{text}'", "does not start with a number", next_step=f"write '{with_unit('1', unit)}'"
+        ) from None
     given = tail.strip()
     if not given and unit != "1":
-        raise UnitError(f"'{text}'", "has no unit", next_step=f"write '{text.strip()} {unit}'")
+        raise UnitError(f"'{text}'", "has no unit", next_step=f"write '{with_unit(text.strip(), unit)}'")
     if not same_dimension(given or "1", unit):
-        raise UnitError(f"'{text}'", f"'{given}' is not a unit like '{unit}'", next_step=f"write '1 {unit}'")
+        raise UnitError(
+            f"'{text}'",
+            f"'{given}' is not a unit like '{typeset_unit(unit)}'",
+            next_step=f"write '{with_unit('1', unit)}'",
+        )
     return quantity(number, given or "1", source="given on the command line")

@@ -1,18 +1,22 @@
 """Parts that can be declared; they never learn what they are used for."""
 
+from typing import NoReturn
+
 from .assembly.named_parts import Assembly, assembly
-from .assembly.smooth_form import Sharp, smoothed
-from .core.dampers import CoulombFriction, Dashpot, TorsionDashpot, ViscousMaterial
-from .core.element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Parallel, parallel
+from .assembly.renamed import renamed
+from .assembly.smooth_form import smoothed
+from .core.contacts import Rounded, Sharp, Smooth
+from .core.dampers import Dashpot, ViscousMaterial
+from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
+from .core.element import Element, Parallel, parallel
 from .core.part import Part
 from .core.series import Series, series
-from .core.springs import LinearElastic, SmoothStrainStiffening, Spring, StrainStiffening, TorsionSpring
+from .core.springs import LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
-from .materials.material_memory import StressSoftening, TensionSet, ViscousHeating, WorkHeating
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,
@@ -20,32 +24,34 @@ from .materials.named_networks import (
     maxwell,
     standard_linear_solid,
 )
+from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.rate_independent import SlidingFillers
+from .materials.self_heating import HeatBalance, SelfHeating, ViscousHeat, WorkHeat
+from .materials.specimen import Specimen, specimen
 from .materials.springpot import Springpot
-from .materials.stress_softening import PermanentSet, Softening
-from .materials.thermal import ArrheniusShift, SelfHeating, WlfShift
-from .mechanics.backlash import Backlash, InertialBacklash, LooseCable, Play, Slack, Turned
-from .mechanics.bodies import Body, Driven, DrivenPoint, Fixed, FixedPoint, GearedMotor, Inertia, Mass
-from .mechanics.carriage import ConstantForce, LinearDrive, SlidingFriction
-from .mechanics.dry_friction import DryFriction, DryLoadFriction, DryStribeckFriction
-from .mechanics.friction import LoadFriction, QuadraticDrag, StribeckFriction, TorqueRipple
+from .materials.stress_softening import LargestMotion, OgdenRoxburgh, StressSoftening
+from .materials.time_shift import ArrheniusShift, WlfShift
+from .mechanics.backlash import Backlash, Inertial, Slack, Turned
+from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
+from .mechanics.carriage import ConstantForce, LinearDrive
+from .mechanics.friction import CoulombFriction, LoadFriction, QuadraticDrag, StribeckFriction
 from .mechanics.gear import Gear, LossyGear
 from .mechanics.imperfect_motor import DelayedMotor, SaturatingMotor
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
-from .mechanics.stops import EndStop, RigidStop, RoundedEndStop
+from .mechanics.ripple import TorqueRipple
+from .mechanics.stops import EndStop, RigidStop
 from .sensing.delayed_sensors import DelayedForceSensor, DriftingForceSensor, TransportDelay
 from .sensing.eccentric_encoder import EccentricEncoder
 from .sensing.sampled_sensors import SampleAndHold, SampledEncoder, Tachometer
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
-from .transmission.cable_guide import CableGuide
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
-from .transmission.cam_drive import PullOnly, Specimen, Through, pull_only, specimen, through
+from .transmission.cam_drive import Through, through
 from .transmission.cam_error import MisshapenCam
 from .transmission.cam_shapes import AnchoredCam, OneSidedCam
-from .transmission.capstan import CapstanFriction
+from .transmission.capstan import CapstanFriction, Guide, WrapProduct
 from .transmission.stretchy_cable import StretchyCable
-from .transmission.unilateral_cable import InextensibleCable
+from .transmission.unilateral_cable import InextensibleCable, PullOnly, pull_only
 
 __all__ = [
     "MATERIAL",
@@ -57,7 +63,6 @@ __all__ = [
     "Assembly",
     "Backlash",
     "Body",
-    "CableGuide",
     "Cam",
     "CapstanFriction",
     "ConstantForce",
@@ -70,10 +75,6 @@ __all__ = [
     "Domain",
     "DriftingForceSensor",
     "Driven",
-    "DrivenPoint",
-    "DryFriction",
-    "DryLoadFriction",
-    "DryStribeckFriction",
     "EccentricEncoder",
     "ElectricMotor",
     "Element",
@@ -81,19 +82,21 @@ __all__ = [
     "EndStop",
     "ExtendedTube",
     "Fixed",
-    "FixedPoint",
     "FlowingChains",
+    "Following",
     "ForceSensor",
     "Gear",
     "GearedMotor",
+    "Guide",
+    "HeatBalance",
     "Hyperelastic",
     "Inertia",
-    "InertialBacklash",
+    "Inertial",
     "InextensibleCable",
+    "LargestMotion",
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
-    "LooseCable",
     "LossyGear",
     "LuGreFriction",
     "Mass",
@@ -101,17 +104,18 @@ __all__ = [
     "MisshapenCam",
     "NeoHooke",
     "Ogden",
+    "OgdenRoxburgh",
     "OneSidedCam",
     "Parallel",
     "Part",
     "PermanentSet",
-    "Play",
     "Property",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
     "RigidStop",
-    "RoundedEndStop",
+    "Rising",
+    "Rounded",
     "SampleAndHold",
     "SampledEncoder",
     "SaturatingMotor",
@@ -121,9 +125,7 @@ __all__ = [
     "Sharp",
     "Slack",
     "SlidingFillers",
-    "SlidingFriction",
-    "SmoothStrainStiffening",
-    "Softening",
+    "Smooth",
     "Specimen",
     "Spring",
     "Springpot",
@@ -132,21 +134,19 @@ __all__ = [
     "StretchyCable",
     "StribeckFriction",
     "Tachometer",
-    "TensionSet",
     "Through",
     "Tie",
     "TorqueRipple",
     "TorqueSensor",
-    "TorsionDashpot",
-    "TorsionSpring",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
-    "ViscousHeating",
+    "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",
     "WlfShift",
-    "WorkHeating",
+    "WorkHeat",
+    "WrapProduct",
     "Yeoh",
     "assembly",
     "burgers",
@@ -165,3 +165,9 @@ __all__ = [
     "through",
     "tie",
 ]
+
+
+def __getattr__(name: str) -> NoReturn:
+    """Say the new name of a component that had another one."""
+    error = renamed(name)
+    raise error or AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -112,10 +112,12 @@ def sine_response(
     ----------
     loop
         Load fixed, or held by its inputs at zero.
-    amplitude, offset
+    amplitude
         Of the desired torque in N·m.
     frequencies
         In Hz; rounded so that a whole number of samples makes the evaluated cycles.
+    offset
+        Of the desired torque in N·m.
     cycles
         Number of cycles that are evaluated.
 

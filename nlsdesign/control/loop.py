@@ -45,6 +45,13 @@ class ClosedLoop:
         Samples between a current's computation and its effect.
     substeps
         Integration steps of the plant per sample.
+
+    Raises
+    ------
+    ValueRangeError
+        If observer and controller are not sampled alike, or delay or substeps is too small.
+    ArrangementError
+        If a wire leads to none of the three.
     """
 
     plant: FlatModel

@@ -41,6 +41,11 @@ class DiscreteStepper:
     ----------
     model
         Discrete, for instance an observer or a controller.
+
+    Raises
+    ------
+    ValueRangeError
+        If the model is continuous.
     """
 
     def __init__(self, model: FlatModel) -> None:
@@ -91,6 +96,13 @@ class PlantStepper:
         Steps per sample. The product of the fastest eigenvalue and the step should stay below about 0.3.
     seen
         Names of variables that are wanted at the samples.
+
+    Raises
+    ------
+    ValueRangeError
+        If the model is discrete.
+    UnknownNameError
+        If a name is no variable of the plant.
     """
 
     def __init__(self, model: FlatModel, sample_time: float, substeps: int, seen: Sequence[str]) -> None:

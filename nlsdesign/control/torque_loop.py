@@ -41,6 +41,11 @@ class TorqueGains:
     compensation
         Share of the estimated spring torque that is added to the current, so that the velocity loop does not
         have to carry it.
+
+    Raises
+    ------
+    ValueRangeError
+        If a gain is negative or not finite.
     """
 
     proportional: float = 32.0

@@ -8,7 +8,7 @@ limits and no convexity: it is what every optimised cam is measured against. At 
     e₀ = 0:  h(0+) = √(τ'(0)/(N·K₀)), a jump, for a cable through the centre has no lever arm at zero;
     e₀ > 0:  h(0) = 0 and τ'(0) = N·F₀·h'(0).
 
-Source: Schepelmann, Geberth and Geyer, ICRA 2014; virtual work.
+Source: Schepelmann et al. 2014; virtual work.
 """
 
 from __future__ import annotations
@@ -125,6 +125,8 @@ def closed_form(
     ------
     InfeasibleError
         As :func:`energy_profile`.
+    ValueRangeError
+        If fewer than three angles are asked for.
     """
     if points < 3:
         raise ValueRangeError(f"points = {points}", "a profile needs at least three angles")

@@ -9,7 +9,7 @@ so ρ ≥ 0 everywhere means convex. At φ = 0 the cable lies along the x axis a
 What is described is the lower right lip; the other three are its mirror images. All lengths are those of the
 cable's centre line: the cam itself lies deeper by the radius of the cable.
 
-Source: support function of a convex curve, any text on convex geometry.
+Source: Schneider 2014 (support function of a convex curve).
 """
 
 from __future__ import annotations
@@ -120,6 +120,11 @@ class Contour:
         -------
         numpy.ndarray
             Shape (2, 2): contact point, then anchor.
+
+        Raises
+        ------
+        ValueRangeError
+            If the angle lies beyond the end of the contour.
         """
         if abs(angle) > self.angles[-1] * (1 + 1e-9) + 1e-12:
             raise ValueRangeError(

@@ -114,7 +114,7 @@ class Target(ABC):
 class ExponentialTorque(Target):
     """τ(θ) = τ_max·(e^{cθ} − 1)/(e^{cθ_max} − 1); gentle near zero, stiff at the end.
 
-    Source: Schepelmann, Geberth and Geyer, ICRA 2014, with c = 1, 5 N·m, 53°.
+    Source: Schepelmann et al. 2014, with c = 1, 5 N·m, 53°.
 
     Parameters
     ----------
@@ -124,6 +124,11 @@ class ExponentialTorque(Target):
         Last angle in rad.
     shape
         c; negative for a softening curve. Zero would be a straight line: see :class:`PowerTorque`.
+
+    Raises
+    ------
+    ValueRangeError
+        If the shape is zero, which would be a straight line.
 
     Examples
     --------

@@ -23,7 +23,7 @@ from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from ..writing import write_text
 from .blocks.tearing import blocks_of
-from .effects import ALL, Effect
+from .effects import ALL, EffectFunction
 from .fitting.unpredictable import Key
 from .reporting.advice import advice, more_excitation, where_they_differ
 from .reporting.gap import course_of, gaps_of, shapes_of
@@ -59,7 +59,7 @@ def diagnose(
     actuator: Assembly,
     records: RecordSet,
     *,
-    catalogue: Sequence[Effect] = ALL,
+    catalogue: Sequence[EffectFunction] = ALL,
     progress: Callable[[str], None] = _silent,
 ) -> Verdict:
     """Find out what a declared model lacks.

@@ -1,4 +1,4 @@
-"""Reading the fixed shells and writing several results whole or not at all."""
+"""Fixed C shells, and atomic writing of several files."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ def shell(name: str) -> str:
     return (files(__package__) / "shells" / name).read_text(encoding="utf-8")
 
 
-def filled(name: str, words: Mapping[str, str]) -> str:
-    """Return a shell with its ``@word@`` marks replaced.
+def filled(name: str, values: Mapping[str, str]) -> str:
+    """Return a shell with its ``@name@`` placeholders replaced.
 
     Parameters
     ----------
     name
         File name in ``nlsdesign/export/shells``.
-    words
-        Replacement by word.
+    values
+        Text by name of the placeholder.
     """
     text = shell(name)
-    for word, replacement in words.items():
-        text = text.replace(f"@{word}@", replacement)
+    for placeholder, value in values.items():
+        text = text.replace(f"@{placeholder}@", value)
     return text
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
-    """Write several files; none is touched before all of them could be written beside their place.
+    """Write several files; none is replaced before all of them are written as temporary files.
 
     Parameters
     ----------

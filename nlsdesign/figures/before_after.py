@@ -72,6 +72,11 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
         Of the errors, for instance ``"N"``.
     quantity
         Name of the error, for the axis.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no record.
     """
     if not errors:
         raise ValueRangeError(
@@ -248,6 +253,11 @@ def candidate_shares(candidates: Sequence[CandidateShare]) -> Figure:
     ----------
     candidates
         At least one.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no candidate.
     """
     if not candidates:
         raise ValueRangeError("candidates", "there is none to draw", next_step="leave this figure out")

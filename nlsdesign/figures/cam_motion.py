@@ -58,6 +58,11 @@ class CamMotion:
         Length of the rubber without force in m.
     pretension
         Extension in m at angle zero.
+
+    Raises
+    ------
+    ValueRangeError
+        If the rows differ in length.
     """
 
     contour: Contour

@@ -44,7 +44,7 @@ class EquationBuilder:
 
     def _declare(self, path: str, part: Part) -> None:
         inner = part.element if isinstance(part, Tie) else part
-        for field_name, info in inner.parameter_infos().items():
+        for field_name, info in inner.infos().items():
             given = part.parameters()[field_name]
             for name, value in zip(number_names(path, inner, field_name), given.values, strict=True):
                 variable = Variable(
@@ -145,7 +145,13 @@ class OwnNames(SwitchScope):
         return self._builder.inputs[full][1]
 
     def state(self, name: str, unit: str, description: str) -> Expression:
-        """Declare a state."""
+        """Declare a state.
+
+        Raises
+        ------
+        ArrangementError
+            If two equations claim the state.
+        """
         full = self._builder.own(self.path, name)
         if full in self._builder.states:
             raise ArrangementError(full, "two equations claim this state")

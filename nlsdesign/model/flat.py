@@ -305,9 +305,9 @@ class FlatModel:
 
         Examples
         --------
-        >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+        >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
         >>> from nlsdesign.model import flatten
-        >>> spring = tie(TorsionSpring(stiffness=2.0), "wheel")
+        >>> spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
         >>> swing = flatten(assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring))
         >>> swing.symbolic_equations().derivatives["wheel.angle"]
         wheel.speed

@@ -50,8 +50,8 @@ def flatten(
 
     Examples
     --------
-    >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
-    >>> spring = tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
+    >>> spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
     >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring)
     >>> [v.name for v in flatten(swing).states]
     ['wheel.angle', 'wheel.speed']

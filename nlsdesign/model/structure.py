@@ -12,9 +12,10 @@ from ..components.assembly.named_parts import Assembly
 from ..components.core.element import Domain
 from ..components.core.part import Part, walk
 from ..components.core.tie import Tie
+from ..components.materials.specimen import Specimen
 from ..components.mechanics.bodies import Body, Free, GearedMotor
 from ..components.mechanics.motor import ElectricMotor
-from ..components.transmission.cam_drive import Specimen, Through
+from ..components.transmission.cam_drive import Through
 from .gear_train import trains
 
 

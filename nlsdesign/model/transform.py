@@ -79,9 +79,9 @@ def with_signal(
 
     Examples
     --------
-    >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+    >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
     >>> from nlsdesign.model import Variable, flatten
-    >>> spring = tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
     >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring)
     >>> energy = Variable("spring.energy", "J", "energy stored in the spring")
     >>> half = lambda n: n["spring.torque"] * n["wheel.angle"] / 2

@@ -31,14 +31,14 @@ class Layout:
     ----------
     angle, speed
         States.
-    consistent
-        States that agree with a signal at rest, as for :func:`~nlsdesign.analysis.rest.rest_states`.
-    rate
-        Input that is the rate of a measured state, if there is one.
     speed_size
         Typical speed in rad/s.
     angles
         Ascending, shape (n,): the range in which the form is wanted.
+    consistent
+        States that agree with a signal at rest, as for :func:`~nlsdesign.analysis.rest.rest_states`.
+    rate
+        Input that is the rate of a measured state, if there is one.
     """
 
     angle: str

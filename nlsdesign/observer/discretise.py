@@ -33,7 +33,7 @@ def held(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
 def linear(a: Array, sample_time: float) -> tuple[Array, Array, Array]:
     """Return Φ, Γ₀ and Γ₁ of x⁺ = Φx + Γ₀g₀ + Γ₁g₁ for a drive that runs linearly from g₀ to g₁.
 
-    ẋ = A x + g(t). Source: Van Loan, Computing integrals involving the matrix exponential, 1978.
+    ẋ = A x + g(t). Source: Van Loan 1978.
 
     Parameters
     ----------

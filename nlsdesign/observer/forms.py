@@ -62,7 +62,13 @@ class Minimal:
     """
 
     def plant(self, model: FlatModel, *, estimate: str, angle: str, angles: Array) -> AngleScheduledPlant:
-        """Return the plant; see :class:`StateForm`."""
+        """Return the plant; see :class:`StateForm`.
+
+        Raises
+        ------
+        UnknownNameError
+            If the angle is no state of the model.
+        """
         if angle not in {v.name for v in model.states}:
             raise unknown_name("state", angle, (v.name for v in model.states))
         model = without_idle_states(model, [estimate, angle])
@@ -94,7 +100,13 @@ class AsPublished:
     rate_bandwidth: float = float("inf")
 
     def plant(self, model: FlatModel, *, estimate: str, angle: str, angles: Array) -> AngleScheduledPlant:
-        """Return the plant; see :class:`StateForm`."""
+        """Return the plant; see :class:`StateForm`.
+
+        Raises
+        ------
+        ValueRangeError
+            If the bandwidth of the rate is not positive.
+        """
         n = self.names
         if not self.rate_bandwidth > 0.0:
             raise ValueRangeError(f"rate_bandwidth {self.rate_bandwidth:g} Hz", "must be positive")

@@ -72,6 +72,11 @@ class CascadeGain:
     extension), and constant in the rows of angle and speed, such that their own error has the double pole
     e^(−2πfT).
 
+    Raises
+    ------
+    ValueRangeError
+        If the bandwidth is not positive and finite.
+
     Notes
     -----
     Argument. The inner states are driven by the measured angle alone, ζ⁺ = Φ_ζ ζ + (known), so their error

@@ -96,6 +96,11 @@ def observer_design(
     ----------
     model, estimate, measured, sample_time, gain, form, grid
         As for :func:`design_observer`, which also says what is raised.
+
+    Raises
+    ------
+    ValueRangeError
+        If the sample time is not between 0 and 1 s, or the model is discrete.
     """
     if not 0.0 < sample_time < 1.0:
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")

@@ -133,6 +133,11 @@ class GridByTolerance(Grid):
         In rad.
     most_points
         Where the bound is not kept with so many points, an error is raised.
+
+    Raises
+    ------
+    ValueRangeError
+        If the tolerance is not positive.
     """
 
     lower: float = -1.1
@@ -183,6 +188,11 @@ class FixedGrid(Grid):
         Range in rad; beyond it the ends are held.
     points
         Number of grid points.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are fewer than two points.
     """
 
     lower: float = -1.1
@@ -217,6 +227,11 @@ def compacted(
         Of a sum; a share of it may be spent on literals and shared columns.
     angle_error
         As in :class:`GridByTolerance`.
+
+    Raises
+    ------
+    ConvergenceError
+        If an entry is not finite at some angle.
     """
     columns: list[Entry] = []
     places: dict[str, Place] = {}

@@ -1,4 +1,4 @@
-"""A CasADi function called through fixed buffers, which costs little more than its arithmetic."""
+"""A CasADi function called through fixed buffers, with little overhead."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def as_it_is(function: ca.Function) -> ca.Function:
 
 
 class Buffered:
-    """A function with dense results, with its arguments and results as arrays that stay.
+    """A function with dense results, with fixed arrays for its arguments and results.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Events: where a model is not smooth, the step ends there, and goes on with the equations of the other side.
+"""Event location: a step ends where the model is not smooth and continues with the next equations.
 
-Between events the modes of all switches are held, so each step sees smooth equations only. For each switch
-the model gives a number that is not negative while its mode lasts; it is looked at in the middle and at the
-end of each step. Where one has become negative, the step is taken anew with shorter and shorter lengths until
-the moment is known. Source: Shampine and Thompson 2000, Event location for ordinary differential equations;
-for the laws that hold a rate, Pfeiffer and Glocker 1996, Multibody Dynamics with Unilateral Contacts.
+Between events the modes of all switches are constant, so each step has smooth equations. For each switch the
+model gives an event function that is not negative while its mode lasts; it is evaluated in the middle and at
+the end of each step. Where one is negative, the step is repeated with shorter lengths until the time of the
+event is known.
+Source: Shampine and Thompson 2000; Pfeiffer and Glocker 1996 (laws that hold a rate).
 """
 
 from __future__ import annotations
@@ -23,20 +23,22 @@ from ..model.switching import Switch, Switching
 from .buffered import Array, Buffered
 
 LOCATED = 1e-12
-"""An event is known to this share of the distance of two samples, or to four units in the last place."""
+"""Accuracy of an event time, as a share of the sample interval; at best four units in the last place."""
 
 REBOUND = 2
+"""Mode number under which a rebound is recorded."""
 MOST_AT_ONCE = 40
+"""Largest number of mode changes at one time."""
 MOST_DRIFT = 1e-6
-"""Change of a rate that is held in one step, relative to the nominal size, beyond rounding."""
+"""Largest change of a constrained rate in one step, relative to the nominal size."""
 
-CROWD, CROWDED = 200, 1e-7
-"""So many events within this share of the whole time are taken for infinitely many."""
+MOST_EVENTS, EVENT_WINDOW = 200, 1e-7
+"""This number of events within this share of the simulated time counts as accumulation (Zeno)."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at a moment.
+    """A change of mode at a point in time.
 
     Parameters
     ----------
@@ -56,21 +58,21 @@ class Event:
         return f"{self.time:.9g} s: {self.name} {self.what}"
 
 
-def located(lasts: Callable[[float], float], length: float, finest: float) -> float:
-    """Return the shortest length known at which something has ended.
+def locate_event(lasts: Callable[[float], float], length: float, finest: float) -> float:
+    """Return the shortest known step length at which a mode has ended.
 
-    Source: Chandrupatla 1997, a bracket with inverse quadratic interpolation where that is safe.
+    Source: Chandrupatla 1997, bracketing with inverse quadratic interpolation where that is safe.
 
     Parameters
     ----------
     lasts
-        Takes a length of step; not negative while everything lasts. It is called last with the result.
+        Event function of the step length, not negative while all modes last. Its last call has the result.
     length
-        Where something has ended.
+        Length at which a mode has ended.
     finest
-        Uncertainty that is allowed.
+        Allowed uncertainty.
     """
-    # At the beginning something may just have changed: there its value says nothing.
+    # At length zero a mode may just have changed, so the event function is not evaluated there.
     one, at_one, other, at_other = length, lasts(length), 0.0, np.inf
     share, last = 0.5, length
     while abs(other - one) > finest:
@@ -90,7 +92,7 @@ def located(lasts: Callable[[float], float], length: float, finest: float) -> fl
 
 
 def _share(one: float, at_one: float, other: float, at_other: float, third: float, at_third: float) -> float:
-    """Return where in the bracket to look next, as a share of the way from one end to the other."""
+    """Return the next point in the bracket, as a share of its width."""
     if at_third in (at_one, at_other) or not (math.isfinite(at_other) and math.isfinite(at_third)):
         return 0.5
     place, value = (one - other) / (third - other), (at_one - at_other) / (at_third - at_other)
@@ -101,8 +103,8 @@ def _share(one: float, at_one: float, other: float, at_other: float, third: floa
     return first + (third - one) / (other - one) * second
 
 
-class Story:
-    """What has happened, unless it never ends.
+class EventLog:
+    """The events so far; raises an error where they accumulate.
 
     Parameters
     ----------
@@ -111,23 +113,23 @@ class Story:
     switches
         In the order of their numbers.
     span
-        Whole time that is simulated, in s.
+        Simulated time in s.
     """
 
     def __init__(self, model: str, switches: Sequence[Switch], span: float) -> None:
-        self._model, self._switches, self._crowded = model, switches, CROWDED * span
-        self._recent: deque[float] = deque(maxlen=CROWD)
+        self._model, self._switches, self._window = model, switches, EVENT_WINDOW * span
+        self._recent: deque[float] = deque(maxlen=MOST_EVENTS)
         self.events: list[Event] = []
 
-    def tell(self, time: float, i: int, mode: int) -> None:
+    def record(self, time: float, i: int, mode: int) -> None:
         """Record that a mode of a switch has begun."""
         switch = self._switches[i]
         self.events.append(Event(time, switch.name, switch.told(mode)))
         self._recent.append(time)
-        if len(self._recent) == CROWD and time - self._recent[0] < self._crowded:
-            raise self.endless(i, time)
+        if len(self._recent) == MOST_EVENTS and time - self._recent[0] < self._window:
+            raise self.accumulation(i, time)
 
-    def endless(self, i: int, time: float) -> ConvergenceError:
+    def accumulation(self, i: int, time: float) -> ConvergenceError:
         """Return the error for events that accumulate."""
         return ConvergenceError(
             f"simulation of {self._model}",
@@ -135,8 +137,8 @@ class Story:
             next_step="give a stop a speed below which it rests, or take the smooth form of the law",
         )
 
-    def running_away(self, i: int, time: float) -> ConvergenceError:
-        """Return the error for a rate that should be held and is not."""
+    def drift(self, i: int, time: float) -> ConvergenceError:
+        """Return the error for a rate that should stay constant and does not."""
         return ConvergenceError(
             f"simulation of {self._model}",
             f"'{self._switches[i].name}' sticks, but its rate has changed by t = {time:g} s",
@@ -145,14 +147,19 @@ class Story:
 
 
 class Modes:
-    """The modes of all switches, what changes them, and what has happened.
+    """The modes of all switches, their changes and the events.
 
     Parameters
     ----------
     model
         With switches.
     span
-        Whole time that is simulated, in s.
+        Simulated time in s.
+
+    Raises
+    ------
+    ValueError
+        If the model has no switches.
     """
 
     def __init__(self, model: FlatModel, span: float) -> None:
@@ -166,27 +173,27 @@ class Modes:
         self._branch, self._natural = Buffered(laws.branch, (*given, self.now)), Buffered(laws.natural, given)
         self._land = Buffered(laws.landing, (*given, self.now))
         self._nominal = np.array([v.nominal for v in model.states])
-        self.story = Story(model.name, laws.switches, span)
+        self.log = EventLog(model.name, laws.switches, span)
         self.held = np.zeros(0, dtype=int)
 
     @property
     def jump(self) -> bool:
-        """Whether the equations themselves jump at one of them."""
+        """Whether the equations are discontinuous at a switch."""
         return bool(self._laws.jumps)
 
     def begin(self, time: float, state: Array, inputs: Array) -> None:
-        """Take the modes that belong to a state, which must lie within all stops."""
+        """Set the modes that belong to a state, which must lie within all stops."""
         self.now[:] = self._at(self._natural, time, state, inputs)[0]
-        self.settle(time, state, inputs, told=False)
+        self.settle(time, state, inputs, record=False)
 
-    def settle(self, time: float, state: Array, inputs: Array, *, told: bool = True) -> None:
-        """Change the modes that have ended, and the state where it jumps, until all last.
+    def settle(self, time: float, state: Array, inputs: Array, *, record: bool = True) -> None:
+        """Change the modes that have ended, and the state where it jumps, until no mode ends.
 
         Parameters
         ----------
         time, state, inputs
-            Now; the state is changed in place.
-        told
+            At the event; the state is changed in place.
+        record
             Whether to record events.
         """
         before = self.now.copy()
@@ -198,18 +205,18 @@ class Modes:
             for i in ended.tolist():
                 rebounds += self._changed(i, time, state, inputs)
         else:
-            raise self.story.endless(int(ended[0]), time)
+            raise self.log.accumulation(int(ended[0]), time)
         self.held = np.flatnonzero((self.now == 0.0) & np.array(self._laws.holds))
         self.keep(time, state, inputs)
-        if told:
+        if record:
             for i in rebounds:
-                self.story.tell(time, i, REBOUND)
+                self.log.record(time, i, REBOUND)
             for i, (old, new) in enumerate(zip(before.tolist(), self.now.tolist(), strict=True)):
                 if old != new:
-                    self.story.tell(time, i, int(new))
+                    self.log.record(time, i, int(new))
 
     def keep(self, time: float, state: Array, inputs: Array) -> None:
-        """Bring the rates that are held back to exactly zero, without changing any momentum."""
+        """Set the constrained rates to exactly zero, without changing any momentum."""
         if not len(self.held):
             return
         rate, _, _, reach, slope = self._landing(time, state, inputs)
@@ -218,9 +225,9 @@ class Modes:
             change = np.linalg.solve(slope[held] @ reach[:, held], -rate[held])
             state += reach[:, held] @ change
             if np.max(np.abs(reach[:, held] @ change) / self._nominal) > MOST_DRIFT:
-                raise self.story.running_away(int(held[0]), time)
+                raise self.log.drift(int(held[0]), time)
             for i in held.tolist():
-                # What rounding has left.
+                # The remaining rounding error.
                 left = self._landing(time, state, inputs)[0][i]
                 first = int(np.argmax(np.abs(slope[i])))
                 state[first] -= left / slope[i, first]

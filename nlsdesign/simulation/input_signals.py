@@ -1,4 +1,4 @@
-"""What drives the inputs of a model: samples, functions of time, constants."""
+"""Input signals of a model: samples, functions of time, constants."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Drive: TypeAlias = Callable[[float], float] | Array | float
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """Inputs over time: lines between samples, and functions that are asked wherever they are needed.
+    """Inputs over time: linear between samples, or functions of time.
 
     Parameters
     ----------
@@ -61,20 +61,20 @@ class Drives:
         ValueRangeError
             If a function gives no finite number.
         """
-        found = np.empty((len(moments), len(self.samples))) if out is None else out
+        inputs = np.empty((len(moments), len(self.samples))) if out is None else out
         if len(self.functions) < len(self.samples):
             since = moments - self.times[interval]
-            np.multiply(since[:, None], self.slopes[:, interval], out=found)
-            found += self.samples[:, interval]
+            np.multiply(since[:, None], self.slopes[:, interval], out=inputs)
+            inputs += self.samples[:, interval]
         for (name, number), function in self.functions.items():
             if isinstance(function, Sine):
-                found[:, number] = function.at(moments)
+                inputs[:, number] = function.at(moments)
                 continue
             values = [float(function(t)) for t in moments.tolist()]
             if not math.isfinite(sum(values)):
                 raise _not_finite(name, moments, np.array(values))
-            found[:, number] = values
-        return found
+            inputs[:, number] = values
+        return inputs
 
 
 def drives_of(model: FlatModel, times: Array, given: Mapping[str, Drive], *, hold: bool) -> Drives:

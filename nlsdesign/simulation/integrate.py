@@ -1,7 +1,7 @@
 """Simulation of a flat model over time.
 
-Continuous models are integrated explicitly, and implicitly where they turn out to be stiff; discrete ones
-are stepped. Inputs are samples (lines between them) or functions of time.
+Continuous models are integrated explicitly, and implicitly from where they are stiff; discrete ones are
+stepped. Inputs are samples (linear between them) or functions of time.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def simulate(
         Strictly ascending sample times in s, shape (n,). A discrete model needs multiples of its sample time.
     inputs
         By name: a function of time, samples of shape (n,), or a constant. Others rest at their start value.
-        A function is asked at least twelve times between two times; a shorter pulse may be missed.
+        A function is evaluated at least twelve times between two times; a shorter pulse may be missed.
     start
         States at the first time, by name; others at their start value.
     hold
@@ -61,8 +61,8 @@ def simulate(
     Returns
     -------
     Trace
-        All states, inputs, outputs and signals at ``times``; ``events`` tells when something stuck, slipped,
-        struck or went slack. A stiff model without jumps is told only until the implicit method takes over.
+        All states, inputs, outputs and signals at ``times``; ``events`` lists sticking, slipping,
+        impacts and slack. Of a stiff model without jumps only until the implicit method takes over.
 
     Raises
     ------
@@ -108,10 +108,10 @@ def _integrated(
         return np.zeros((0, len(drives.times))), []
     try:
         x, events = integrate_explicitly(model, drives, x0, tolerance, translate)
-    except TooStiffError as found:
-        first, events = found.interval, found.events
-        rest = integrate_implicitly(model, drives, first, found.states[:, -1], tolerance)
-        x = np.hstack([found.states[:, :-1], rest])
+    except TooStiffError as stiff:
+        first, events = stiff.interval, stiff.events
+        rest = integrate_implicitly(model, drives, first, stiff.states[:, -1], tolerance)
+        x = np.hstack([stiff.states[:, :-1], rest])
     if not np.all(np.isfinite(x)):
         raise ConvergenceError(f"simulation of {model.name}", "a state is not finite")
     return x, events
@@ -135,7 +135,7 @@ def _evaluated(model: FlatModel, times: Array, x: Array, u: Array) -> Trace:
     w = np.zeros((0, len(times)))
     if model.tables:
         w = np.array([model.look_up(list(x[:, k]), list(u[:, k])) for k in range(len(times))]).T
-    # Many columns of the others against one of the parameters: CasADi runs through them.
+    # With one column of parameters and many of the others CasADi maps over the columns.
     _, y, s, r = model.equations(times[None, :], x, u, model.start(model.parameters), w)
     _check_residuals(model, times, np.array(r))
     signals: dict[str, Array] = {}

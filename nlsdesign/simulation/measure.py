@@ -1,4 +1,4 @@
-"""From a simulated run to what the sensors of the bench would have written down."""
+"""From a simulated run to the records of its sensors."""
 
 from __future__ import annotations
 
@@ -9,24 +9,25 @@ from numpy.typing import NDArray
 
 from ..errors import UnitError, ValueRangeError, unknown_name
 from ..model import Assembly
+from ..quantity import typeset_unit
 from .trace import Trace
 
 
 def measure(run: Trace, assembly: Assembly, *, seed: int) -> Trace:
     """Return the readings of all sensors over a run, with noise, exact delay, sample rate and hold.
 
-    The continuous readings that may stand in the run are not used: every sensor starts from the signal that
-    it reads, or from the record of an earlier sensor. Each sensor has a noise of its own, led by the seed and
-    its name, so another sensor more or less changes nothing for the others.
+    Continuous readings in the run are not used: a sensor starts from the signal that it reads, or from the
+    record of an earlier sensor. The noise of each sensor depends on the seed and its name only, so adding or
+    removing another sensor does not change it.
 
     Parameters
     ----------
     run
-        Simulated signals; its times should lie at least as close as the samples of the fastest sensor.
+        Simulated signals, at least as densely as the samples of the fastest sensor.
     assembly
         Its sensors.
     seed
-        Leads the noise; the same seed gives the same record.
+        Of the noise; the same seed gives the same record.
 
     Returns
     -------
@@ -38,7 +39,7 @@ def measure(run: Trace, assembly: Assembly, *, seed: int) -> Trace:
     ValueRangeError
         If the assembly has no sensor, or the run is coarser than the samples of a sensor.
     UnknownNameError
-        If the run lacks what a sensor reads.
+        If the run lacks the signal that a sensor reads.
     UnitError
         If a sensor cannot read a signal of that unit.
 
@@ -65,8 +66,9 @@ def measure(run: Trace, assembly: Assembly, *, seed: int) -> Trace:
             raise unknown_name(f"sensor '{name}' reads", sensor.of, known)
         unit = units[sensor.of]
         if not sensor.sees(unit):
-            raise UnitError(f"sensor '{name}' of '{sensor.of}'", f"cannot read a signal in {unit}")
-        chance = np.random.default_rng([seed, zlib.crc32(name.encode())])
-        readings[f"{name}.reading"] = sensor.recorded(run.time, known[sensor.of], chance)
+            shown = typeset_unit(unit) or "1"
+            raise UnitError(f"sensor '{name}' of '{sensor.of}'", f"cannot read a signal in {shown}")
+        generator = np.random.default_rng([seed, zlib.crc32(name.encode())])
+        readings[f"{name}.reading"] = sensor.recorded(run.time, known[sensor.of], generator)
         units[f"{name}.reading"] = sensor.reading_unit(unit)
     return Trace(run.time, readings, {n: units[n] for n in readings}, run.name, warnings=run.warnings)

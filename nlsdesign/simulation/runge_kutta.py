@@ -1,7 +1,7 @@
 """Explicit Runge–Kutta integration of order 8 with error control, written out in CasADi.
 
-A one-step method loses nothing where an input has a corner at every sample; a multi-step method would
-have to start again there. Source of the method: Dormand and Prince 1981; Hairer, Nørsett and Wanner,
+A one-step method loses no accuracy where an input has a kink at every sample; a multi-step method would
+have to restart there. Source of the method: Dormand and Prince 1981; Hairer, Nørsett and Wanner,
 Solving Ordinary Differential Equations I, section II.5; coefficients from ``scipy.integrate.DOP853``.
 """
 
@@ -18,7 +18,7 @@ from scipy.integrate import DOP853
 from ..errors import ConvergenceError
 from ..model import FlatModel
 from .buffered import Buffered, Translate, as_it_is
-from .events import LOCATED, Event, Modes, branch_of, located
+from .events import LOCATED, Event, Modes, branch_of, locate_event
 from .input_signals import Drives
 
 Array = NDArray[np.float64]
@@ -28,15 +28,15 @@ NODES: Array = np.asarray(DOP853.C[:STAGES], dtype=float)
 SMALLEST_STEP = 1e-13
 """Shortest step relative to the distance of two samples or to the time itself."""
 
-HOPELESS = 1e6
-"""With an error beyond this a step is shortened before anything is looked for in it."""
+LARGEST_ERROR = 1e6
+"""With an error beyond this a step is shortened before its events are located."""
 
 WRITTEN_OUT = 2000
 """Right-hand sides with more operations than this are called, not written out twelve times."""
 
 
 class TooStiffError(Exception):
-    """The steps are held short by stability and not by accuracy; an implicit method is due."""
+    """Stability limits the steps, not accuracy; an implicit method is needed."""
 
     def __init__(self, interval: int, states: Array, events: list[Event]) -> None:
         super().__init__(interval)
@@ -73,25 +73,25 @@ def step_function(branch: ca.Function) -> ca.Function:
     after = x + h * weighted(DOP853.B)
     scale = tolerance * (nominal + ca.fmax(ca.fabs(x), ca.fabs(after)))
     fifth, third = ca.sumsqr(weighted(DOP853.E5) / scale), ca.sumsqr(weighted(DOP853.E3) / scale)
-    # The smallest normal number only keeps 0/0 away.
+    # The smallest normal number avoids 0/0.
     error = h * fifth / ca.sqrt(n * (fifth + 0.01 * third) + 2.3e-308)
-    watched = [ca.MX(1), ca.MX(1), ca.MX(0, 1)]
+    monitors = [ca.MX(1), ca.MX(1), ca.MX(0, 1)]
     if switches:
         last, at_end, rate = branch(t + h, after, u[:, STAGES - 1], p, modes)
         middle = (x + after) / 2 + h / 8 * (rates[0] - last)
         at_middle = branch(t + h / 2, middle, u[:, STAGES], p, modes)[1]
-        watched = [ca.mmin(at_end), ca.mmin(ca.vertcat(at_end, at_middle)), rate]
-    results = [ca.densify(each) for each in (after, error, *watched)]
+        monitors = [ca.mmin(at_end), ca.mmin(ca.vertcat(at_end, at_middle)), rate]
+    results = [ca.densify(each) for each in (after, error, *monitors)]
     step = ca.Function("step", [t, h, x, u, p, tolerance, nominal, modes], results)
     if branch.n_instructions() >= WRITTEN_OUT:
         return step
     symbols = [step.sx_in(i) for i in range(step.n_in())]
-    # What depends on parameters alone is then computed once and not at every stage.
+    # Expressions of parameters alone are then computed once, not at every stage.
     return ca.Function("step", symbols, ca.cse([ca.densify(ca.SX(each)) for each in step.call(symbols)]))
 
 
 class _Stepper:
-    """One step at a time through buffers, so that a step costs little more than its arithmetic."""
+    """One step at a time through fixed buffers, without allocation."""
 
     def __init__(
         self, model: FlatModel, drives: Drives, tolerance: float, modes: Array, translate: Translate
@@ -105,12 +105,12 @@ class _Stepper:
         given = (self._time, self._length, self.state, self._inputs, *fixed)
         self._step = Buffered(step, given)
         self.after, self.error, self._end, self._least, self._rate = self._step.results
-        self._drives, self._asked = drives, self._inputs[: len(self._moments)]
+        self._drives, self._stage_inputs = drives, self._inputs[: len(self._moments)]
 
     def step(self, interval: int, time: float, length: float) -> float:
-        """Try a step from ``state`` to ``after`` and return its error; 1 is as large as it may be."""
+        """Try a step from ``state`` to ``after`` and return its error; at most 1 is accepted."""
         self._time[0], self._length[0] = time, length
-        self._drives.at(interval, time + length * self._moments, self._asked)
+        self._drives.at(interval, time + length * self._moments, self._stage_inputs)
         self._step.evaluate()
         return float(self.error[0])
 
@@ -119,7 +119,7 @@ class _Stepper:
         return bool(self._least[0] < 0.0)
 
     def settle(self, modes: Modes, time: float) -> None:
-        """After a step that was taken, change the modes that have ended and keep what is held."""
+        """After an accepted step, change the modes that have ended and project the constrained rates."""
         inputs = self._inputs[STAGES - 1]
         if self._end[0] < 0.0:
             modes.settle(time, self.state, inputs)
@@ -127,7 +127,7 @@ class _Stepper:
             modes.keep(time, self.state, inputs)
 
     def shortened(self, interval: int, length: float, distance: float) -> float:
-        """Take the step anew so that it ends where the first mode ends; return its length."""
+        """Repeat the step so that it ends where the first mode ends; return its length."""
         time = float(self._time[0])
 
         def lasts(length: float) -> float:
@@ -135,12 +135,12 @@ class _Stepper:
             return float(self._end[0])
 
         if self._end[0] >= 0.0:
-            # Something has ended in the middle of the step, and begun again.
+            # A mode has ended in the middle of the step, and begun again.
             if lasts(length / 2) >= 0.0:
                 self.step(interval, time, length)
                 return length
             length /= 2
-        return located(lasts, length, max(LOCATED * distance, 4 * math.ulp(time)))
+        return locate_event(lasts, length, max(LOCATED * distance, 4 * math.ulp(time)))
 
 
 def integrate_explicitly(
@@ -166,7 +166,7 @@ def integrate_explicitly(
     Raises
     ------
     TooStiffError
-        If stability holds the steps short, with what was found so far.
+        If stability limits the steps; it carries the result so far.
     ConvergenceError
         If no step is short enough, or events accumulate.
     """
@@ -178,49 +178,49 @@ def integrate_explicitly(
     if modes:
         modes.begin(times[0], stepper.state, drives.at(0, drives.times[:1])[0])
     states[:, 0] = stepper.state
-    can_be_handed_over = modes is None or not modes.jump
-    wanted, budget, done = times[1] - times[0], 40 * 20.0, 0
+    may_change_method = modes is None or not modes.jump
+    proposed, budget, done = times[1] - times[0], 40 * 20.0, 0
     for k, end in enumerate(times[1:]):
         now = times[k]
         while now < end:
             left = end - now
-            # A sliver of a step at the end would cost as much as a whole one.
-            length = left if left <= 1.001 * wanted else wanted
+            # A very short last step would cost as much as a full one.
+            length = left if left <= 1.001 * proposed else proposed
             error = stepper.step(k, now, length)
-            ended = modes is not None and error < HOPELESS and stepper.ends()
+            ended = modes is not None and error < LARGEST_ERROR and stepper.ends()
             taken = stepper.shortened(k, length, end - times[k]) if ended else length
             error = float(stepper.error[0])
             if error <= 1.0:
                 now = end if taken == left else now + taken
                 stepper.state[:] = stepper.after
                 longer = taken * min(10.0, 0.9 * max(error, 1e-30) ** -0.125)
-                wanted = max(wanted, longer) if taken == left or ended else longer
+                proposed = max(proposed, longer) if taken == left or ended else longer
                 if modes:
                     stepper.settle(modes, now)
             else:
-                wanted = taken * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.2)
-                if wanted < SMALLEST_STEP * max(abs(now), end - times[k]):
+                proposed = taken * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.2)
+                if proposed < SMALLEST_STEP * max(abs(now), end - times[k]):
                     raise _no_step(model, now)
             done += 1
             if done > budget:
-                if can_be_handed_over and _held_by_stability(model, drives, k, stepper.state, wanted):
-                    raise TooStiffError(k, states[:, : k + 1], modes.story.events if modes else [])
+                if may_change_method and _limited_by_stability(model, drives, k, stepper.state, proposed):
+                    raise TooStiffError(k, states[:, : k + 1], modes.log.events if modes else [])
                 budget *= 2.0
         states[:, k + 1] = stepper.state
         budget += 40.0
-    return states, modes.story.events if modes else []
+    return states, modes.log.events if modes else []
 
 
-def _held_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, wanted: float) -> bool:
-    """Tell whether the step wanted is about as long as the fastest pole allows."""
+def _limited_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, length: float) -> bool:
+    """Tell whether a step length is near the stability limit of the fastest pole."""
     s = model.symbols()
     slope = ca.Function(
         "slope", [s.time, s.state, s.input, s.parameter], [ca.jacobian(s.derivative, s.state)]
     )
     moment = drives.times[interval : interval + 1]
     inputs = drives.at(interval, moment)[0]
-    found = np.array(slope(moment, x, inputs, model.start(model.parameters)), dtype=float)
-    return bool(np.all(np.isfinite(found)) and np.max(np.abs(np.linalg.eigvals(found))) * wanted > 1.5)
+    jacobian = np.array(slope(moment, x, inputs, model.start(model.parameters)), dtype=float)
+    return bool(np.all(np.isfinite(jacobian)) and np.max(np.abs(np.linalg.eigvals(jacobian))) * length > 1.5)
 
 
 def _no_step(model: FlatModel, time: float) -> ConvergenceError:

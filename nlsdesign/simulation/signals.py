@@ -15,10 +15,12 @@ class Sine:
 
     Parameters
     ----------
-    amplitude, offset
+    amplitude
         In the unit of the input.
     frequency
         In Hz.
+    offset
+        In the unit of the input.
     phase
         In rad.
     """
@@ -58,10 +60,12 @@ def sine(name: str, amplitude: float, frequency: float, *, offset: float = 0.0) 
     ----------
     name
         Full name of the input.
-    amplitude, offset
+    amplitude
         In the unit of the input.
     frequency
         In Hz.
+    offset
+        In the unit of the input.
 
     Examples
     --------

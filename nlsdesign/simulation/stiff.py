@@ -1,6 +1,6 @@
-"""Implicit integration for stiff models: CVODES, begun anew at every sample.
+"""Implicit integration for stiff models: CVODES, restarted at every sample.
 
-Source: Hindmarsh et al. 2005, SUNDIALS, through CasADi.
+Source: Hindmarsh et al. 2005 (SUNDIALS), through CasADi.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def _pieces(
     values = drives.at(interval, begin + length * _PLACES)
     coefficients = (_TO_COEFFICIENTS @ values).T
     if drives.functions and halvings < MOST_HALVINGS:
-        asked = drives.at(interval, begin + length * _BETWEEN)
-        found = np.vander(_BETWEEN, 6, increasing=True) @ coefficients.T
-        if np.any(np.abs(asked - found) > tolerance * (1.0 + np.max(np.abs(values)))):
+        exact = drives.at(interval, begin + length * _BETWEEN)
+        fitted = np.vander(_BETWEEN, 6, increasing=True) @ coefficients.T
+        if np.any(np.abs(exact - fitted) > tolerance * (1.0 + np.max(np.abs(values)))):
             middle = begin + length / 2
             yield from _pieces(drives, interval, begin, middle, tolerance, halvings + 1)
             yield from _pieces(drives, interval, middle, end, tolerance, halvings + 1)
@@ -50,7 +50,7 @@ def integrate_implicitly(model: FlatModel, drives: Drives, first: int, x0: Array
     model
         Continuous, with at least one state.
     drives
-        Inputs; functions of time are followed piece by piece by polynomials of degree five.
+        Inputs; functions of time are approximated piecewise by polynomials of degree five.
     first
         Number of the sample at which to begin.
     x0
@@ -65,10 +65,10 @@ def integrate_implicitly(model: FlatModel, drives: Drives, first: int, x0: Array
     """
     times, parameters = drives.times.tolist(), model.start(model.parameters)
     nominal = np.array([v.nominal for v in model.states])
-    # CVODES lets errors grow a hundred times over the steps; below the smallest it fails in rounding.
+    # Errors of CVODES grow up to a hundredfold over the steps; below the smallest tolerance it fails.
     each = max(tolerance / 100, SMALLEST_TOLERANCE)
     options = {"reltol": each, "abstol": each, "max_num_steps": 1_000_000}
-    # Called anew for every piece: told of all at once, CasADi carries its step across jumps of the inputs.
+    # Called for each piece: with a grid of times CasADi would step across jumps of the inputs.
     solver = ca.integrator("solver", "cvodes", _problem(model), 0.0, 1.0, options)
     states = [np.asarray(x0, dtype=float)]
     for k in range(first, len(times) - 1):
@@ -89,7 +89,7 @@ def integrate_implicitly(model: FlatModel, drives: Drives, first: int, x0: Array
 
 
 def _problem(model: FlatModel) -> dict[str, ca.SX]:
-    """Return one piece in scaled states and in the share of it that is over, with inputs as polynomials."""
+    """Return one piece in scaled states and relative time, with inputs as polynomials."""
     s = model.symbols()
     coefficients = ca.SX.sym("coefficients", s.input.shape[0], 6)
     begin, length, share = ca.SX.sym("begin"), ca.SX.sym("length"), ca.SX.sym("share")

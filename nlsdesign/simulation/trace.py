@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 
 from ..errors import MeasurementError, unknown_name
 from ..model import Variable
+from ..quantity import with_unit
 from ..writing import write_table
 from .events import Event
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-9
-"""Relative to the nominal size."""
+"""Excess over a range that is rounding, relative to the nominal size."""
 
 
 class RangeWarning(NamedTuple):
-    """A signal that left the range in which the law behind it is stated to hold.
+    """A signal that left the stated range of its law.
 
     Parameters
     ----------
@@ -43,10 +44,11 @@ class RangeWarning(NamedTuple):
     maximum: float
 
     def __str__(self) -> str:
-        unit = "" if self.unit == "1" else f" {self.unit}"
+        limits = with_unit(f"[{self.minimum:g}, {self.maximum:g}]", self.unit)
+        furthest = with_unit(f"{self.furthest:g}", self.unit)
         return (
-            f"{self.name} leaves [{self.minimum:g}, {self.maximum:g}]{unit}, where its law is stated to "
-            f"hold, at t = {self.time:g} s and reaches {self.furthest:g}{unit}"
+            f"{self.name} leaves {limits}, where its law is stated to hold, at t = {self.time:g} s "
+            f"and reaches {furthest}"
         )
 
 
@@ -62,31 +64,31 @@ def range_warnings(
     time
         Shape (n,), in s.
     signals
-        Arrays of shape (n,) by name; a variable that is not among them is passed over.
+        Arrays of shape (n,) by name; variables without an array are skipped.
     prefix
-        What stands before the names of the variables in ``signals``.
+        Prefix of the names of the variables in ``signals``.
     """
-    found = []
+    warnings = []
     for v in variables:
         values = signals.get(prefix + v.name)
         if values is None or not v.bounded:
             continue
         over = np.maximum(v.minimum - values, values - v.maximum)
-        # A strain that should be zero is a rounding error beside it.
+        # Ignore excesses that are rounding errors, for instance of a strain that should be zero.
         outside = np.flatnonzero(over > _ROUNDING * v.nominal)
         if outside.size:
             first, worst = int(outside[0]), int(np.argmax(over))
-            found.append(
+            warnings.append(
                 RangeWarning(
                     prefix + v.name, v.unit, float(time[first]), float(values[worst]), v.minimum, v.maximum
                 )
             )
-    return tuple(found)
+    return tuple(warnings)
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Signals sampled at common times; what simulation gives and measurement brings.
+    """Signals sampled at common times, simulated or measured.
 
     Parameters
     ----------
@@ -99,9 +101,14 @@ class Trace:
     name
         For messages and legends.
     warnings
-        Signals that left the range in which their law is stated to hold.
+        Signals that left the stated range of their law.
     events
-        What happened, in order of time.
+        Changes of mode, in order of time.
+
+    Raises
+    ------
+    MeasurementError
+        If a signal has another number of samples than time.
     """
 
     time: Array
@@ -144,8 +151,8 @@ class Trace:
             f"Trace {self.name}: {len(self.signals)} signals, {len(self)} samples "
             f"from {self.time[0]:g} s to {self.time[-1]:g} s"
         )
-        happened = [f"  {len(self.events)} events, the first at {self.events[0]}"] if self.events else []
-        return "\n".join([head, *happened, *(f"  warning: {each}" for each in self.warnings)])
+        events = [f"  {len(self.events)} events, the first at {self.events[0]}"] if self.events else []
+        return "\n".join([head, *events, *(f"  warning: {each}" for each in self.warnings)])
 
     def with_signals(self, signals: Mapping[str, Array], units: Mapping[str, str]) -> Trace:
         """Return a copy with more (or other) signals.

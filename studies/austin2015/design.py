@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.design import CamDesign, RestLengthRange, write_drawings
-from nlsdesign.model import Assembly
+from nlsdesign.design import CamDesign
 
 FREE = ("spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length")
 
 
-def design_spring(actuator: Assembly, out: Path) -> CamDesign:
+def design_spring(actuator: nls.Assembly, out: Path) -> CamDesign:
     """Design for 5 N·m at 53°, and write deck and drawings."""
     design = nls.design_cam(
         actuator,
@@ -21,9 +20,9 @@ def design_spring(actuator: Assembly, out: Path) -> CamDesign:
             nls.MinimumRadiusOfCurvature(1e-3),
             nls.MaximumCamRadius(20e-3),
             nls.MaximumStrain(1.0),
-            RestLengthRange(8e-3, 20e-3),
+            nls.RestLengthRange(8e-3, 20e-3),
         ],
     )
-    write_drawings(out / "drawing", design.contour, note=f"design {design.fingerprint}")
+    nls.write_drawings(out / "drawing", design.contour, note=f"design {design.fingerprint}")
     nls.write_deck(design.actuator, out / "designed.toml")
     return design

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import nlsdesign as nls
 from nlsdesign.discrepancy import Verdict
-from nlsdesign.model import Assembly
 from nlsdesign.progress import Progress
 
 from .._published import bench_records, with_bench_sensors
 
 
-def diagnose_bench(actuator: Assembly, out: Path, progress: Progress) -> Verdict:
+def diagnose_bench(actuator: nls.Assembly, out: Path, progress: Progress) -> Verdict:
     """Name what the records show and the declared actuator lacks; write verdict and better deck."""
     bench = with_bench_sensors(actuator)
     verdict = nls.diagnose(bench, bench_records(bench), progress=progress.note)

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.components import Driven, DrivenPoint
-from nlsdesign.design import equilibrium_torque
+from nlsdesign.components import TRANSLATION, Driven
 from nlsdesign.identification import Agreement, agreement
-from nlsdesign.model import Assembly, FlatModel
 
 from .._published import Array, element_loop, figure_points
 
@@ -75,12 +73,12 @@ class FigureComparison:
         return agreement(self.static.measured, self.static.hooke)
 
 
-def compare_with_figures(actuator: Assembly) -> FigureComparison:
+def compare_with_figures(actuator: nls.Assembly) -> FigureComparison:
     """Compute the curves of the three figures."""
     driven = actuator.with_part("motor", Driven()).without_part("motor_encoder")
     model = nls.flatten(driven, outputs=["spring.torque"])
     angle, measured = figure_points("fig08_torque_profile_nls").T
-    torque = equilibrium_torque(nls.flatten(actuator), "spring", angle)
+    torque = nls.equilibrium_torque(nls.flatten(actuator), "spring", angle)
     hooke = angle * float(angle @ measured / (angle @ angle))
     return FigureComparison(
         StaticCurve(angle, measured, torque, hooke),
@@ -89,7 +87,7 @@ def compare_with_figures(actuator: Assembly) -> FigureComparison:
     )
 
 
-def hysteresis_loop(model: FlatModel, degrees: int) -> HysteresisLoop:
+def hysteresis_loop(model: nls.FlatModel, degrees: int) -> HysteresisLoop:
     """Simulate the loop of Fig. 1 as the second cycle of a sine of the measured amplitude."""
     shown, torque = figure_points(f"fig01_mean_torque_{degrees}deg").T
     turn, amplitude = 2.0 * np.pi * FIG1_FREQUENCY, float(shown.max())
@@ -102,11 +100,13 @@ def hysteresis_loop(model: FlatModel, degrees: int) -> HysteresisLoop:
     return HysteresisLoop((shown, torque), (angle[cycle][drawn], trace["spring.torque"][cycle][drawn]))
 
 
-def compare_element(actuator: Assembly, degrees: int) -> ElementLoop:
+def compare_element(actuator: nls.Assembly, degrees: int) -> ElementLoop:
     """Simulate one element over the two stretches of Fig. 6; its extension over time is taken as a sine."""
     extension, force = element_loop(degrees)
     rubber = nls.tie(actuator.element("spring.rubber"), "grip")
-    model = nls.flatten(nls.assembly("element", grip=DrivenPoint(), rubber=rubber), outputs=["rubber.force"])
+    model = nls.flatten(
+        nls.assembly("element", grip=Driven(domain=TRANSLATION), rubber=rubber), outputs=["rubber.force"]
+    )
     turn, half = 2.0 * np.pi * FIG6_FREQUENCY, 0.5 * extension.max()
     time = np.linspace(0.0, 2.0 / FIG6_FREQUENCY, 801)
     path, speed = half * (1.0 - np.cos(turn * time)), half * turn * np.sin(turn * time)

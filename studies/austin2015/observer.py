@@ -8,12 +8,8 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.analysis import Chart
-from nlsdesign.components import Inertia
 from nlsdesign.identification import rmse
-from nlsdesign.model import Assembly, FlatModel
-from nlsdesign.model.transform import with_outputs
-from nlsdesign.observer import AsPublished, ObserverDesign, observer_design
-from nlsdesign.simulation import Trace
+from nlsdesign.observer import ObserverDesign
 
 SETTLED = 1.0  # s; from here on errors count
 
@@ -35,28 +31,28 @@ class ObserverComparison:
     """
 
     minimal: ObserverDesign
-    bench: Trace
-    minimal_estimate: Trace
-    published_estimate: Trace
-    free: Trace
+    bench: nls.Trace
+    minimal_estimate: nls.Trace
+    published_estimate: nls.Trace
+    free: nls.Trace
 
-    def error(self, estimate: Trace) -> float:
+    def error(self, estimate: nls.Trace) -> float:
         """Return the rms torque error of an estimate in N·m, once it has settled."""
         return rmse((estimate["spring.torque"] - self.bench["spring.torque"])[self.bench.time > SETTLED])
 
 
-def sweep_angle(model: FlatModel, count: int) -> Chart:
+def sweep_angle(model: nls.FlatModel, count: int) -> Chart:
     """Compute observability and stability from −50° to 50°."""
     views = [nls.Observability(measured=("motor.angle",)), nls.Stability()]
     angles = np.radians(np.linspace(-50.0, 50.0, count))
-    return nls.over_angle(with_outputs(model, ["motor.angle", "spring.torque"]), views, angles=angles)
+    return nls.over_angle(nls.with_outputs(model, ["motor.angle", "spring.torque"]), views, angles=angles)
 
 
-def compare_observers(actuator: Assembly, model: FlatModel, stop: float) -> ObserverComparison:
+def compare_observers(actuator: nls.Assembly, model: nls.FlatModel, stop: float) -> ObserverComparison:
     """Design both observers and run them on the bench; simulate the free drivetrain as well."""
-    minimal, published = observer_design(model), observer_design(model, form=AsPublished())
+    minimal, published = nls.observer_design(model), nls.observer_design(model, form=nls.AsPublished())
     time = np.arange(0.0, stop, minimal.step.sample_time)
-    link = Inertia(inertia=nls.quantity(2e-3, "kg*m^2", source="assumed: a light link"))
+    link = nls.Inertia(inertia=nls.quantity(2e-3, "kg*m^2", source="assumed: a light link"))
     free = nls.flatten(actuator.with_part("load", link), inputs=["motor.current"])
     bench = nls.simulate(model, time, inputs=nls.sine("motor.current", 6.0, 2.0), hold=True)
     readings = {"motor.angle": "motor_encoder.reading"}

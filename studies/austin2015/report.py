@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.model.equations import equations
-from nlsdesign.quantity import sources
 from nlsdesign.report import (
     CamSection,
     Chapter,
@@ -61,7 +59,7 @@ def write_page(results: Results, out: Path) -> None:
 
 def key_numbers(results: Results) -> Section:
     """Return what stands at the top of the page."""
-    numbers, assumed = results.numbers, sources(results.actuator.quantities())["assumed"]
+    numbers, assumed = results.numbers, nls.sources(results.actuator.quantities())["assumed"]
     fig8, design = numbers["fig8_rms_error_Nm"], numbers["design_torque_error_mNm_rms"]
     observer, verdict = (
         numbers["observer_minimal_error_mNm_rms"],
@@ -87,7 +85,7 @@ def actuator_sections(results: Results) -> list[Section]:
         TextSection("Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)),
         numbers_table("Numbers of the deck", actuator.quantities(), folded=True),
         EquationsSection(
-            "Equations", equations(results.model), "The flat model; `f(…)` stands for a long law."
+            "Equations", nls.equations(results.model), "The flat model; `f(…)` stands for a long law."
         ),
     ]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import nlsdesign as nls
 from nlsdesign.analysis import Chart
 from nlsdesign.design import CamDesign
 from nlsdesign.discrepancy import Verdict
-from nlsdesign.model import Assembly, FlatModel
 
 from .figures import FigureComparison
 from .observer import ObserverComparison
@@ -38,8 +38,8 @@ class Results:
         Of the diagnosis of the bench records.
     """
 
-    actuator: Assembly
-    model: FlatModel
+    actuator: nls.Assembly
+    model: nls.FlatModel
     design: CamDesign
     figures: FigureComparison
     chart: Chart

@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import ClosedLoop, torque_controller
-from nlsdesign.export import CSource, Late
-from nlsdesign.model import FlatModel
+from nlsdesign.export import CSource
 from nlsdesign.observer import ObserverDesign
-from nlsdesign.simulation import Trace
 
 from .._published import Array
 
@@ -22,7 +19,7 @@ WIRES = {
     **FROM_ENCODER,
     "observer.motor.current": "controller.motor.current",
     "controller.spring.torque": "observer.spring.torque",
-    "plant.motor.current": Late("controller.motor.current"),  # one sample to compute
+    "plant.motor.current": nls.Late("controller.motor.current"),  # one sample to compute
 }
 
 
@@ -44,8 +41,8 @@ class TorqueLoop:
 
     source: CSource
     fmus: tuple[Path, ...]
-    cosimulated: Trace
-    whole: Trace
+    cosimulated: nls.Trace
+    whole: nls.Trace
 
     @property
     def difference(self) -> Array:
@@ -54,9 +51,11 @@ class TorqueLoop:
         return self.cosimulated["plant.spring.torque"] - torque
 
 
-def export_and_cosimulate(model: FlatModel, observer: ObserverDesign, out: Path, stop: float) -> TorqueLoop:
+def export_and_cosimulate(
+    model: nls.FlatModel, observer: ObserverDesign, out: Path, stop: float
+) -> TorqueLoop:
     """Write C and FMUs, co-simulate the closed loop, and simulate the same loop in one piece."""
-    controller = torque_controller(model)
+    controller = nls.torque_controller(model)
     parts = {"plant": model, "observer": observer.model, "controller": controller}
     source = nls.export_c(observer.model, out / "c", name="observer")
     fmus = {name: nls.export_fmu(each, out / "fmu" / f"{name}.fmu") for name, each in parts.items()}
@@ -64,5 +63,5 @@ def export_and_cosimulate(model: FlatModel, observer: ObserverDesign, out: Path,
     desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
     order = ("observer", "controller", "plant")
     run = nls.cosimulate(fmus=fmus, wires=WIRES, order=order, stop=stop, inputs=desired)
-    loop = ClosedLoop(plant=model, observer=observer.model, controller=controller, wires=FROM_ENCODER)
+    loop = nls.ClosedLoop(plant=model, observer=observer.model, controller=controller, wires=FROM_ENCODER)
     return TorqueLoop(source, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))

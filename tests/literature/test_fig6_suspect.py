@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from models import cam_rubber_actuator
-from nlsdesign.components import Assembly, DrivenPoint, tie
+from nlsdesign.components import TRANSLATION, Assembly, Driven, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import diagnose
@@ -39,7 +39,7 @@ def points(degrees: int) -> np.ndarray:
 def element() -> Assembly:
     """One rubber element of the actuator between a driven grip and the bench."""
     rubber = cam_rubber_actuator(load_deck("austin2015_figure_consistent")).element("spring.rubber")
-    found = assembly("element", grip=DrivenPoint(), rubber=tie(rubber, "grip"))
+    found = assembly("element", grip=Driven(domain=TRANSLATION), rubber=tie(rubber, "grip"))
     measured = ("area", "rest_length", "knots")
     return found.with_values(
         {n: replace(q, spread=0.0) for n, q in found.quantities().items() if n.rpartition(".")[2] in measured}

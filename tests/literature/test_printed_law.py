@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly, Driven, DrivenPoint, Specimen, tie
+from nlsdesign.components import TRANSLATION, Assembly, Driven, Specimen, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
@@ -28,7 +28,10 @@ PRINTED, CONSISTENT = "austin2015_as_printed", "austin2015_figure_consistent"
 def rubber(name: str) -> FlatModel:
     piece = declare(load_deck(name))["spring.rubber"]
     assert isinstance(piece, Specimen)
-    return flatten(assembly("piece", grip=DrivenPoint(), rubber=tie(piece, "grip")), outputs=["rubber.force"])
+    return flatten(
+        assembly("piece", grip=Driven(domain=TRANSLATION), rubber=tie(piece, "grip")),
+        outputs=["rubber.force"],
+    )
 
 
 def static_force(model: FlatModel, extension: float) -> float:

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
-    CableGuide,
+    CapstanFriction,
+    Following,
+    LargestMotion,
     Part,
+    PermanentSet,
+    SelfHeating,
     Spring,
     StressSoftening,
-    TensionSet,
-    ViscousHeating,
-    WorkHeating,
+    ViscousHeat,
+    WorkHeat,
+    WrapProduct,
 )
 
 _INSIDE = (("band", Spring(stiffness=2500.0)),)
 _PARTS: tuple[Part, ...] = (
-    CableGuide(members=_INSIDE, wrap=0.12),
-    TensionSet(members=_INSIDE, share=0.05),
-    WorkHeating(members=_INSIDE, halving_work=40.0, cooling_time=8.0),
-    StressSoftening(members=_INSIDE, softening=0.2),
-    ViscousHeating(members=_INSIDE, halving_speed=0.3, cooling_time=8.0),
+    CapstanFriction(members=_INSIDE, guide=WrapProduct(wrap=0.12), creep_speed=2e-4),
+    PermanentSet(members=_INSIDE, share=0.05, memory=Following()),
+    SelfHeating(members=_INSIDE, heat=WorkHeat(halving_work=40.0, cooling_time=8.0)),
+    StressSoftening(members=_INSIDE, curve=LargestMotion(softening=0.2)),
+    SelfHeating(members=_INSIDE, heat=ViscousHeat(halving_speed=0.3, cooling_time=8.0)),
 )
-EXAMPLES: dict[type[Part], Part] = {type(part): part for part in _PARTS}
+EXAMPLES: tuple[Part, ...] = _PARTS

@@ -12,6 +12,7 @@ from nlsdesign.components import (
     Encoder,
     ForceSensor,
     Gear,
+    Guide,
     LossyGear,
     OneSidedCam,
     Part,
@@ -33,25 +34,24 @@ WINDING = {
     "voltage_limit": 24.0,
 }
 
-EXAMPLES: dict[type[Part], Part] = {
-    type(part): part
-    for part in (
-        Encoder(of="motor.angle", quantum=0.767e-3),
-        SampledEncoder(of="motor.angle", quantum=0.767e-3, sample_rate=1000.0),
-        Tachometer(of="motor.angle", bandwidth=60.0, sample_rate=1000.0),
-        SampleAndHold(of="motor.speed", sample_rate=1000.0),
-        TransportDelay(of="motor.speed", delay=1e-3),
-        ForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2),
-        DelayedForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, delay=2e-3),
-        DriftingForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, drift=0.01),
-        TorqueSensor(of="spring.torque", gain=0.98, bias=0.01, noise=0.005),
-        CurrentSensor(of="motor.current", bias=0.02, noise=0.04),
-        CurrentDrivenMotor(**WINDING),
-        VoltageDrivenMotor(**WINDING, inductance=8.2e-5),
-        OneSidedCam(lever_arm=ROW, last_angle=1.2, onset=0.02),
-        AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035),
-        CapstanFriction(members=(("rubber", Spring(stiffness=2500.0)),), friction=0.15, wrap_angle=1.57),
-        Gear(between=("motor", "wheel"), ratio=4.0),
-        LossyGear(between=("motor", "wheel"), ratio=4.0, efficiency=0.8, back_efficiency=0.7),
-    )
-}
+EXAMPLES: tuple[Part, ...] = (
+    Encoder(of="motor.angle", quantum=0.767e-3),
+    SampledEncoder(of="motor.angle", quantum=0.767e-3, sample_rate=1000.0),
+    Tachometer(of="motor.angle", bandwidth=60.0, sample_rate=1000.0),
+    SampleAndHold(of="motor.speed", sample_rate=1000.0),
+    TransportDelay(of="motor.speed", delay=1e-3),
+    ForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2),
+    DelayedForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, delay=2e-3),
+    DriftingForceSensor(of="spring.rubber.force", gain=1.02, bias=-0.4, noise=0.2, drift=0.01),
+    TorqueSensor(of="spring.torque", gain=0.98, bias=0.01, noise=0.005),
+    CurrentSensor(of="motor.current", bias=0.02, noise=0.04),
+    CurrentDrivenMotor(**WINDING),
+    VoltageDrivenMotor(**WINDING, inductance=8.2e-5),
+    OneSidedCam(lever_arm=ROW, last_angle=1.2, onset=0.02),
+    AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035),
+    CapstanFriction(
+        members=(("rubber", Spring(stiffness=2500.0)),), guide=Guide(friction=0.15, wrap_angle=1.57)
+    ),
+    Gear(between=("motor", "wheel"), ratio=4.0),
+    LossyGear(between=("motor", "wheel"), ratio=4.0, efficiency=0.8, back_efficiency=0.7),
+)

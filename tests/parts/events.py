@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
-    DryFriction,
-    DryLoadFriction,
-    DryStribeckFriction,
+    ROTATION,
+    Backlash,
+    CoulombFriction,
     EndStop,
-    LooseCable,
+    LoadFriction,
     LuGreFriction,
     Part,
-    Play,
     RigidStop,
-    RoundedEndStop,
+    Rounded,
+    Slack,
     Spring,
-    TorsionSpring,
+    StribeckFriction,
 )
 
-_SPRING = (("spring", TorsionSpring(stiffness=3.4)),)
+_SPRING = (("spring", Spring(stiffness=3.4, domain=ROTATION)),)
 
-EXAMPLES: dict[type[Part], Part] = {
-    DryFriction: DryFriction(sliding_torque=0.02),
-    DryStribeckFriction: DryStribeckFriction(sliding_torque=0.02, breakaway=0.01, stribeck_speed=0.5),
-    DryLoadFriction: DryLoadFriction(ratio=0.1, members=_SPRING),
-    LuGreFriction: LuGreFriction(
+EXAMPLES: tuple[Part, ...] = (
+    CoulombFriction(sliding_effort=0.02),
+    StribeckFriction(sliding_effort=0.02, breakaway=0.01, stribeck_speed=0.5),
+    LoadFriction(ratio=0.1, members=_SPRING),
+    LuGreFriction(
         stiffness=120.0, bristle_damping=0.1, damping=1e-3,
-        sliding_torque=0.02, breakaway=0.01, stribeck_speed=0.5,
+        sliding_effort=0.02, breakaway=0.01, stribeck_speed=0.5,
     ),
-    EndStop: EndStop(lower=-1.5, upper=1.5, stiffness=2000.0, damping=0.1),
-    RoundedEndStop: RoundedEndStop(lower=-1.5, upper=1.5, stiffness=2000.0, damping=0.1, width=1e-3),
-    RigidStop: RigidStop(lower=-1.5, upper=1.5, restitution=0.5),
-    Play: Play(gap=0.005, members=_SPRING),
-    LooseCable: LooseCable(length=0.002, members=(("spring", Spring(stiffness=2500.0)),)),
-}  # fmt: skip
+    EndStop(lower=-1.5, upper=1.5, stiffness=2000.0, damping=0.1),
+    EndStop(lower=-1.5, upper=1.5, stiffness=2000.0, damping=0.1, contact=Rounded(width=1e-3)),
+    RigidStop(lower=-1.5, upper=1.5, restitution=0.5),
+    Backlash(gap=0.005, members=_SPRING),
+    Slack(length=0.002, members=(("spring", Spring(stiffness=2500.0)),)),
+)  # fmt: skip

@@ -15,4 +15,4 @@ _PARTS: tuple[Part, ...] = (
         error=(0.0, 4e-4, 9e-4, -2e-4, 1e-4),
     ),
 )
-EXAMPLES: dict[type[Part], Part] = {type(part): part for part in _PARTS}
+EXAMPLES: tuple[Part, ...] = _PARTS

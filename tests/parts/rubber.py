@@ -6,13 +6,16 @@ from nlsdesign.components import (
     ArrheniusShift,
     ExtendedTube,
     FlowingChains,
+    HeatBalance,
     NeoHooke,
     Ogden,
+    OgdenRoxburgh,
     Part,
     PermanentSet,
+    Rising,
     SelfHeating,
-    Softening,
     Springpot,
+    StressSoftening,
     WlfShift,
     Yeoh,
     standard_linear_solid,
@@ -27,11 +30,13 @@ _PARTS: tuple[Part, ...] = (
     FlowingChains(shear_modulus=0.1e6, viscosity=0.4e6),
     GUM,
     Ogden(moduli=(0.618e6, 1.18e3, -9.81e3), exponents=(1.3, 5.0, -2.0)),
-    PermanentSet(members=(("law", SOLID),), share=0.05, width=1e-3),
-    SelfHeating(members=(("law", SOLID),), heat_capacity=1.8e6, cooling=4e4, softening=3e-3),
-    Softening(members=(("law", GUM),), strength=1.8, scale=0.12e6),
+    PermanentSet(members=(("law", SOLID),), share=0.05, memory=Rising(width=1e-3)),
+    SelfHeating(
+        members=(("law", SOLID),), heat=HeatBalance(heat_capacity=1.8e6, cooling=4e4, softening=3e-3)
+    ),
+    StressSoftening(members=(("law", GUM),), curve=OgdenRoxburgh(strength=1.8, scale=0.12e6)),
     Springpot(modulus=1e6, order=0.1, lower=0.01, upper=100.0),
     WlfShift(members=(("law", SOLID),), temperature=293.15, reference=253.15),
     Yeoh(c1=0.2e6, c2=-1.9e3, c3=45.0),
 )
-EXAMPLES: dict[type[Part], Part] = {type(part): part for part in _PARTS}
+EXAMPLES: tuple[Part, ...] = _PARTS

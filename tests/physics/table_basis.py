@@ -33,8 +33,8 @@ ROWS: tuple[Row, ...] = (
         ("linearised network", "compliances add"),
         "test_random_networks.py::test_network_agrees_with_complex_stiffness",
     ),
-    Row(c.TorsionSpring, "Newton", ("flat model", "J·ω̇ by hand"), _RUBBER + "motor_against_newton"),
-    Row(c.TorsionDashpot, "Newton", ("flat model", "J·ω̇ by hand"), _RUBBER + "motor_against_newton"),
+    Row(c.Spring, "Newton", ("flat model", "J·ω̇ by hand"), _RUBBER + "motor_against_newton"),
+    Row(c.Dashpot, "Newton", ("flat model", "J·ω̇ by hand"), _RUBBER + "motor_against_newton"),
     Row(
         c.GearedMotor,
         "Newton",
@@ -61,7 +61,7 @@ ROWS: tuple[Row, ...] = (
         _RUBBER + "strain_stiffening_is_the_sum_of_engaged_springs",
     ),
     Row(
-        c.SmoothStrainStiffening,
+        c.StrainStiffening,
         "limit of small width",
         ("smooth law", "sharp law"),
         _RUBBER + "smooth_law_tends_to_the_sharp_one",
@@ -97,7 +97,7 @@ ROWS: tuple[Row, ...] = (
         "test_cam_equilibrium.py::test_strain_and_stress_are_nominal",
     ),
     Row(
-        c.DrivenPoint,
+        c.Driven,
         "work = stored + lost",
         ("simulated power of the grip", "energies by hand"),
         _POWER + "random_networks_with_hardening_springs_balance",
@@ -127,7 +127,7 @@ ROWS: tuple[Row, ...] = (
         _PLAY + "a_mass_on_a_spring_swings_at_its_frequency",
     ),
     Row(
-        c.FixedPoint,
+        c.Fixed,
         "action = reaction",
         ("signal of the wall", "−k·x"),
         _PLAY + "a_mass_on_a_spring_swings_at_its_frequency",
@@ -145,7 +145,7 @@ ROWS: tuple[Row, ...] = (
         _PLAY + "torque_behind_a_backlash_is_the_slope_of_its_energy",
     ),
     Row(
-        c.InertialBacklash,
+        c.Backlash,
         "momentum",
         ("simulation of an impact", "common speed of two wheels that stay together"),
         _PLAY + "what_meets_the_far_side_of_a_play_takes_it_along",

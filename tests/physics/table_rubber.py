@@ -26,7 +26,7 @@ ROWS: tuple[Row, ...] = (
         "test_networks.py::test_a_step_relaxes_by_a_power_law",
     ),
     Row(
-        c.Softening,
+        c.StressSoftening,
         "work lost in a cycle",
         ("simulated power", "closed form of Ogden and Roxburgh"),
         "test_history.py::test_what_is_lost_in_softening_is_work_minus_what_comes_back",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import ConstantForce, LinearDrive, SlidingFriction
+from nlsdesign.components import ConstantForce, CoulombFriction, LinearDrive
 
 from .table import Row
 
@@ -13,7 +13,7 @@ _FINAL = "test_models_by_hand.py::test_the_drive_ends_at_the_speed_at_which_all_
 ROWS: tuple[Row, ...] = (
     Row(LinearDrive, "m·v̇ = g·V + ΣF",
         ("flattened assembly", "Radau on the equation typed again"), _BY_HAND),
-    Row(SlidingFriction, "power balance", ("work of the voltage", "½mv² + ∫ of b·v² + F_c·v·tanh"), _BALANCE),
+    Row(CoulombFriction, "power balance", ("work of the voltage", "½mv² + ∫ of b·v² + F_c·v·tanh"), _BALANCE),
     Row(ConstantForce, "b·v = g·V − F_c − F₀ at constant v",
         ("simulation for many time constants", "algebra"), _FINAL),
 )  # fmt: skip

@@ -16,7 +16,7 @@ from tests.stretched import pulled, stress_at
 MODULUS, LINKS = 0.27e6, 26.5
 """Arruda and Boyce 1993 for Treloar's rubber."""
 LAW = ArrudaBoyce(shear_modulus=MODULUS, links=LINKS)
-EXAMPLES: dict[type[Part], Part] = {ArrudaBoyce: LAW}
+EXAMPLES: tuple[Part, ...] = (LAW,)
 ROWS = (
     Row(
         ArrudaBoyce,

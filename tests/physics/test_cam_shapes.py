@@ -15,12 +15,13 @@ from scipy.integrate import cumulative_simpson, quad
 from scipy.interpolate import BSpline
 
 from nlsdesign.components import (
+    TRANSLATION,
     AnchoredCam,
     Cam,
     CapstanFriction,
     Driven,
-    DrivenPoint,
     Element,
+    Guide,
     InextensibleCable,
     LinearElastic,
     OneSidedCam,
@@ -219,11 +220,11 @@ def test_work_at_a_cam_is_the_energy_of_the_spring_and_of_the_cable(cam: Cam, ca
 
 
 def pulled(behind: Element) -> FlatModel:
-    return flatten(assembly("c", grip=DrivenPoint(), rope=tie(behind, "grip")))
+    return flatten(assembly("c", grip=Driven(domain=TRANSLATION), rope=tie(behind, "grip")))
 
 
 def guide(friction: float, wrap: float, **inside: Element) -> CapstanFriction:
-    return CapstanFriction(members=tuple(inside.items()), friction=friction, wrap_angle=wrap)
+    return CapstanFriction(members=tuple(inside.items()), guide=Guide(friction=friction, wrap_angle=wrap))
 
 
 def test_the_loop_of_a_capstan_has_the_area_of_eytelwein() -> None:

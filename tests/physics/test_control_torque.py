@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from nlsdesign.components import Driven, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Driven, Spring, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.control import ClosedLoop, TorqueGains, sine_response, torque_controller, zero_torque
@@ -19,7 +19,9 @@ MOVED = {"observer.motor.angle": "plant.spring.angle", "controller.motor.angle":
 
 
 def linear_actuator(stiffness: float, *, moved: bool) -> FlatModel:
-    parts = dict(ob.actuator().parts) | {"spring": tie(TorsionSpring(stiffness=stiffness), "motor", "load")}
+    parts = dict(ob.actuator().parts) | {
+        "spring": tie(Spring(stiffness=stiffness, domain=ROTATION), "motor", "load")
+    }
     if moved:
         parts["load"] = Driven()
     return flatten(assembly("linear", **parts), outputs=["motor.angle", "spring.torque"])

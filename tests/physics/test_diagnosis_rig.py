@@ -20,7 +20,7 @@ from tests.diagnosed import declared_rig, names, verdict_of
 from tests.rig import ACTUATORS, truth
 
 SINGLE = [
-    ("arm", "coulomb_friction", "dry_friction.sliding_torque", "friction"),
+    ("arm", "coulomb_friction", "dry_friction.sliding_effort", "friction"),
     ("wrist", "second_relaxation", "second_relaxing.spring.modulus", "branch_modulus"),
     ("wrist", "cable_compliance", "elastic.stiffness", "cable_stiffness"),
     ("arm", "force_sensor_delay", "force_sensor.delay", "force_delay"),

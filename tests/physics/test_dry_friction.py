@@ -14,16 +14,17 @@ import pytest
 from scipy.integrate import cumulative_simpson, solve_ivp
 
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
+    CoulombFriction,
+    Dashpot,
     Driven,
-    DryFriction,
-    DryLoadFriction,
-    DryStribeckFriction,
     Element,
     Fixed,
     Inertia,
-    TorsionDashpot,
-    TorsionSpring,
+    LoadFriction,
+    Spring,
+    StribeckFriction,
     parallel,
     series,
     tie,
@@ -51,7 +52,7 @@ def wheel(rub: Element, **more: Element) -> Assembly:
 
 def test_a_ramp_of_torque_slips_at_its_moment() -> None:
     """Torque 0.13·t against 0.05 N·m: sticks exactly until T/0.13, then J·ω = 0.13·(t − t₁)²/2."""
-    model = flatten(wheel(DryFriction(sliding_torque=T)))
+    model = flatten(wheel(CoulombFriction(sliding_effort=T)))
     times = np.linspace(0.0, 1.0, 11)
     run = simulate(model, times, inputs={"wheel.torque": lambda t: 0.13 * t})
     start = T / 0.13
@@ -67,7 +68,7 @@ def test_a_ramp_of_torque_slips_at_its_moment() -> None:
 
 def test_what_sticks_does_not_drift() -> None:
     """A thousand seconds under half the torque that would move it."""
-    model = flatten(wheel(DryFriction(sliding_torque=T), spring=TorsionSpring(stiffness=K)))
+    model = flatten(wheel(CoulombFriction(sliding_effort=T), spring=Spring(stiffness=K, domain=ROTATION)))
     times = np.linspace(0.0, 1000.0, 101)
     drive = {"wheel.torque": lambda t: 0.5 * T * math.sin(3.7 * t)}
     run = simulate(model, times, inputs=drive, start={"wheel.angle": 0.4 * T / K}, tolerance=1e-6)
@@ -79,7 +80,7 @@ def test_what_sticks_does_not_drift() -> None:
 @pytest.mark.parametrize("first", [0.33, -0.51])
 def test_a_swing_loses_four_times_the_torque_over_stiffness_per_cycle(first: float) -> None:
     """Half cycles of π/Ω around ±T/K; each reversal is 2·T/K nearer to rest, until it sticks."""
-    model = flatten(wheel(DryFriction(sliding_torque=T), spring=TorsionSpring(stiffness=K)))
+    model = flatten(wheel(CoulombFriction(sliding_effort=T), spring=Spring(stiffness=K, domain=ROTATION)))
     times = np.linspace(0.0, 1.0, 1001)
     run = simulate(model, times, start={"wheel.angle": first}, tolerance=1e-11)
     expected, angle, side, half = np.zeros_like(times), abs(first), math.copysign(1.0, first), 0
@@ -100,7 +101,7 @@ def test_a_swing_loses_four_times_the_torque_over_stiffness_per_cycle(first: flo
 
 
 def test_halving_the_tolerance_moves_events_toward_the_closed_form() -> None:
-    model = flatten(wheel(DryFriction(sliding_torque=T), spring=TorsionSpring(stiffness=K)))
+    model = flatten(wheel(CoulombFriction(sliding_effort=T), spring=Spring(stiffness=K, domain=ROTATION)))
     errors = []
     for tolerance in (1e-4, 1e-7, 1e-10):
         run = simulate(model, np.array([0.0, 1.0]), start={"wheel.angle": 0.33}, tolerance=tolerance)
@@ -152,10 +153,8 @@ def test_stick_slip_on_a_belt() -> None:
         "belt",
         belt=Driven(),
         wheel=Inertia(inertia=J),
-        spring=tie(TorsionSpring(stiffness=K), "wheel"),
-        rub=tie(
-            DryStribeckFriction(sliding_torque=0.03, breakaway=0.04, stribeck_speed=0.5), "wheel", "belt"
-        ),
+        spring=tie(Spring(stiffness=K, domain=ROTATION), "wheel"),
+        rub=tie(StribeckFriction(sliding_effort=0.03, breakaway=0.04, stribeck_speed=0.5), "wheel", "belt"),
     )
     times = np.linspace(0.0, stop, 31)
     drive = {"belt.angle": lambda t: speed * t, "belt.speed": speed}
@@ -174,7 +173,7 @@ def test_two_inertias_stick_to_each_other() -> None:
         "clutch",
         driver=Inertia(inertia=one),
         driven=Inertia(inertia=other),
-        rub=tie(DryFriction(sliding_torque=T), "driver", "driven"),
+        rub=tie(CoulombFriction(sliding_effort=T), "driver", "driven"),
     )
     times = np.linspace(0.0, 0.4, 9)
     run = simulate(flatten(made), times, inputs={"driver.torque": lambda t: ramp * t})
@@ -193,7 +192,7 @@ def test_two_inertias_stick_to_each_other() -> None:
 
 def test_a_loaded_gear_holds_its_load() -> None:
     """T_in ± µ·|T_in|: let go with µ = 0.2, it turns back only when the drive falls below 0.8 of the load."""
-    gear = DryLoadFriction(ratio=0.2, members=(("spring", TorsionSpring(stiffness=K)),))
+    gear = LoadFriction(ratio=0.2, members=(("spring", Spring(stiffness=K, domain=ROTATION)),))
     model = flatten(wheel(gear))
     times = np.linspace(0.0, 2.0, 21)
     start, load = 0.5, K * 0.5
@@ -206,7 +205,12 @@ def test_a_loaded_gear_holds_its_load() -> None:
 
 def test_two_frictions_on_one_shaft_share_the_load() -> None:
     """Their torques add: it slips at the sum, and while it sticks each carries its share."""
-    made = wheel(DryFriction(sliding_torque=T), more=DryFriction(sliding_torque=3 * T))
+    made = assembly(
+        "two_bearings",
+        wheel=Inertia(inertia=J), bench=Fixed(),
+        rub=tie(CoulombFriction(sliding_effort=T), "wheel"),
+        more=tie(CoulombFriction(sliding_effort=3 * T), "wheel", "bench"),
+    )  # fmt: skip
     run = simulate(flatten(made), np.linspace(0.0, 1.0, 11), inputs={"wheel.torque": lambda t: 0.4 * t})
     (event,) = run.events
     assert event.time == pytest.approx(4 * T / 0.4, rel=1e-11)
@@ -220,8 +224,8 @@ def test_a_stack_of_sticking_inertias() -> None:
     made = assembly(
         "stack",
         a=Inertia(inertia=1e-3), b=Inertia(inertia=2e-3), c=Inertia(inertia=4e-3),
-        ab=tie(DryFriction(sliding_torque=0.08), "a", "b"),
-        bc=tie(DryFriction(sliding_torque=0.05), "b", "c"),
+        ab=tie(CoulombFriction(sliding_effort=0.08), "a", "b"),
+        bc=tie(CoulombFriction(sliding_effort=0.05), "b", "c"),
     )  # fmt: skip
     run = simulate(flatten(made), np.linspace(0.0, 0.5, 6), inputs={"a.torque": lambda t: 0.3 * t})
     second = 0.05 * 7 / 4 / 0.3
@@ -237,25 +241,25 @@ def test_a_stack_of_sticking_inertias() -> None:
 @pytest.mark.parametrize(
     ("rub", "level"),
     [
-        (DryFriction(sliding_torque=T), lambda run: np.full(len(run), T)),
+        (CoulombFriction(sliding_effort=T), lambda run: np.full(len(run), T)),
         (
-            DryStribeckFriction(sliding_torque=T, breakaway=0.03, stribeck_speed=0.7),
+            StribeckFriction(sliding_effort=T, breakaway=0.03, stribeck_speed=0.7),
             lambda run: T + 0.03 * np.exp(-((run["wheel.speed"] / 0.7) ** 2)),
         ),
         (
-            DryLoadFriction(ratio=0.1, members=(("in", TorsionSpring(stiffness=K / 2)),)),
+            LoadFriction(ratio=0.1, members=(("in", Spring(stiffness=K / 2, domain=ROTATION)),)),
             lambda run: 0.1 * np.abs(K / 2 * run["wheel.angle"]),
         ),
     ],
 )
 def test_power_balance(rub: Element, level: object) -> None:
     """Work of the drive = energy of spring and wheel + ∫ level·|ω|, written here."""
-    whole = K if not isinstance(rub, DryLoadFriction) else K / 2
-    model = flatten(wheel(rub, spring=TorsionSpring(stiffness=whole)))
+    whole = K if not isinstance(rub, LoadFriction) else K / 2
+    model = flatten(wheel(rub, spring=Spring(stiffness=whole, domain=ROTATION)))
     times = np.linspace(0.0, 1.0, 20_001)
     run = simulate(model, times, inputs={"wheel.torque": lambda t: 0.1 * math.sin(20 * t)}, tolerance=1e-10)
     speed = run["wheel.speed"]
-    stiffness = K if not isinstance(rub, DryLoadFriction) else whole + K / 2
+    stiffness = K if not isinstance(rub, LoadFriction) else whole + K / 2
     work = cumulative_simpson(0.1 * np.sin(20 * times) * speed, x=times, initial=0.0)
     stored = J / 2 * speed**2 + stiffness / 2 * run["wheel.angle"] ** 2
     lost = cumulative_simpson(level(run) * np.abs(speed), x=times, initial=0.0)  # type: ignore[operator]
@@ -268,7 +272,7 @@ def test_power_balance(rub: Element, level: object) -> None:
 
 
 def test_sticking_in_series_is_refused_by_name() -> None:
-    inside = series(k=TorsionSpring(stiffness=K), rub=DryFriction(sliding_torque=T))
+    inside = series(k=Spring(stiffness=K, domain=ROTATION), rub=CoulombFriction(sliding_effort=T))
     with pytest.raises(ArrangementError, match=r"net\.rub.*its rate is itself an unknown.*smoothed"):
         flatten(assembly("net", wheel=Inertia(inertia=J), net=tie(inside, "wheel")))
 
@@ -276,23 +280,43 @@ def test_sticking_in_series_is_refused_by_name() -> None:
 def test_friction_without_inertia_is_refused_by_name() -> None:
     with pytest.raises(ArrangementError, match=r"rub.*nothing with inertia"):
         flatten(
-            assembly("net", crank=Driven(), bench=Fixed(), rub=tie(DryFriction(sliding_torque=T), "crank"))
+            assembly(
+                "net", crank=Driven(), bench=Fixed(), rub=tie(CoulombFriction(sliding_effort=T), "crank")
+            )
         )
 
 
 def test_the_same_motion_held_twice_is_refused_by_name() -> None:
+    """Two frictions in a row and a third around both: what each carries is not defined while all stick."""
     made = assembly(
         "net",
-        a=Inertia(inertia=J), b=Inertia(inertia=J),
-        one=tie(DryFriction(sliding_torque=T), "a", "b"), two=tie(DryFriction(sliding_torque=T), "b", "a"),
+        a=Inertia(inertia=J), b=Inertia(inertia=J), c=Inertia(inertia=J),
+        one=tie(CoulombFriction(sliding_effort=T), "a", "b"),
+        two=tie(CoulombFriction(sliding_effort=T), "b", "c"),
+        three=tie(CoulombFriction(sliding_effort=T), "a", "c"),
     )  # fmt: skip
-    with pytest.raises(ArrangementError, match=r"'one' and 'two'.*hold the same motion"):
+    with pytest.raises(ArrangementError, match=r"'one' and 'two' and 'three'.*hold the same motion"):
         flatten(made)
 
 
+def test_two_dry_frictions_between_the_same_bodies_are_refused_when_they_are_put_together() -> None:
+    bodies = {"a": Inertia(inertia=J), "b": Inertia(inertia=J)}
+    rub, oil = CoulombFriction(sliding_effort=T), Dashpot(damping=1e-3, domain=ROTATION)
+    for second in (rub, rub.smooth(), parallel(oil=oil, rub=rub)):
+        with pytest.raises(
+            ArrangementError, match=r"'one' and 'two'.*both bring dry friction to 'b' and 'a'"
+        ):
+            assembly("net", **bodies, one=tie(rub, "a", "b"), two=tie(second, "b", "a"))
+    # What is no twin: viscous friction twice, and dry friction against another body.
+    assembly("net", **bodies, one=tie(oil, "a", "b"), two=tie(oil, "a", "b"), three=tie(rub, "a", "b"))
+    assembly("net", **bodies, one=tie(rub, "a", "b"), two=tie(rub, "a"))
+
+
 def test_load_that_contains_friction_is_refused_by_name() -> None:
-    inside = parallel(k=TorsionSpring(stiffness=K), rub=DryFriction(sliding_torque=T))
-    made = wheel(DryLoadFriction(ratio=0.1, members=(("in", inside),)), damper=TorsionDashpot(damping=1e-3))
+    inside = parallel(k=Spring(stiffness=K, domain=ROTATION), rub=CoulombFriction(sliding_effort=T))
+    made = wheel(
+        LoadFriction(ratio=0.1, members=(("in", inside),)), damper=Dashpot(damping=1e-3, domain=ROTATION)
+    )
     with pytest.raises(ArrangementError, match="a load contains another dry friction"):
         flatten(made)
 
@@ -303,7 +327,7 @@ def test_a_prescribed_speed_needs_its_acceleration() -> None:
         "belt",
         belt=Driven(),
         wheel=Inertia(inertia=J),
-        rub=tie(DryFriction(sliding_torque=T), "wheel", "belt"),
+        rub=tie(CoulombFriction(sliding_effort=T), "wheel", "belt"),
     )
     model, times = flatten(made), np.linspace(0.0, 1.0, 101)
     drive = {"belt.speed": lambda t: 2.0 * t, "belt.angle": lambda t: t * t}

@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
-    DrivenPoint,
+    Driven,
     Element,
     FlowingChains,
     LinearElastic,
@@ -27,7 +28,7 @@ MODULUS, VISCOSITY, LENGTH, AREA = 0.1e6, 0.3e6, 0.08, 1e-5
 def pulled(law: Element) -> Assembly:
     return assembly(
         "pulled",
-        grip=DrivenPoint(),
+        grip=Driven(domain=TRANSLATION),
         strip=tie(specimen(area=AREA, rest_length=LENGTH, law=law), "grip"),
     )
 

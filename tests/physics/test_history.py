@@ -19,14 +19,17 @@ from scipy.optimize import brentq
 
 from nlsdesign.components import (
     Element,
+    HeatBalance,
     LinearElastic,
     NeoHooke,
+    OgdenRoxburgh,
     PermanentSet,
+    Rising,
     SelfHeating,
     SlidingFillers,
-    Softening,
     Spring,
     Springpot,
+    StressSoftening,
     ViscousMaterial,
     maxwell,
     parallel,
@@ -38,8 +41,10 @@ from tests.stretched import AREA, LENGTH, VOLUME, pulled, run
 MU, R, M, WIDTH = 0.6e6, 1.8, 0.12e6, 1e-3
 
 
-def soft(width: float = WIDTH) -> Softening:
-    return Softening(members=(("law", NeoHooke(shear_modulus=MU)),), strength=R, scale=M, width=width)
+def soft(width: float = WIDTH) -> StressSoftening:
+    return StressSoftening(
+        members=(("law", NeoHooke(shear_modulus=MU)),), curve=OgdenRoxburgh(strength=R, scale=M, width=width)
+    )
 
 
 def energy(strain: np.ndarray) -> np.ndarray:
@@ -94,7 +99,9 @@ def test_softening_is_the_function_of_ogden_and_roxburgh() -> None:
 
 def test_the_softening_at_rest_tends_to_its_published_limit() -> None:
     """Ogden and Roxburgh 1999: the least η is 1 − erf(W_m/m)/r, so 1 − 1/r after a pull far beyond m."""
-    small = Softening(members=(("law", NeoHooke(shear_modulus=MU)),), strength=R, scale=M / 40)
+    small = StressSoftening(
+        members=(("law", NeoHooke(shear_modulus=MU)),), curve=OgdenRoxburgh(strength=R, scale=M / 40)
+    )
     assert cycled(small, [0.9])["rubber.law.softening"][-1] == pytest.approx(1 - 1 / R, abs=1e-6)
 
 
@@ -147,9 +154,13 @@ def test_no_path_wins_energy_from_softening(peaks: list[float]) -> None:
 
 def test_softening_asks_for_laws_that_say_their_energy() -> None:
     with pytest.raises(ArrangementError, match=r"Softening member 'spring'.*LinearElastic"):
-        Softening(members=(("spring", LinearElastic(modulus=1e6)),), strength=2.0, scale=1e5)
+        StressSoftening(
+            members=(("spring", LinearElastic(modulus=1e6)),), curve=OgdenRoxburgh(strength=2.0, scale=1e5)
+        )
     with pytest.raises(ValueRangeError, match="strength"):
-        Softening(members=(("law", NeoHooke(shear_modulus=1e6)),), strength=0.8, scale=1e5)
+        StressSoftening(
+            members=(("law", NeoHooke(shear_modulus=1e6)),), curve=OgdenRoxburgh(strength=0.8, scale=1e5)
+        )
 
 
 # --- permanent set --------------------------------------------------------------------------------
@@ -157,7 +168,9 @@ def test_softening_asks_for_laws_that_say_their_energy() -> None:
 
 def test_after_a_pull_the_rest_length_has_grown_by_its_share() -> None:
     share, modulus = 0.1, 1e6
-    law = PermanentSet(members=(("law", LinearElastic(modulus=modulus)),), share=share)
+    law = PermanentSet(
+        members=(("law", LinearElastic(modulus=modulus)),), share=share, memory=Rising(width=1e-4)
+    )
     trace = cycled(law, [0.5, 0.3])
     strain, force = trace["rubber.strain"], trace["rubber.force"] / AREA
     greatest = np.maximum.accumulate(strain)
@@ -171,7 +184,12 @@ def test_after_a_pull_the_rest_length_has_grown_by_its_share() -> None:
 def test_work_on_a_set_is_stored_or_lost_while_it_grows() -> None:
     """First loading of Hooke: W = ½E(1 − c)²ε² + E·(1 − c)·c·ε²/2; afterwards nothing is lost."""
     share, modulus = 0.2, 1e6
-    trace = cycled(PermanentSet(members=(("law", LinearElastic(modulus=modulus)),), share=share), [0.5, 0.5])
+    trace = cycled(
+        PermanentSet(
+            members=(("law", LinearElastic(modulus=modulus)),), share=share, memory=Rising(width=1e-4)
+        ),
+        [0.5, 0.5],
+    )
     work = work_of(trace) / VOLUME
     stored = modulus / 2 * ((1 - share) * 0.5) ** 2
     lost = modulus * (1 - share) * share * 0.5**2 / 2
@@ -185,7 +203,9 @@ def test_work_on_a_set_is_stored_or_lost_while_it_grows() -> None:
 
 def test_laws_inside_a_set_see_the_rate_of_what_is_left() -> None:
     """A dashpot: η·(1 − c)·ε̇ while the set grows, η·ε̇ on the way back."""
-    law = PermanentSet(members=(("oil", ViscousMaterial(viscosity=2e4)),), share=0.3)
+    law = PermanentSet(
+        members=(("oil", ViscousMaterial(viscosity=2e4)),), share=0.3, memory=Rising(width=1e-4)
+    )
     trace = cycled(law, [0.5])
     stress, rate = trace["rubber.force"] / AREA, trace["grip.speed"] / LENGTH
     growing = (trace.time > 0.15) & (trace.time < 0.45)
@@ -198,7 +218,7 @@ def test_laws_inside_a_set_see_the_rate_of_what_is_left() -> None:
 @given(st.lists(st.floats(0.05, 1.0), min_size=2, max_size=4), st.floats(0.0, 0.5))
 def test_no_path_wins_energy_from_a_set_around_fading_memory(peaks: list[float], share: float) -> None:
     inside = parallel(still=LinearElastic(modulus=1e6), branch=maxwell(modulus=0.8e6, viscosity=5e4))
-    law = PermanentSet(members=(("law", inside),), share=share)
+    law = PermanentSet(members=(("law", inside),), share=share, memory=Rising(width=1e-4))
     work = work_of(cycled(law, peaks, per_second=1500, tolerance=1e-8))
     assert np.min(work) > -1e-5 * np.max(work)
 
@@ -212,8 +232,10 @@ STILL, BRANCH, ETA = 1e6, 0.8e6, 2e4
 def hot(softening: float, cooling: float = COOLING, capacity: float = CAPACITY) -> SelfHeating:
     inside = parallel(still=LinearElastic(modulus=STILL), branch=maxwell(modulus=BRANCH, viscosity=ETA))
     return SelfHeating(
-        members=(("law", inside),), heat_capacity=capacity, cooling=cooling, softening=softening,
-        ambient=AMBIENT,
+        members=(("law", inside),),
+        heat=HeatBalance(
+            heat_capacity=capacity, cooling=cooling, softening=softening, ambient=AMBIENT
+        ),
     )  # fmt: skip
 
 
@@ -255,7 +277,10 @@ def test_the_steady_rise_is_the_loss_of_a_cycle_over_the_cooling() -> None:
 def test_the_heat_of_a_springpot_is_that_of_its_loss_modulus() -> None:
     """Mean power ω/2·E''·ε² with E'' = |E*|·sin(α·π/2) of the exact law, to the error of the series."""
     pot = Springpot(modulus=1e6, reference=4.0, order=0.15, lower=0.1, upper=100.0)
-    law = SelfHeating(members=(("pot", pot),), heat_capacity=1e6, cooling=0.0, softening=0.0, ambient=AMBIENT)
+    law = SelfHeating(
+        members=(("pot", pot),),
+        heat=HeatBalance(heat_capacity=1e6, cooling=0.0, softening=0.0, ambient=AMBIENT),
+    )
     trace = shaken(law, 3.0)
     power = float(np.mean(trace["rubber.law.lost_power"][-1001:-1]))
     loss_modulus = 1e6 * math.sin(0.15 * math.pi / 2)
@@ -278,13 +303,16 @@ def test_heat_comes_from_fillers_dashpots_and_softening_alike() -> None:
     inside: dict[str, Element] = {
         "fillers": SlidingFillers(modulus=1e6, yield_stress=5e4),
         "mullins": soft(0.1),
-        "set": PermanentSet(members=(("law", NeoHooke(shear_modulus=3e5)),), share=0.1),
+        "set": PermanentSet(
+            members=(("law", NeoHooke(shear_modulus=3e5)),), share=0.1, memory=Rising(width=1e-4)
+        ),
         "branch": maxwell(modulus=BRANCH, viscosity=ETA),
         "dashpot": ViscousMaterial(viscosity=2e3),
     }
     for name, law in inside.items():
         wrapped = SelfHeating(
-            members=((name, law),), heat_capacity=1e5, cooling=0.0, softening=0.0, ambient=AMBIENT
+            members=((name, law),),
+            heat=HeatBalance(heat_capacity=1e5, cooling=0.0, softening=0.0, ambient=AMBIENT),
         )
         trace = cycled(wrapped, [0.5])
         work = work_of(trace)[-1] / VOLUME
@@ -309,4 +337,4 @@ def stored_at_the_end(name: str, trace: Trace) -> float:
 
 def test_laws_of_history_belong_inside_a_specimen() -> None:
     with pytest.raises(ArrangementError, match="PermanentSet: acts on strain and stress"):
-        PermanentSet(members=(("spring", Spring(stiffness=100.0)),), share=0.1)
+        PermanentSet(members=(("spring", Spring(stiffness=100.0)),), share=0.1, memory=Rising(width=1e-4))

@@ -20,7 +20,7 @@ from nlsdesign.simulation import simulate
 
 J = 1e-3
 NUMBERS = {
-    "stiffness": 100.0, "bristle_damping": 0.1, "damping": 2e-3, "sliding_torque": 0.05, "breakaway": 0.03,
+    "stiffness": 100.0, "bristle_damping": 0.1, "damping": 2e-3, "sliding_effort": 0.05, "breakaway": 0.03,
     "stribeck_speed": 0.2, "elastic_share": 0.7,
 }  # fmt: skip
 RUB = LuGreFriction(**NUMBERS)  # type: ignore[arg-type]

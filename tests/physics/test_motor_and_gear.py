@@ -16,15 +16,16 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.optimize import brentq
 
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
+    CoulombFriction,
     CurrentDrivenMotor,
-    DryFriction,
+    Dashpot,
     Gear,
     GearedMotor,
     Inertia,
     LossyGear,
-    TorsionDashpot,
-    TorsionSpring,
+    Spring,
     VoltageDrivenMotor,
     parallel,
     tie,
@@ -115,7 +116,9 @@ def test_the_current_never_passes_the_limit_while_the_supply_can_hold_it() -> No
 def test_electrical_power_is_mechanical_power_heat_and_field() -> None:
     """∫U·I = ∫k·I·ω + ∫R·I² + ½L·I² at every moment, driven into both limits."""
     times = np.linspace(0.0, 0.3, 60_001)
-    made = assembly("m", motor=by_voltage(inertia=4e-5), spring=tie(TorsionSpring(stiffness=0.02), "motor"))
+    made = assembly(
+        "m", motor=by_voltage(inertia=4e-5), spring=tie(Spring(stiffness=0.02, domain=ROTATION), "motor")
+    )
     wave = {"motor.wanted_voltage": lambda t: 40.0 * math.sin(60.0 * t)}
     run = simulate(flatten(made), times, inputs=wave)
     current, speed = run["motor.current"], run["motor.speed"]
@@ -147,7 +150,9 @@ def test_a_slow_current_driven_motor_is_the_limit_of_no_inductance() -> None:
 def test_rigidly_geared_inertias_are_one_state_pair_and_the_reflected_motor() -> None:
     """The same as a geared motor with J = n²·J_r + J_w, which is written as one body."""
     ratio, wheel = 6.0, 3e-3
-    shaft = tie(parallel(k=TorsionSpring(stiffness=2.0), c=TorsionDashpot(damping=0.01)), "wheel")
+    shaft = tie(
+        parallel(k=Spring(stiffness=2.0, domain=ROTATION), c=Dashpot(damping=0.01, domain=ROTATION)), "wheel"
+    )
     motor = by_current(voltage_limit=1e4)
     made = assembly("a", motor=motor, wheel=Inertia(inertia=wheel), shaft=shaft,
                     gear=Gear(between=("motor", "wheel"), ratio=ratio))  # fmt: skip
@@ -168,7 +173,7 @@ def test_rigidly_geared_inertias_are_one_state_pair_and_the_reflected_motor() ->
 
 
 def test_a_rigid_gear_is_the_limit_of_a_stiff_shaft() -> None:
-    shaft = parallel(k=TorsionSpring(stiffness=1e5), c=TorsionDashpot(damping=0.5))
+    shaft = parallel(k=Spring(stiffness=1e5, domain=ROTATION), c=Dashpot(damping=0.5, domain=ROTATION))
     bodies = {"one": Inertia(inertia=2e-3), "two": Inertia(inertia=5e-3)}
     soft = assembly("s", **bodies, shaft=tie(shaft, "one", "two"))
     stiff = assembly("r", **bodies, hub=Gear(between=("one", "two"), ratio=1.0))
@@ -184,10 +189,13 @@ def test_a_rigid_gear_is_the_limit_of_a_stiff_shaft() -> None:
 @pytest.mark.parametrize(("at", "level"), [("wheel", 0.1), ("motor", 0.1 / 8.0)])
 def test_dry_friction_anywhere_in_a_train_sticks_as_on_the_reflected_body(at: str, level: float) -> None:
     """On the motor's shaft a gear makes an n-th of the friction torque as strong."""
-    ratio, wheel, spring = 8.0, 2e-3, tie(TorsionSpring(stiffness=0.3), "wheel")
-    friction, gear = tie(DryFriction(sliding_torque=level), at), Gear(between=("motor", "wheel"), ratio=ratio)
+    ratio, wheel, spring = 8.0, 2e-3, tie(Spring(stiffness=0.3, domain=ROTATION), "wheel")
+    friction, gear = (
+        tie(CoulombFriction(sliding_effort=level), at),
+        Gear(between=("motor", "wheel"), ratio=ratio),
+    )
     made = assembly("a", motor=by_current(), wheel=Inertia(inertia=wheel), gear=gear, s=spring, f=friction)
-    dry = tie(DryFriction(sliding_torque=0.1), "wheel")
+    dry = tie(CoulombFriction(sliding_effort=0.1), "wheel")
     one = assembly("b", wheel=Inertia(inertia=wheel + ratio**2 * ROTOR), s=spring, f=dry)
     times = np.linspace(0.0, 1.5, 1501)
     run = simulate(flatten(made), times, inputs={"motor.current": lambda t: 0.8 * math.sin(8.0 * t)})
@@ -266,7 +274,7 @@ def test_a_lossy_gear_between_two_inertias_against_trying_both_directions() -> N
 def test_a_swing_through_a_lossy_gear_against_another_integrator_and_its_power_balance() -> None:
     sizes, stiffness = (ROTOR, 2e-3, 8.0), 3.0
     made = assembly("a", motor=by_current(voltage_limit=1e4), wheel=Inertia(inertia=2e-3), gear=lossy(),
-                    spring=tie(TorsionSpring(stiffness=stiffness), "wheel"))  # fmt: skip
+                    spring=tie(Spring(stiffness=stiffness, domain=ROTATION), "wheel"))  # fmt: skip
 
     def current(t: float) -> float:
         return 4.0 * math.sin(17.0 * t)
@@ -299,7 +307,7 @@ def long_train(order: tuple[str, ...]) -> Assembly:
         "first": LossyGear(between=("motor", "counter"), ratio=4.0, efficiency=0.8, back_efficiency=0.7),
         "second": LossyGear(between=("counter", "wheel"), ratio=-5.0, efficiency=0.9, back_efficiency=0.85),
         "belt": Gear(between=("fan", "motor"), ratio=2.0),
-        "spring": tie(TorsionSpring(stiffness=20.0), "wheel"),
+        "spring": tie(Spring(stiffness=20.0, domain=ROTATION), "wheel"),
     }
     return assembly("train", **{name: parts[name] for name in order})
 

@@ -249,7 +249,7 @@ def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: 
 
     The printed actuator without dry friction: its lever arm jumps at zero angle.
     """
-    actuator = declare(load_deck("austin2015_as_printed")).with_values({"dry_friction.sliding_torque": 0.0})
+    actuator = declare(load_deck("austin2015_as_printed")).with_values({"dry_friction.sliding_effort": 0.0})
     model = flatten(actuator, outputs=["motor.angle", "spring.torque"])
     grid = FixedGrid(-1.1, 1.1, points=points)
     check = check_stability(

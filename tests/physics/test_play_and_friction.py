@@ -14,26 +14,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     Backlash,
     Driven,
-    DrivenPoint,
     Element,
     Fixed,
-    FixedPoint,
     Inertia,
-    InertialBacklash,
+    Inertial,
     InextensibleCable,
     LinearElastic,
     LoadFriction,
     Mass,
     QuadraticDrag,
+    Rounded,
     Slack,
     SlidingFillers,
+    Smooth,
     Spring,
     StretchyCable,
     StribeckFriction,
     TorqueRipple,
-    TorsionSpring,
     Turned,
     ViscousMaterial,
     parallel,
@@ -45,7 +46,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import simulate
 
-SPRING = TorsionSpring(stiffness=3.4)
+SPRING = Spring(stiffness=3.4, domain=ROTATION)
 
 
 def on_shaft(element: Element) -> FlatModel:
@@ -63,13 +64,15 @@ def torque(element: Element, angle: float, speed: float = 0.0) -> float:
 def test_backlash_is_a_dead_zone_within_its_rounding(angle: float) -> None:
     gap, width = 0.05, 1e-4
     sharp = 3.4 * (max(angle - gap / 2, 0.0) - max(-angle - gap / 2, 0.0))
-    found = torque(Backlash(members=(("s", SPRING),), gap=gap, width=width), angle)
+    found = torque(Backlash(members=(("s", SPRING),), gap=gap, contact=Rounded(width=width)), angle)
     assert abs(found - sharp) <= 3.4 * width * (2 * math.log(2.0) + 1.0)
 
 
 def test_what_meets_the_far_side_of_a_play_takes_it_along() -> None:
     """Nothing touches for g/2 over the speed; then both turn with J₁·ω/(J₁ + J₂): a plastic impact."""
-    play = InertialBacklash(members=(("s", TorsionSpring(stiffness=1e-9)),), gap=0.1, inertia=2e-3)
+    play = Backlash(
+        members=(("s", Spring(stiffness=1e-9, domain=ROTATION)),), gap=0.1, contact=Inertial(inertia=2e-3)
+    )
     model = flatten(assembly("a", wheel=Inertia(inertia=6e-3), play=tie(play, "wheel")))
     run = simulate(model, np.linspace(0.0, 0.2, 401), start={"wheel.speed": 2.0})
     early = run.time < 0.05 / 2.0 - 5e-3
@@ -80,7 +83,7 @@ def test_what_meets_the_far_side_of_a_play_takes_it_along() -> None:
 
 
 def test_a_load_lags_by_half_the_gap_behind_a_play() -> None:
-    play = InertialBacklash(members=(("s", SPRING),), gap=0.05, inertia=1e-3, contact_time=1e-4)
+    play = Backlash(members=(("s", SPRING),), gap=0.05, contact=Inertial(inertia=1e-3, contact_time=1e-4))
     model = flatten(assembly("a", shaft=Driven(), e=tie(play, "shaft")), outputs=["e.torque"])
     # At rest the contact is a spring of stiffness J/τ², a hundred thousand N·m/rad, in series.
     lag = 0.025 + 3.4 * (0.3 - 0.025) / (3.4 + 1e5)
@@ -90,7 +93,7 @@ def test_a_load_lags_by_half_the_gap_behind_a_play() -> None:
 
 def test_torque_behind_a_backlash_is_the_slope_of_its_energy() -> None:
     """½k·φ(θ)² is stored; its numerical derivative over θ must be the torque: virtual work."""
-    play = Backlash(members=(("s", SPRING),), gap=0.05, width=2e-3)
+    play = Backlash(members=(("s", SPRING),), gap=0.05, contact=Rounded(width=2e-3))
     model, step = on_shaft(play), 1e-5
     for angle in np.linspace(-0.06, 0.06, 41):
         inner = [
@@ -105,7 +108,12 @@ def test_torque_behind_a_backlash_is_the_slope_of_its_energy() -> None:
 @given(st.floats(-0.01, 0.02))
 def test_slack_shifts_the_law_of_what_is_behind(extension: float) -> None:
     made = assembly(
-        "a", grip=DrivenPoint(), s=tie(Slack(members=(("k", Spring(stiffness=2500.0)),), length=2e-3), "grip")
+        "a",
+        grip=Driven(domain=TRANSLATION),
+        s=tie(
+            Slack(members=(("k", Spring(stiffness=2500.0)),), length=2e-3, contact=Rounded(width=1e-5)),
+            "grip",
+        ),
     )
     found = flatten(made, outputs=["s.force"]).evaluate([], [extension, 0.0])["s.force"]
     assert abs(found - 2500.0 * max(extension - 2e-3, 0.0)) <= 2500.0 * 1e-5 * (2 * math.log(2.0) + 1.0)
@@ -125,7 +133,7 @@ def test_a_stretchy_cable_is_a_spring_in_series(extension: float, stiffness: flo
     """1/(1/C + 1/k) for linear laws, and the rigid limit as C grows."""
     made = assembly(
         "a",
-        grip=DrivenPoint(),
+        grip=Driven(domain=TRANSLATION),
         s=tie(StretchyCable(stiffness=stiffness, members=(("k", Spring(stiffness=2500.0)),)), "grip"),
     )
     found = flatten(made, outputs=["s.force"]).evaluate([], [extension, 0.0])["s.force"]
@@ -145,7 +153,9 @@ def test_a_slack_cable_meets_the_rubber_where_it_has_recovered_to() -> None:
         still=LinearElastic(modulus=still),
         relaxing=series(spring=LinearElastic(modulus=branch), dashpot=ViscousMaterial(viscosity=viscosity)),
     )  # fmt: skip
-    made = assembly("a", grip=DrivenPoint(), s=tie(InextensibleCable(members=(("r", rubber),)), "grip"))
+    made = assembly(
+        "a", grip=Driven(domain=TRANSLATION), s=tie(InextensibleCable(members=(("r", rubber),)), "grip")
+    )
     model = flatten(made, outputs=["s.force"])
     held = 0.3
     times = np.linspace(0.0, 0.2, 401)
@@ -168,7 +178,9 @@ def test_a_slack_cable_meets_the_rubber_where_it_has_recovered_to() -> None:
 
 @given(st.floats(-20.0, 20.0))
 def test_stribeck_lies_between_breakaway_and_sliding(speed: float) -> None:
-    rub = StribeckFriction(sliding_torque=0.4, creep_speed=1e-3, breakaway=0.2, stribeck_speed=0.5)
+    rub = StribeckFriction(
+        sliding_effort=0.4, contact=Smooth(creep_speed=1e-3), breakaway=0.2, stribeck_speed=0.5
+    )
     found = torque(rub, 0.0, speed)
     assert found * speed >= 0.0
     if abs(speed) > 0.02:
@@ -193,7 +205,9 @@ def test_ripple_does_no_work_over_a_turn() -> None:
 
 @given(st.floats(-0.5, 0.5), st.sampled_from([-2.0, 2.0]))
 def test_load_friction_takes_its_share_of_the_load_and_only_takes(angle: float, speed: float) -> None:
-    found = torque(LoadFriction(members=(("s", SPRING),), ratio=0.05), angle, speed)
+    found = torque(
+        LoadFriction(members=(("s", SPRING),), ratio=0.05, contact=Smooth(creep_speed=0.02)), angle, speed
+    )
     assert found == pytest.approx(3.4 * angle + 0.05 * abs(3.4 * angle) * math.copysign(1, speed), rel=1e-9)
     assert (found - 3.4 * angle) * speed >= 0.0
 
@@ -202,7 +216,9 @@ def test_sliding_fillers_do_not_know_the_rate_and_only_lose() -> None:
     """The same path at 1 and at 100 times the speed gives one loop; its area is positive; it saturates."""
     law = SlidingFillers(modulus=0.5e6, yield_stress=4e4)
     rubber = specimen(area=1e-4, rest_length=0.0125, fillers=law)
-    model = flatten(assembly("a", grip=DrivenPoint(), r=tie(rubber, "grip")), outputs=["r.force"])
+    model = flatten(
+        assembly("a", grip=Driven(domain=TRANSLATION), r=tie(rubber, "grip")), outputs=["r.force"]
+    )
     loops = []
     for period in (10.0, 0.1):
         times = np.linspace(0.0, 2 * period, 4001)
@@ -226,7 +242,10 @@ def test_sliding_fillers_do_not_know_the_rate_and_only_lose() -> None:
 
 def test_a_mass_on_a_spring_swings_at_its_frequency() -> None:
     made = assembly(
-        "a", block=Mass(mass=0.4), wall=FixedPoint(), s=tie(Spring(stiffness=90.0), "block", "wall")
+        "a",
+        block=Mass(mass=0.4),
+        wall=Fixed(domain=TRANSLATION),
+        s=tie(Spring(stiffness=90.0), "block", "wall"),
     )
     times = np.linspace(0.0, 2.0, 201)
     run = simulate(flatten(made), times, start={"block.position": 0.01}, tolerance=1e-11)
@@ -238,7 +257,7 @@ def test_two_wheels_on_a_spring_keep_their_momentum_and_swing_at_the_reduced_ine
     made = assembly(
         "a",
         one=Inertia(inertia=2e-3), other=Inertia(inertia=6e-3), bench=Fixed(),
-        s=tie(parallel(k=TorsionSpring(stiffness=3.0)), "one", "other"),
+        s=tie(parallel(k=Spring(stiffness=3.0, domain=ROTATION)), "one", "other"),
     )  # fmt: skip
     times = np.linspace(0.0, 1.0, 401)
     run = simulate(flatten(made), times, start={"one.angle": 0.1}, tolerance=1e-11)

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from scipy.integrate import cumulative_simpson
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
     Dashpot,
     Driven,
-    DrivenPoint,
     Element,
     LinearElastic,
     Mass,
@@ -81,7 +81,7 @@ def test_the_published_actuator_balances(name: str) -> None:
     speed = run["motor.speed"]
     work = integral(4 * number["motor.torque_constant"] * run["motor.current"] * speed, times)
     stored = 0.5 * number["motor.inertia"] * speed**2 + 2 * rubber_energy(run, number)
-    friction = number["dry_friction.sliding_torque"] * np.tanh(speed / number["dry_friction.creep_speed"])
+    friction = number["dry_friction.sliding_effort"] * np.tanh(speed / number["dry_friction.creep_speed"])
     lost = integral(
         2 * rubber_loss(run, number) + number["bearing.damping"] * speed**2 + friction * speed, times
     )
@@ -161,7 +161,9 @@ def test_random_networks_with_hardening_springs_balance(batch: int) -> None:
         element = network(draw, draw.randint(1, 3))
         if nonlinear_in_series(element) > 2 or len(list(leaves(element, ""))) < 3:
             continue
-        model = flatten(assembly("net", grip=DrivenPoint(), net=tie(element, "grip")), outputs=["net.force"])
+        model = flatten(
+            assembly("net", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
+        )
         # Roots within roots are right too, but take long.
         if model.equations.n_instructions() > 10_000:
             continue

@@ -11,7 +11,7 @@ import random
 import numpy as np
 import pytest
 
-from nlsdesign.components import Dashpot, DrivenPoint, Element, Spring, parallel, series, tie
+from nlsdesign.components import TRANSLATION, Dashpot, Driven, Element, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import LinearModel, linearise
@@ -36,7 +36,9 @@ def random_network(draw: random.Random, depth: int) -> tuple[Element, object]:
 
 
 def flattened(element: Element) -> LinearModel:
-    model = flatten(assembly("net", grip=DrivenPoint(), net=tie(element, "grip")), outputs=["net.force"])
+    model = flatten(
+        assembly("net", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
+    )
     return linearise(model, model.start(model.states))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from nlsdesign.components import Dashpot, DrivenPoint, Element, Spring, parallel, series, tie
+from nlsdesign.components import TRANSLATION, Dashpot, Driven, Element, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError
 from nlsdesign.model import flatten
@@ -65,7 +65,9 @@ def test_rate_fed_networks_agree_with_complex_stiffness(batch: int) -> None:
     asked = 0
     for number in range(60):
         element, law = joined(draw, draw.randint(1, 4), linear_leaf)
-        model = flatten(assembly("net", grip=DrivenPoint(), net=tie(element, "grip")), outputs=["net.force"])
+        model = flatten(
+            assembly("net", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
+        )
         linear = linearise(model, model.start(model.states))
         asked += any("branch_force" in v.name for v in model.states)
         for frequency in FREQUENCIES:
@@ -81,7 +83,9 @@ def test_three_fed_solids_in_series_at_any_state() -> None:
         b=parallel(x=FedSolid(still=1.0, stiffness=2.0, damping=4.0), y=Dashpot(damping=0.3)),
         c=series(u=FedSolid(still=9.0, stiffness=1.0, damping=0.1), v=Spring(stiffness=4.0)),
     )
-    model = flatten(assembly("net", grip=DrivenPoint(), net=tie(element, "grip")), outputs=["net.force"])
+    model = flatten(
+        assembly("net", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
+    )
     draw = np.random.default_rng(3)
     first = linearise(model, model.start(model.states))
     for _ in range(5):
@@ -94,7 +98,7 @@ def test_forces_that_are_states_alone_cannot_share_a_motion() -> None:
     """Two laws in series whose force does not depend on the motion at all: no equation gives the share."""
     lone = {n: FedSolid(still=0.0, stiffness=1.0, damping=1.0) for n in ("a", "b")}
     with pytest.raises(ArrangementError, match="singular"):
-        flatten(assembly("net", grip=DrivenPoint(), net=tie(series(**lone), "grip")))
+        flatten(assembly("net", grip=Driven(domain=TRANSLATION), net=tie(series(**lone), "grip")))
 
 
 # --- hardening springs: small signals around a preload --------------------------------------------
@@ -148,7 +152,9 @@ def test_hardening_networks_around_a_preload(batch: int) -> None:
     for number in range(8):
         element, static = network(draw, 2)
         preload = draw.uniform(-0.6, 0.6)
-        model = flatten(assembly("net", grip=DrivenPoint(), net=tie(element, "grip")), outputs=["net.force"])
+        model = flatten(
+            assembly("net", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
+        )
         held = model.with_values({"grip.position": preload})
         rest = rest_state(held, {})
         found = held.evaluate(list(rest))["net.force"]

@@ -16,19 +16,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     CoulombFriction,
     Dashpot,
     Driven,
-    DrivenPoint,
     Element,
     Fixed,
     GearedMotor,
     LinearElastic,
-    SmoothStrainStiffening,
+    Rounded,
+    Smooth,
     Spring,
     StrainStiffening,
-    TorsionDashpot,
-    TorsionSpring,
     ViscousMaterial,
     parallel,
     pull_only,
@@ -49,7 +49,9 @@ TIMES = np.linspace(0.0, 0.4, 81)
 def pulled(**laws: Element) -> FlatModel:
     return flatten(
         assembly(
-            "pulled", grip=DrivenPoint(), rubber=tie(specimen(area=AREA, rest_length=LENGTH, **laws), "grip")
+            "pulled",
+            grip=Driven(domain=TRANSLATION),
+            rubber=tie(specimen(area=AREA, rest_length=LENGTH, **laws), "grip"),
         ),
         outputs=["rubber.force"],
     )
@@ -235,7 +237,7 @@ def test_strain_stiffening_is_the_sum_of_engaged_springs(strain: float) -> None:
 def test_smooth_strain_stiffening_stays_within_its_bound(strain: float, width: float) -> None:
     """|σ_smooth − σ_sharp| ≤ w·ln 2·Σk for ε ≥ 0, the slope rises with the strain, and σ(0) = 0."""
     w = 10.0**width
-    smooth = pulled(law=SmoothStrainStiffening(modulus=ENGAGED, knots=KNOTS, width=w))
+    smooth = pulled(law=StrainStiffening(modulus=ENGAGED, knots=KNOTS, contact=Rounded(width=w)))
     values = [
         smooth.evaluate([], [e * LENGTH, 0.0])["rubber.force"] / AREA for e in (0.0, strain, strain + 1e-4)
     ]
@@ -250,7 +252,7 @@ def test_smooth_law_tends_to_the_sharp_one() -> None:
     strains = np.linspace(0.0, 0.3, 61)
     errors = []
     for width in (1e-2, 1e-3, 1e-4):
-        smooth = pulled(law=SmoothStrainStiffening(modulus=ENGAGED, knots=KNOTS, width=width))
+        smooth = pulled(law=StrainStiffening(modulus=ENGAGED, knots=KNOTS, contact=Rounded(width=width)))
         sharp = pulled(law=StrainStiffening(modulus=ENGAGED, knots=KNOTS))
         errors.append(
             max(
@@ -270,7 +272,9 @@ def test_smooth_law_tends_to_the_sharp_one() -> None:
 @given(st.floats(-3.0, 3.0))
 def test_dry_friction_saturates_and_always_takes_power(speed: float) -> None:
     made = assembly(
-        "a", shaft=Driven(), rub=tie(CoulombFriction(sliding_torque=0.4, creep_speed=0.02), "shaft")
+        "a",
+        shaft=Driven(),
+        rub=tie(CoulombFriction(sliding_effort=0.4, contact=Smooth(creep_speed=0.02)), "shaft"),
     )
     torque = flatten(made).evaluate([], [0.0, speed])["rub.torque"]
     assert torque == pytest.approx(0.4 * math.tanh(speed / 0.02), rel=1e-12, abs=1e-15)
@@ -281,7 +285,7 @@ def test_dry_friction_saturates_and_always_takes_power(speed: float) -> None:
 @given(st.floats(-0.05, 0.05), st.floats(-0.5, 0.5))
 def test_a_cable_only_pulls(extension: float, rate: float) -> None:
     inside = parallel(k=Spring(stiffness=1000.0), c=Dashpot(damping=30.0))
-    made = assembly("a", grip=DrivenPoint(), rope=tie(pull_only(inside=inside), "grip"))
+    made = assembly("a", grip=Driven(domain=TRANSLATION), rope=tie(pull_only(inside=inside), "grip"))
     found = flatten(made, outputs=["rope.force"]).evaluate([], [extension, rate])["rope.force"]
     sharp = max(1000.0 * extension + 30.0 * rate, 0.0)
     assert sharp <= found <= sharp + 0.1 * math.log(2.0) * (1 + 1e-12)
@@ -293,8 +297,8 @@ def test_motor_against_newton() -> None:
         "m",
         motor=GearedMotor(inertia=5.97e-4, gear_ratio=4, torque_constant=0.055, current_limit=2.0),
         wall=Fixed(),
-        oil=tie(TorsionDashpot(damping=1e-3), "motor"),
-        spring=tie(TorsionSpring(stiffness=1.7), "motor", "wall"),
+        oil=tie(Dashpot(damping=1e-3, domain=ROTATION), "motor"),
+        spring=tie(Spring(stiffness=1.7, domain=ROTATION), "motor", "wall"),
     )
     model = flatten(made)
     for current, felt in ((1.5, 1.5), (5.0, 2.0), (-7.0, -2.0)):
@@ -306,7 +310,7 @@ def test_motor_against_newton() -> None:
 
 
 def test_an_element_between_two_moving_bodies_feels_the_difference() -> None:
-    inside = parallel(k=TorsionSpring(stiffness=3.0), c=TorsionDashpot(damping=0.2))
+    inside = parallel(k=Spring(stiffness=3.0, domain=ROTATION), c=Dashpot(damping=0.2, domain=ROTATION))
     made = assembly("a", one=Driven(), other=Driven(), s=tie(inside, "one", "other"))
     at = flatten(made).evaluate([], [0.7, 5.0, 0.2, 1.0])
     assert at["s.torque"] == pytest.approx(3.0 * 0.5 + 0.2 * 4.0)

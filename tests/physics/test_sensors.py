@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     Assembly,
     CurrentSensor,
     DelayedForceSensor,
     DriftingForceSensor,
     Driven,
-    DrivenPoint,
     Encoder,
     ForceSensor,
     SampleAndHold,
@@ -28,7 +29,6 @@ from nlsdesign.components import (
     Spring,
     Tachometer,
     TorqueSensor,
-    TorsionSpring,
     TransportDelay,
     tie,
 )
@@ -86,7 +86,9 @@ def test_a_held_signal_is_half_a_sample_late_and_smaller_by_sinc() -> None:
 
 
 def pulled(**sensors: Sensor) -> Assembly:
-    return assembly("pulled", grip=DrivenPoint(), spring=tie(Spring(stiffness=1000.0), "grip"), **sensors)
+    return assembly(
+        "pulled", grip=Driven(domain=TRANSLATION), spring=tie(Spring(stiffness=1000.0), "grip"), **sensors
+    )
 
 
 def waved(made: Assembly, frequency: float) -> tuple[Trace, Trace]:
@@ -159,7 +161,9 @@ def test_transducer_and_ammeter_are_lines_in_a_record(sensor: Sensor, unit: str,
 
 def test_a_torque_transducer_is_the_same_line_in_the_flat_model() -> None:
     sensor = TorqueSensor(of="spring.torque", gain=1.5, bias=0.25)
-    made = assembly("a", hand=Driven(), spring=tie(TorsionSpring(stiffness=4.0), "hand"), cell=sensor)
+    made = assembly(
+        "a", hand=Driven(), spring=tie(Spring(stiffness=4.0, domain=ROTATION), "hand"), cell=sensor
+    )
     assert flatten(made).evaluate([], [0.5, 0.0])["cell.reading"] == pytest.approx(1.5 * 2.0 + 0.25)
 
 

@@ -11,10 +11,11 @@ import pytest
 from scipy.optimize import brentq
 
 from nlsdesign.components import (
-    DrivenPoint,
+    TRANSLATION,
+    Driven,
     Element,
     InextensibleCable,
-    LooseCable,
+    Slack,
     Spring,
     StrainStiffening,
     series,
@@ -33,7 +34,7 @@ CORNERS = np.append(KNOTS, 1e6)
 
 
 def pulled(**members: Element) -> FlatModel:
-    made = assembly("p", grip=DrivenPoint(), net=tie(series(**members), "grip"))
+    made = assembly("p", grip=Driven(domain=TRANSLATION), net=tie(series(**members), "grip"))
     return flatten(made, outputs=["net.force"])
 
 
@@ -91,8 +92,8 @@ def test_pieces_of_rubber_with_knots_share_by_the_common_force() -> None:
 
 def test_a_slack_member_takes_what_the_others_do_not_need() -> None:
     """Two loose cables and a spring: no force until both have been used up, then three springs in series."""
-    first = LooseCable(length=0.02, members=(("k", Spring(stiffness=300.0)),))
-    second = LooseCable(length=0.01, members=(("k", Spring(stiffness=700.0)),))
+    first = Slack(length=0.02, members=(("k", Spring(stiffness=300.0)),))
+    second = Slack(length=0.01, members=(("k", Spring(stiffness=700.0)),))
     model = pulled(a=first, b=second, c=Spring(stiffness=200.0))
     flexible = 1 / 300 + 1 / 700 + 1 / 200
     for whole in (0.005, 0.02, 0.0299, 0.0301, 0.05, 0.3):
@@ -120,7 +121,7 @@ def test_together_as_nested_two_by_two_also_where_rates_are_asked_for() -> None:
     a, c = Hardening(stiffness=30.0, hardening=4e4), Hardening(stiffness=10.0, hardening=9e5)
     b = BoucWen(still=5.0, level=0.3, yields_at=0.004)
     together = pulled(a=a, b=b, c=c)
-    made = assembly("p", grip=DrivenPoint(), net=tie(series(a=a, rest=series(b=b, c=c)), "grip"))
+    made = assembly("p", grip=Driven(domain=TRANSLATION), net=tie(series(a=a, rest=series(b=b, c=c)), "grip"))
     nested = flatten(made, outputs=["net.force"])
     times = np.linspace(0.0, 0.5, 26)
     drive = {"grip.position": 0.05 * np.sin(20 * times), "grip.speed": np.cos(20 * times)}

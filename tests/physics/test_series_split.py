@@ -15,8 +15,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from nlsdesign.components import (
+    TRANSLATION,
     Dashpot,
-    DrivenPoint,
+    Driven,
     Element,
     LinearElastic,
     Specimen,
@@ -48,7 +49,9 @@ def rubber(**more: Element) -> Specimen:
 
 
 def pulled(element: Element) -> FlatModel:
-    return flatten(assembly("p", grip=DrivenPoint(), net=tie(element, "grip")), outputs=["net.force"])
+    return flatten(
+        assembly("p", grip=Driven(domain=TRANSLATION), net=tie(element, "grip")), outputs=["net.force"]
+    )
 
 
 def static(extension: float) -> float:

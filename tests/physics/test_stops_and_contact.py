@@ -15,20 +15,20 @@ from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 
 from nlsdesign.components import (
-    DryFriction,
+    ROTATION,
+    Backlash,
+    CoulombFriction,
+    Dashpot,
     Element,
     EndStop,
     Inertia,
     InextensibleCable,
-    LooseCable,
     Mass,
-    Play,
     RigidStop,
-    RoundedEndStop,
+    Rounded,
+    Slack,
     Spring,
     StrainStiffening,
-    TorsionDashpot,
-    TorsionSpring,
     smoothed,
     specimen,
     tie,
@@ -123,7 +123,7 @@ def test_a_stop_with_friction_on_the_same_motion_is_refused() -> None:
         "held twice",
         wheel=Inertia(inertia=J),
         stop=tie(RigidStop(lower=0.0, upper=1.0, restitution=0.5), "wheel"),
-        rub=tie(DryFriction(sliding_torque=0.01), "wheel"),
+        rub=tie(CoulombFriction(sliding_effort=0.01), "wheel"),
     )
     with pytest.raises(ArrangementError, match=r"'stop' and 'rub'.*hold the same motion.*elastic stop"):
         flatten(made)
@@ -166,12 +166,12 @@ def test_rebound_from_an_elastic_stop(damping: float) -> None:
 def test_play_between_two_inertias() -> None:
     """Free through the gap, then half a sine of the reduced inertia, then free with speeds exchanged."""
     one, other, stiffness, gap, speed = 1e-3, 2e-3, 50.0, 0.02, 0.8
-    inside = (("spring", TorsionSpring(stiffness=stiffness)),)
+    inside = (("spring", Spring(stiffness=stiffness, domain=ROTATION)),)
     made = assembly(
         "gear",
         motor=Inertia(inertia=one),
         load=Inertia(inertia=other),
-        play=tie(Play(gap=gap, members=inside), "motor", "load"),
+        play=tie(Backlash(gap=gap, members=inside), "motor", "load"),
     )
     run = simulate(flatten(made), np.linspace(0.0, 0.1, 11), start={"motor.speed": speed}, tolerance=1e-11)
     reduced = one * other / (one + other)
@@ -200,12 +200,15 @@ def test_play_between_two_inertias() -> None:
 
 def test_play_with_a_damper_balances_and_jumps_where_it_should() -> None:
     stiffness, damping = 50.0, 0.01
-    inside = (("spring", TorsionSpring(stiffness=stiffness)), ("damper", TorsionDashpot(damping=damping)))
+    inside = (
+        ("spring", Spring(stiffness=stiffness, domain=ROTATION)),
+        ("damper", Dashpot(damping=damping, domain=ROTATION)),
+    )
     made = assembly(
         "gear",
         motor=Inertia(inertia=J),
         load=Inertia(inertia=2 * J),
-        play=tie(Play(gap=0.02, members=inside), "motor", "load"),
+        play=tie(Backlash(gap=0.02, members=inside), "motor", "load"),
     )
     times = np.linspace(0.0, 0.5, 50_001)
     run = simulate(
@@ -232,7 +235,7 @@ def test_play_with_a_damper_balances_and_jumps_where_it_should() -> None:
 def test_a_loose_cable_catches_a_mass() -> None:
     """Free flight to the length, half a sine in the cable, free flight back."""
     mass, stiffness, length, speed = 0.5, 800.0, 0.03, 0.4
-    cable = LooseCable(length=length, members=(("spring", Spring(stiffness=stiffness)),))
+    cable = Slack(length=length, members=(("spring", Spring(stiffness=stiffness)),))
     made = assembly("catch", mass=Mass(mass=mass), cable=tie(cable, "mass"))
     run = simulate(flatten(made), np.linspace(0.0, 0.25, 26), start={"mass.speed": speed}, tolerance=1e-11)
     taut = length / speed
@@ -288,8 +291,8 @@ def test_smooth_friction_tends_to_the_sharp_one() -> None:
     made = assembly(
         "swing",
         wheel=Inertia(inertia=J),
-        spring=tie(TorsionSpring(stiffness=2.0), "wheel"),
-        rub=tie(DryFriction(sliding_torque=0.05), "wheel"),
+        spring=tie(Spring(stiffness=2.0, domain=ROTATION), "wheel"),
+        rub=tie(CoulombFriction(sliding_effort=0.05), "wheel"),
     )
     sharp = ending(made, {"wheel.angle": 0.33}, "wheel.angle")
     widths = (0.08, 0.04, 0.02, 0.01)
@@ -304,7 +307,7 @@ def test_smooth_friction_tends_to_the_sharp_one() -> None:
 def test_rounded_corners_tend_to_the_sharp_ones(what: str) -> None:
     """At second order in the width, ∫(softplus − plus) = π²/6·w², or better where entry and exit cancel."""
     stop = EndStop(lower=-1.0, upper=0.1, stiffness=4.0, damping=0.1)
-    play = Play(gap=0.2, members=(("spring", TorsionSpring(stiffness=4.0)),))
+    play = Backlash(gap=0.2, members=(("spring", Spring(stiffness=4.0, domain=ROTATION)),))
     made = assembly("a", wheel=Inertia(inertia=J), it=tie(stop if what == "stop" else play, "wheel"))
     sharp = ending(made, {"wheel.speed": 0.9}, "wheel.angle")
     errors = [
@@ -324,14 +327,14 @@ def test_a_rigid_stop_is_the_limit_of_a_stiff_one() -> None:
     sharp = ending(made, {"wheel.speed": 1.0}, "wheel.angle")
     errors = []
     for stiffness in (1e2, 4e2, 16e2):
-        soft = RoundedEndStop(lower=-1.0, upper=0.1, stiffness=stiffness, damping=0.0, width=1e-6)
+        soft = EndStop(lower=-1.0, upper=0.1, stiffness=stiffness, damping=0.0, contact=Rounded(width=1e-6))
         errors.append(abs(ending(made.with_part("it", soft), {"wheel.speed": 1.0}, "wheel.angle") - sharp))
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.02)
     assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.02)
 
 
 def test_smoothed_says_what_it_cannot_find() -> None:
-    made = assembly("a", wheel=Inertia(inertia=J), rub=tie(DryFriction(sliding_torque=0.1), "wheel"))
+    made = assembly("a", wheel=Inertia(inertia=J), rub=tie(CoulombFriction(sliding_effort=0.1), "wheel"))
     with pytest.raises(UnknownNameError, match=r"'rbu'.*did you mean 'rub'"):
         smoothed(made, {"rbu": 0.1})
     assert flatten(smoothed(made)).switching is None
@@ -340,20 +343,19 @@ def test_smoothed_says_what_it_cannot_find() -> None:
 def test_smoothed_reaches_what_lies_inside_others() -> None:
     rubber = specimen(area=1e-4, rest_length=0.1, law=StrainStiffening(modulus=(1e6, 3e6), knots=(0.0, 0.2)))
     cable = InextensibleCable(members=(("rubber", rubber),))
-    made = assembly(
-        "a", mass=Mass(mass=0.1), it=tie(LooseCable(length=0.01, members=(("c", cable),)), "mass")
-    )
+    made = assembly("a", mass=Mass(mass=0.1), it=tie(Slack(length=0.01, members=(("c", cable),)), "mass"))
     kinds = {path: type(part).__name__ for path, part in smoothed(made).walk()}
     assert kinds["it.c"] == "PullOnly"
-    assert kinds["it.c.rubber.law"] == "SmoothStrainStiffening"
-    assert type(smoothed(made).element("it")).__name__ == "Slack"
+    laws = [smoothed(made).element(path) for path in ("it", "it.c.rubber.law")]
+    assert [type(law) for law in laws] == [Slack, StrainStiffening]
+    assert all(isinstance(law.contact, Rounded) for law in laws)
 
 
 # --- exports --------------------------------------------------------------------------------------
 
 
 def test_exports_refuse_what_jumps_and_take_what_has_corners() -> None:
-    sharp = assembly("sharp", wheel=Inertia(inertia=J), rub=tie(DryFriction(sliding_torque=0.1), "wheel"))
+    sharp = assembly("sharp", wheel=Inertia(inertia=J), rub=tie(CoulombFriction(sliding_effort=0.1), "wheel"))
     for write in (lambda m: fmu_texts(m, version="3.0", step=1e-3), check_discrete):
         with pytest.raises(ExportError, match=r"'rub'.*is not smooth.*smoothed\(assembly\)"):
             write(flatten(sharp))

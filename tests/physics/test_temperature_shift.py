@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_simpson
 from nlsdesign.components import (
     ArrheniusShift,
     Element,
+    HeatBalance,
     LinearElastic,
     NeoHooke,
     SelfHeating,
@@ -91,7 +92,9 @@ def test_arrhenius_by_its_slope() -> None:
 def test_what_goes_in_is_stored_or_lost_in_the_slower_dashpot() -> None:
     """Work = ½E(ε − ε_d)² + ∫σ²/(η·a_T); and a self-heating law around it takes that very loss as heat."""
     shifted = wlf(maxwell(modulus=1e6, viscosity=5e3), 243.15)
-    law = SelfHeating(members=(("cold", shifted),), heat_capacity=1e5, cooling=0.0, softening=0.0)
+    law = SelfHeating(
+        members=(("cold", shifted),), heat=HeatBalance(heat_capacity=1e5, cooling=0.0, softening=0.0)
+    )
     times = np.linspace(0.0, 1.0, 8001)
     trace = run(
         pulled(law=law), times, lambda t: 0.2 * math.sin(11 * t), lambda t: 2.2 * math.cos(11 * t), 1e-10
@@ -130,7 +133,8 @@ def test_the_pole_is_named() -> None:
 
 def test_a_law_that_cools_in_real_time_is_not_shifted() -> None:
     inside = SelfHeating(
-        members=(("law", LinearElastic(modulus=1e6)),), heat_capacity=1e6, cooling=1e4, softening=0.0
+        members=(("law", LinearElastic(modulus=1e6)),),
+        heat=HeatBalance(heat_capacity=1e6, cooling=1e4, softening=0.0),
     )
     with pytest.raises(ArrangementError, match=r"WlfShift member 'law'.*real time.*inside the self-heating"):
         wlf(inside, 273.15)

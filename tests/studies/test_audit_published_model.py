@@ -18,8 +18,8 @@ import sympy
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from nlsdesign.cli.studies import claims, load_study
-from studies import _audit_figures, _audit_law, _audit_paper, _audit_units
+from nlsdesign.cli.studies import claims, run_study
+from studies.audit_published_model import figures, law, paper
 
 NAME = "audit_published_model"
 A, BRANCH, VISCOSITY = 8e-3, 0.58e6, 411.0
@@ -30,7 +30,7 @@ KNOTS = (0.0, 0.2e-3, 1.06e-3, 2.65e-3, 9.04e-3, 9.05e-3)
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, float]]:
     out = tmp_path_factory.mktemp("audit")
-    return out, load_study(NAME).main(out)
+    return out, run_study(NAME, out)
 
 
 @pytest.fixture(scope="module")
@@ -80,31 +80,31 @@ def verdict(findings: list[Any], key: str) -> str:
 
 
 def test_another_parameter_turns_the_table_of_forces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_audit_paper, "MODULI", _audit_paper.MODULI * 1.01)
-    assert verdict(_audit_law.findings(), "0.3") == "does not hold"
+    monkeypatch.setattr(paper, "MODULI", paper.MODULI * 1.01)
+    assert verdict(law.findings(), "0.3") == "does not hold"
 
 
 def test_a_lost_term_turns_the_derivation(monkeypatch: pytest.MonkeyPatch) -> None:
-    lost = _audit_paper.CORRECT_FORCE_RATE + _audit_paper.A * _audit_paper.K * _audit_paper.RATE
-    monkeypatch.setattr(_audit_paper, "CORRECT_FORCE_RATE", lost)
-    assert verdict(_audit_law.findings(), "0.1") == "does not hold"
+    lost = paper.CORRECT_FORCE_RATE + paper.A * paper.K * paper.RATE
+    monkeypatch.setattr(paper, "CORRECT_FORCE_RATE", lost)
+    assert verdict(law.findings(), "0.1") == "does not hold"
 
 
 def test_a_wrong_unit_turns_the_dimensional_audit(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = {"(1)": (_audit_paper.F, _audit_paper.F_STAR + _audit_paper.ETA * _audit_paper.RATE)}
-    monkeypatch.setattr(_audit_units, "EQUATIONS", wrong)
-    assert verdict(_audit_units.findings(), "0.4") == "does not hold"
+    wrong = {"(1)": (paper.F, paper.F_STAR + paper.ETA * paper.RATE)}
+    monkeypatch.setattr(law, "EQUATIONS", wrong)
+    assert verdict(law.findings(), "0.4") == "does not hold"
 
 
 def test_loops_that_run_the_other_way_turn_the_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    forward = _audit_paper.element_loop
+    forward = figures.element_loop
 
     def backward(degrees: int, kind: str = "measured") -> tuple[np.ndarray, np.ndarray]:
         x, force = forward(degrees, kind)
         return x[::-1], force[::-1]
 
-    monkeypatch.setattr(_audit_paper, "element_loop", backward)
-    found = _audit_figures.findings()
+    monkeypatch.setattr(figures, "element_loop", backward)
+    found = figures.findings()
     assert verdict(found, "8.4") == "does not hold"
     assert verdict(found, "8.5") == "holds"
 

@@ -6,7 +6,7 @@ import json
 from html.parser import HTMLParser
 from pathlib import Path
 
-from nlsdesign.cli.studies import claims, load_study
+from nlsdesign.cli.studies import claims, run_study
 
 FILES = (
     "report.html", "actuator.toml", "designed.toml", "c/observer.c", "c/observer.h", "fmu/plant.fmu",
@@ -25,7 +25,7 @@ class Pictures(HTMLParser):
 
 
 def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
-    results = load_study("austin2015").main(tmp_path, fast=True)
+    results = run_study("austin2015", tmp_path, fast=True)
     expected = claims("austin2015")
     assert set(results) == set(expected)
     for name, claim in expected.items():

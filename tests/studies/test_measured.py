@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.studies import claims, load_study
+from nlsdesign.cli.studies import claims, run_study
 
 NAMES = ("emps", "vhb4910")
 BOUNDS = {
@@ -31,7 +31,7 @@ NAMED = {
 )
 @pytest.mark.parametrize("name", NAMES)
 def test_the_study_keeps_its_claims(name: str, tmp_path: Path) -> None:
-    results = load_study(name).main(tmp_path, fast=True)
+    results = run_study(name, tmp_path, fast=True)
     expected = claims(name)
     assert set(results) == set(expected)
     for key, claim in expected.items():
@@ -49,6 +49,6 @@ def test_without_the_measurements_the_study_says_why_it_has_no_result(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("NLSDESIGN_SHARED", raising=False)
-    assert load_study(name).main(tmp_path) == {}
+    assert run_study(name, tmp_path) == {}
     assert f"skipped: The measurements '{name}'" in capsys.readouterr().out
     assert "NLSDESIGN_SHARED" in (tmp_path / "report.html").read_text(encoding="utf8")

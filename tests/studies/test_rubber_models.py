@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli.studies import claims, load_study
+from nlsdesign.cli.studies import claims, run_study
 
 LINEAR = ("Hooke", "Kelvin_Voigt", "Maxwell", "standard_linear_solid", "Burgers")
 
 
 def test_the_study_keeps_its_claims(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    results = load_study("rubber_models_compared").main(tmp_path)
+    results = run_study("rubber_models_compared", tmp_path)
     expected = claims("rubber_models_compared")
     assert set(results) == set(expected)
     for name, claim in expected.items():

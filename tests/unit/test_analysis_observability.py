@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from nlsdesign.analysis import EstimateDeviation, Observability, RestPoint, over_angle
 from nlsdesign.analysis.kalman import discrete_noise, steady_state_kalman
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
@@ -22,8 +22,8 @@ INERTIA, STIFF, DAMPING = 2e-3, 5.0, 0.04
 def swing() -> FlatModel:
     parts = {
         "motor": Inertia(inertia=INERTIA),
-        "spring": tie(TorsionSpring(stiffness=STIFF), "motor"),
-        "bearing": tie(TorsionDashpot(damping=DAMPING), "motor"),
+        "spring": tie(Spring(stiffness=STIFF, domain=ROTATION), "motor"),
+        "bearing": tie(Dashpot(damping=DAMPING, domain=ROTATION), "motor"),
     }
     return flatten(assembly("swing", **parts), outputs=["motor.angle", "spring.torque"])
 
@@ -51,7 +51,10 @@ def test_angle_alone_shows_angle_and_speed(swing: FlatModel) -> None:
 
 
 def test_what_is_not_seen_is_named() -> None:
-    parts = {"motor": Inertia(inertia=INERTIA), "bearing": tie(TorsionDashpot(damping=DAMPING), "motor")}
+    parts = {
+        "motor": Inertia(inertia=INERTIA),
+        "bearing": tie(Dashpot(damping=DAMPING, domain=ROTATION), "motor"),
+    }
     free = flatten(assembly("free", **parts), outputs=["bearing.torque", "motor.angle"])
     chart = over_angle(free, [Observability(measured=("bearing.torque",))], angles=[0.0, 0.3])
     assert list(chart["observability.rank"]) == [1, 1]
@@ -64,7 +67,7 @@ def test_a_mixed_direction_is_written_out() -> None:
     parts = {
         "motor": Inertia(inertia=INERTIA),
         "load": Inertia(inertia=INERTIA),
-        "spring": tie(TorsionSpring(stiffness=STIFF), "motor", "load"),
+        "spring": tie(Spring(stiffness=STIFF, domain=ROTATION), "motor", "load"),
     }
     model = flatten(assembly("pair", **parts), outputs=["spring.angle", "motor.angle"])
     point = RestPoint(model, "motor.angle", np.zeros(4), linearise(model, np.zeros(4)), {})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.analysis import Stability, over_angle
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, parallel, series, tie
+from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.model import flatten
 from tests import observed as ob
@@ -17,7 +17,9 @@ INERTIA, STIFF, DAMPING = 2e-3, 5.0, 0.04
 
 
 def test_an_oscillator_has_its_textbook_eigenvalues() -> None:
-    law = parallel(spring=TorsionSpring(stiffness=STIFF), dashpot=TorsionDashpot(damping=DAMPING))
+    law = parallel(
+        spring=Spring(stiffness=STIFF, domain=ROTATION), dashpot=Dashpot(damping=DAMPING, domain=ROTATION)
+    )
     model = flatten(assembly("swing", motor=Inertia(inertia=INERTIA), spring=tie(law, "motor")))
     chart = over_angle(model, [Stability()], angles=[0.0, 0.4])
     omega = np.sqrt(STIFF / INERTIA)
@@ -30,8 +32,10 @@ def test_an_oscillator_has_its_textbook_eigenvalues() -> None:
 
 
 def test_a_relaxing_branch_is_stiff_only_when_moved_fast() -> None:
-    branch = series(spring=TorsionSpring(stiffness=3.0), dashpot=TorsionDashpot(damping=0.5))
-    law = parallel(spring=TorsionSpring(stiffness=STIFF), relaxing=branch)
+    branch = series(
+        spring=Spring(stiffness=3.0, domain=ROTATION), dashpot=Dashpot(damping=0.5, domain=ROTATION)
+    )
+    law = parallel(spring=Spring(stiffness=STIFF, domain=ROTATION), relaxing=branch)
     model = flatten(assembly("swing", motor=Inertia(inertia=INERTIA), spring=tie(law, "motor")))
     chart = over_angle(model, [Stability()], angles=[0.2])
     assert chart["stiffness.slow"][0] == pytest.approx(STIFF)
@@ -63,7 +67,7 @@ def test_negative_stiffness_is_called_unstable() -> None:
         assembly(
             "swing",
             motor=Inertia(inertia=INERTIA),
-            spring=tie(parallel(a=TorsionSpring(stiffness=1.0)), "motor"),
+            spring=tie(parallel(a=Spring(stiffness=1.0, domain=ROTATION)), "motor"),
         )
     )
     turned = tuple(

@@ -9,18 +9,21 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
+    Dashpot,
     Driven,
     Element,
+    HeatBalance,
     LinearElastic,
     NeoHooke,
+    OgdenRoxburgh,
+    Rounded,
     SelfHeating,
-    SmoothStrainStiffening,
-    Softening,
+    Sharp,
     Spring,
     Springpot,
     StrainStiffening,
-    TorsionDashpot,
-    TorsionSpring,
+    StressSoftening,
     ViscousMaterial,
     Yeoh,
     burgers,
@@ -61,12 +64,14 @@ OUT_OF_RANGE: dict[str, tuple[Callable[[], Element], str]] = {
         lambda: Springpot(modulus=1e6, order=1.0, lower=0.1, upper=10.0), "order = 1",
     ),
     "no softening left": (
-        lambda: Softening(members=(("g", NeoHooke(shear_modulus=1e5)),), strength=0.5, scale=1e5),
+        lambda: StressSoftening(members=(("g", NeoHooke(shear_modulus=1e5)),),
+            curve=OgdenRoxburgh(strength=0.5, scale=1e5)),
         "strength = 0.5",
     ),
     "heat capacity of zero": (
         lambda: SelfHeating(
-            members=(("g", NeoHooke(shear_modulus=1e5)),), heat_capacity=0.0, cooling=0.0, softening=0.0
+            members=(("g", NeoHooke(shear_modulus=1e5)),),
+            heat=HeatBalance(heat_capacity=0.0, cooling=0.0, softening=0.0)
         ),
         "heat_capacity = 0",
     ),
@@ -81,13 +86,12 @@ def test_a_number_that_no_rubber_has_is_named_with_its_range(name: str) -> None:
     assert "must lie in [" in str(caught.value)
 
 
-@pytest.mark.parametrize("law", [StrainStiffening, SmoothStrainStiffening])
-def test_crossing_knots_are_named_with_both(law: type[Element]) -> None:
-    more = {"width": 0.01} if law is SmoothStrainStiffening else {}
+@pytest.mark.parametrize("contact", [Sharp(), Rounded(width=0.01)])
+def test_crossing_knots_are_named_with_both(contact: Sharp | Rounded) -> None:
     with pytest.raises(ValueRangeError, match=r"knots 0\.3 and 0\.1: knots cross.*sort"):
-        law(modulus=(1e6, 1e6, 1e6), knots=(0.0, 0.3, 0.1), **more)
+        StrainStiffening(modulus=(1e6, 1e6, 1e6), knots=(0.0, 0.3, 0.1), contact=contact)
     with pytest.raises(ValueRangeError, match=r"knots \(1\) and modulus \(2\)"):
-        law(modulus=(1e6, 1e6), knots=(0.0,), **more)
+        StrainStiffening(modulus=(1e6, 1e6), knots=(0.0,), contact=contact)
 
 
 def test_an_impossible_unit_is_named() -> None:
@@ -98,9 +102,12 @@ def test_an_impossible_unit_is_named() -> None:
 
 
 def test_a_dashpot_of_zero_in_series_is_found_where_it_is() -> None:
-    chain = series(k=TorsionSpring(stiffness=1.0), oil=TorsionDashpot(damping=0.0))
+    chain = series(k=Spring(stiffness=1.0, domain=ROTATION), oil=Dashpot(damping=0.0, domain=ROTATION))
     made = assembly(
-        "a", shaft=Driven(), left=tie(TorsionSpring(stiffness=2.0), "shaft"), right=tie(chain, "shaft")
+        "a",
+        shaft=Driven(),
+        left=tie(Spring(stiffness=2.0, domain=ROTATION), "shaft"),
+        right=tie(chain, "shaft"),
     )
     with pytest.raises(
         ArrangementError, match=r"singular: der\(right\.oil\.angle\).*zero stiffness in series"
@@ -123,7 +130,9 @@ OVER_CONSTRAINED: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "nothing in parallel": (lambda: parallel(), "needs at least one element"),
     "dashpot that cannot soften": (
-        lambda: Softening(members=(("d", ViscousMaterial(viscosity=1e3)),), strength=2.0, scale=1e5),
+        lambda: StressSoftening(
+            members=(("d", ViscousMaterial(viscosity=1e3)),), curve=OgdenRoxburgh(strength=2.0, scale=1e5)
+        ),
         "Softening member 'd': is a ViscousMaterial, which does not say its strain energy",
     ),
 }
@@ -140,7 +149,8 @@ DECK = """[deck]
 name = "gum"
 description = ""
 [grip]
-component = "DrivenPoint"
+component = "Driven"
+domain = "translation"
 [rubber]
 component = "Specimen"
 between = ["grip"]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from nlsdesign.components import AnchoredCam, CapstanFriction, OneSidedCam, Part, Spring, TorsionSpring
+from nlsdesign.components import ROTATION, AnchoredCam, CapstanFriction, Guide, OneSidedCam, Part, Spring
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, ValueRangeError
 from nlsdesign.quantity import quantity
 from tests.parts.cable import ROW
@@ -56,7 +56,10 @@ WRONG: dict[str, tuple[Callable[[], Part], type[NlsError], str]] = {
     "negative friction": (lambda: capstan(friction=-0.1), ValueRangeError, "friction = -0.1"),
     "negative wrap": (lambda: capstan(wrap_angle=-1.0), ValueRangeError, "wrap_angle = -1 rad"),
     "a guide for torques": (
-        lambda: CapstanFriction(members=(("k", TorsionSpring(stiffness=1.0)),), friction=0.1, wrap_angle=1.0),
+        lambda: CapstanFriction(
+            members=(("k", Spring(stiffness=1.0, domain=ROTATION)),),
+            guide=Guide(friction=0.1, wrap_angle=1.0),
+        ),
         ArrangementError,
         "acts on extension and force.*behind the cam",
     ),

@@ -8,11 +8,12 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
     Dashpot,
-    DrivenPoint,
+    Driven,
     Element,
-    FixedPoint,
+    Fixed,
     Mass,
     Spring,
     parallel,
@@ -106,7 +107,12 @@ def drawn_stiffness(circuit: Circuit, values: list[float]) -> float:
 @pytest.mark.parametrize("seed", range(25))
 def test_what_is_drawn_is_what_is_computed(seed: int) -> None:
     element = network(random.Random(seed), 3)
-    made = assembly("net", grip=DrivenPoint(), clamp=FixedPoint(), net=tie(element, "grip", "clamp"))
+    made = assembly(
+        "net",
+        grip=Driven(domain=TRANSLATION),
+        clamp=Fixed(domain=TRANSLATION),
+        net=tie(element, "grip", "clamp"),
+    )
     values = [q.number for name, q in made.quantities().items() if name.endswith("stiffness")]
     circuit = circuit_of(element, "net")
     assert joined(circuit_lines(circuit, "grip", "clamp"))

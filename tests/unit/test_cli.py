@@ -141,6 +141,7 @@ def test_every_part_that_a_deck_can_name_is_listed_with_its_law(run: Run) -> Non
     _, out, _ = run("parts", "StribeckFriction")
     assert "Source:" in out
     assert "stribeck_speed" in out
+    assert "Armstrong-Hélouvry, B. (1991): Control of Machines with Friction" in out
     status, _, err = run("parts", "StribekFriction")
     assert status == 2
     assert "did you mean 'StribeckFriction'?" in err

@@ -65,7 +65,7 @@ def test_the_run_is_that_of_the_library(run: Run, fmus: dict[str, Path], tmp_pat
 def test_people_see_the_wires_and_the_signals(run: Run, fmus: dict[str, Path]) -> None:
     status, out, _ = run(*words(fmus))
     assert status == 0
-    assert "late by steps" in out
+    assert "delay in steps" in out
     assert "plant.motor.current" in out
     assert "written: y.csv" in out
 
@@ -74,9 +74,9 @@ def test_people_see_the_wires_and_the_signals(run: Run, fmus: dict[str, Path]) -
     ("extra", "said"),
     [
         (["--wire", "observer.motor.angel=plant.motor.angle"], "did you mean 'observer.motor.angle'"),
-        (["--input", "plant.motor.current=1@fast"], "'1@fast' is not understood -> give a number, or"),
+        (["--input", "plant.motor.current=1@fast"], "'1@fast' cannot be read -> give a number, or"),
         (["--input", "plant.motor.current"], "is not NAME=VALUE"),
-        (["--set", "plant.motor.inertia=heavy"], "'heavy' is not understood"),
+        (["--set", "plant.motor.inertia=heavy"], "'heavy' cannot be read"),
         (["--wire", "observer.motor.angle=plant.motor.speed"], "'observer.motor.angle' is given twice"),
         (["--input", f"{BACK[0]}=1"], "is driven by a wire and by a signal"),
         (["--fmu", "other=nothing.fmu", "--order", "other"], "nothing.fmu"),

@@ -27,12 +27,13 @@ from nlsdesign.components import (
     GearedMotor,
     Inertia,
     Mass,
+    Parallel,
     Part,
     Pulley,
     Sensor,
+    Series,
     Spring,
     Tie,
-    TorsionSpring,
     smoothed,
     specimen,
     through,
@@ -40,6 +41,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.core.parameters import readings
 from nlsdesign.components.core.part import walk
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ExportError
@@ -66,7 +68,9 @@ def around(part: Part) -> Assembly:
         motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055)
         return assembly("bench", motor=motor, spring=spring, part=part)
     if isinstance(part, Body):
-        spring = TorsionSpring(stiffness=3.4) if part.domain == ROTATION else Spring(stiffness=2500.0)
+        spring = (
+            Spring(stiffness=3.4, domain=ROTATION) if part.domain == ROTATION else Spring(stiffness=2500.0)
+        )
         other = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
         return assembly("bench", part=part, other=other, spring=tie(spring, "part", "other"))
     if isinstance(part, Gear):
@@ -87,16 +91,38 @@ def flat(part: Part) -> FlatModel:
     return flatten(around(part))
 
 
-@pytest.fixture(params=public(), ids=lambda c: c.__name__)
+def named(part: Part) -> str:
+    """Class, readings and domain of an example, as its name."""
+    held = [type(getattr(part, field)).__name__ for field in readings(type(part))]
+    domain = [part.domain.name] if isinstance(part, Element | Body) and len(part.domains()) > 1 else []
+    return "-".join([type(part).__name__, *held, *domain])
+
+
+EXAMPLES = {named(part): part for part in examples()}
+
+
+@pytest.fixture(params=EXAMPLES)
 def part(request: pytest.FixtureRequest) -> Part:
-    kind: type[Part] = request.param
-    known = examples()
-    assert kind in known, f"{kind.__name__} has no example in tests/parts"
-    return known[kind]
+    return EXAMPLES[request.param]
+
+
+@pytest.mark.parametrize("kind", public(), ids=lambda c: c.__name__)
+def test_every_component_has_an_example_in_each_of_its_readings(kind: type[Part]) -> None:
+    mine = [part for part in EXAMPLES.values() if type(part) is kind]
+    assert mine, f"{kind.__name__} has no example in tests/parts"
+    for field, kinds in readings(kind).items():
+        assert {type(getattr(part, field)) for part in mine} == set(kinds), field
+
+
+@pytest.mark.parametrize("kind", public(), ids=lambda c: c.__name__)
+def test_every_element_states_what_it_brings(kind: type[Part]) -> None:
+    if issubclass(kind, Element) and kind not in (Parallel, Series):
+        assert kind.phenomena
+        assert all(word == word.lower() for word in kind.phenomena)
 
 
 def test_units_are_declared_and_symbols_described(part: Part) -> None:
-    for name, info in part.parameter_infos().items():
+    for name, info in part.infos().items():
         assert parse_unit(info.unit), name
         assert info.description.strip(), name
         assert info.minimum < info.maximum, name
@@ -111,17 +137,19 @@ def test_the_law_is_stated_with_its_source(part: Part) -> None:
     assert text, "has no words"
     if isinstance(part, Element | Cam) and type(part).__name__ not in ("Parallel", "Series"):
         assert re.search(r"\bSources?:", text), "names no source of its law"
-    if part.parameter_infos():
+    if part.infos():
         assert "=" in text or "·" in text or ":" in text, "shows no equation"
 
 
 def test_every_number_says_where_it_comes_from(part: Part) -> None:
     for _, each in walk(part):
-        for name, info in type(each).parameter_infos().items():
-            default = next(f for f in each.__dataclass_fields__.values() if f.name == name).default
-            if hasattr(default, "source"):
-                assert default.source.startswith("assumed"), name
-            assert info.checked(name, getattr(each, name)) == getattr(each, name)
+        for name, info in each.infos().items():
+            number = each.parameters()[name]
+            assert info.checked(name, number) == number
+        for holder in (each, *(getattr(each, field) for field in readings(type(each)))):
+            for field in holder.__dataclass_fields__.values():
+                if hasattr(field.default, "source"):
+                    assert field.default.source.startswith("assumed"), field.name
 
 
 def test_the_derivative_is_that_of_the_finite_difference(part: Part) -> None:
@@ -168,6 +196,7 @@ def test_a_deck_says_the_same(part: Part, tmp_path: Path) -> None:
     assert {n: q.values for n, q in again.quantities().items()} == {
         n: q.values for n, q in made.quantities().items()
     }
+    assert again == made
 
 
 def smooth(part: Part) -> FlatModel:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from nlsdesign.components import Inertia, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.control import TorqueGains, torque_controller
 from nlsdesign.errors import UnknownNameError, ValueRangeError
@@ -112,7 +112,9 @@ def test_bad_settings() -> None:
     with pytest.raises(ValueRangeError, match="sample_time"):
         torque_controller(ob.bench(), sample_time=0.0)
     free = flatten(
-        assembly("free", motor=Inertia(inertia=1e-3), spring=tie(TorsionSpring(stiffness=1.0), "motor"))
+        assembly(
+            "free", motor=Inertia(inertia=1e-3), spring=tie(Spring(stiffness=1.0, domain=ROTATION), "motor")
+        )
     )
     with pytest.raises(UnknownNameError, match=r"motor\.gear_ratio"):
         torque_controller(free)

@@ -267,7 +267,7 @@ IMPOSSIBLE = {
     "a torsion spring behind a cam": (
         SOUND[: SOUND.index("[spring.rubber]")]
         + """[spring.coil]
-component = "TorsionSpring"
+component = "Spring"
 stiffness = {value = 1, unit = "N*m/rad", source = "sheet"}
 """,
         "a cam needs a force",

@@ -17,9 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
     DelayedForceSensor,
-    DrivenPoint,
+    Driven,
     Encoder,
     Fixed,
     GearedMotor,
@@ -107,7 +108,9 @@ def test_any_number_comes_back_bit_for_bit(value: float, unit: str, spread: floa
     if not source.strip():
         source = "bench"
     given_number = Quantity(value, unit, source, spread)
-    made = assembly("one", point=DrivenPoint(), spring=tie(Spring(stiffness=given_number), "point"))
+    made = assembly(
+        "one", point=Driven(domain=TRANSLATION), spring=tie(Spring(stiffness=given_number), "point")
+    )
     assert round_trip(made) == made
 
 
@@ -136,7 +139,9 @@ def test_numbers_are_written_short_where_that_is_exact() -> None:
 def test_written_text_is_the_number_to_half_a_digit(value: float) -> None:
     """Exact decimal reading of the text times the factor rounds to the value."""
     made = assembly(
-        "one", point=DrivenPoint(), s=tie(Spring(stiffness=Quantity(value, "N/mm", "x")), "point")
+        "one",
+        point=Driven(domain=TRANSLATION),
+        s=tie(Spring(stiffness=Quantity(value, "N/mm", "x")), "point"),
     )
     raw = tomllib.loads(deck_text(made), parse_float=Decimal)["s"]["stiffness"]["value"]
     assert float(Fraction(raw) * Fraction(parse_unit("N/mm").factor)) == value
@@ -146,7 +151,7 @@ def test_written_text_is_the_number_to_half_a_digit(value: float) -> None:
     "text", ["tab\there", "nul\x00", "bell\x07", "delete\x7f", "ümlaut ∂ 力", 'a "b" \\c', "\r\n"]
 )
 def test_any_text_comes_back(text: str) -> None:
-    made = Assembly("a", (("point", DrivenPoint()),), text)
+    made = Assembly("a", (("point", Driven(domain=TRANSLATION)),), text)
     assert round_trip(made).description == text
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
     CurrentDrivenMotor,
     Encoder,
@@ -13,7 +14,7 @@ from nlsdesign.components import (
     Gear,
     Inertia,
     SampleAndHold,
-    TorsionSpring,
+    Spring,
     TransportDelay,
     tie,
 )
@@ -149,7 +150,10 @@ def test_blocks_say_where_they_are_and_what_drives_them(rig: Assembly) -> None:
 
 def test_a_positioning_drive_without_a_spring_has_one_block() -> None:
     drive = assembly(
-        "drive", stage=Inertia(inertia=0.02), base=Fixed(), end=tie(TorsionSpring(stiffness=1e-3), "stage")
+        "drive",
+        stage=Inertia(inertia=0.02),
+        base=Fixed(),
+        end=tie(Spring(stiffness=1e-3, domain=ROTATION), "stage"),
     )
     (block,) = blocks_of(drive, ["stage.angle", "stage.torque"])
     assert block.name == "stage"

@@ -7,18 +7,19 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
     ConstantForce,
+    CoulombFriction,
     Dashpot,
-    DrivenPoint,
-    FixedPoint,
+    Driven,
+    Fixed,
     FlowingChains,
     ForceSensor,
     LinearDrive,
     LinearElastic,
     NeoHooke,
     PullOnly,
-    SlidingFriction,
     specimen,
     tie,
 )
@@ -43,8 +44,8 @@ def drive() -> Assembly:
 def strip(law: NeoHooke | LinearElastic) -> Assembly:
     return assembly(
         "strip",
-        grip=DrivenPoint(),
-        clamp=FixedPoint(),
+        grip=Driven(domain=TRANSLATION),
+        clamp=Fixed(domain=TRANSLATION),
         strip=tie(specimen(area=1e-5, rest_length=0.08, law=law), "grip", "clamp"),
         load_cell=ForceSensor(of="strip.force"),
     )
@@ -56,7 +57,7 @@ def test_only_friction_and_a_constant_force_can_sit_on_a_carriage() -> None:
 
 @pytest.mark.parametrize(
     ("effect", "kind", "body_force"),
-    [(coulomb_friction, SlidingFriction, -3.0), (constant_force, ConstantForce, -3.0)],
+    [(coulomb_friction, CoulombFriction, -3.0), (constant_force, ConstantForce, -3.0)],
 )
 def test_the_force_on_a_carriage_is_the_stated_one(effect: object, kind: type, body_force: float) -> None:
     (found,) = effect(drive())  # type: ignore[operator]

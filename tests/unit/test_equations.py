@@ -10,19 +10,23 @@ import pytest
 import sympy
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     Assembly,
     CoulombFriction,
+    Dashpot,
     DelayedForceSensor,
-    DrivenPoint,
+    Driven,
     Encoder,
     Fixed,
     GearedMotor,
     LinearElastic,
     Pulley,
-    SmoothStrainStiffening,
+    Rounded,
+    Sharp,
+    Smooth,
     Spring,
     StrainStiffening,
-    TorsionDashpot,
     TwoSidedCam,
     ViscousMaterial,
     parallel,
@@ -41,12 +45,11 @@ from nlsdesign.model.equations import Equations, equations
 
 
 def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
-    law = SmoothStrainStiffening if smooth else StrainStiffening
-    extra = {"width": 0.02} if smooth else {}
+    contact = Rounded(width=0.02) if smooth else Sharp()
     rubber = specimen(
         area=1e-4,
         rest_length=0.0125,
-        stiff=law(modulus=(1e6, 2e6), knots=(0.0, 0.03), **extra),
+        stiff=StrainStiffening(modulus=(1e6, 2e6), knots=(0.0, 0.03), contact=contact),
         relaxing=series(spring=LinearElastic(modulus=5e5), dashpot=ViscousMaterial(viscosity=4e4)),
     )
     return assembly(
@@ -55,7 +58,11 @@ def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
         load=Fixed(),
         spring=tie(through(cam, rope=pull_only(rubber=rubber), pretension=1e-3), "motor", "load"),
         bearing=tie(
-            parallel(oil=TorsionDashpot(damping=1e-3), rub=CoulombFriction(sliding_torque=0.02)), "motor"
+            parallel(
+                oil=Dashpot(damping=1e-3, domain=ROTATION),
+                rub=CoulombFriction(sliding_effort=0.02, contact=Smooth(creep_speed=0.02)),
+            ),
+            "motor",
         ),
         dial=Encoder(of="motor.angle", quantum=1e-3),
         cell=DelayedForceSensor(of="spring.rope.rubber.force", delay=1e-3, gain=1.1, bias=2.0),
@@ -225,6 +232,6 @@ def test_long_definitions_are_shown_as_functions_of_what_they_depend_on() -> Non
 
 def test_names_of_equal_signals_are_all_there() -> None:
     """A spring alone behind a tie: its force and that of the tie are one expression with two names."""
-    made = assembly("a", p=DrivenPoint(), s=tie(parallel(k=Spring(stiffness=3.0)), "p"))
+    made = assembly("a", p=Driven(domain=TRANSLATION), s=tie(parallel(k=Spring(stiffness=3.0)), "p"))
     view = equations(flatten(made))
     assert {"s.k.force", "s.force"} <= set(view.definitions)

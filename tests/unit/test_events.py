@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from nlsdesign.components import DryFriction, Inertia, Play, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Backlash, CoulombFriction, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ExportError
 from nlsdesign.export import natively
@@ -16,7 +16,7 @@ from nlsdesign.export.compilation.cross_compiler import compiler
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.model.transform import replace_state, with_outputs
 from nlsdesign.simulation import Event, Sine, simulate
-from nlsdesign.simulation.events import located
+from nlsdesign.simulation.events import locate_event
 from nlsdesign.simulation.input_signals import drives_of
 
 LAWS: list[tuple[Callable[[float], float], float]] = [
@@ -37,7 +37,7 @@ def test_an_event_is_located_from_behind(law: Callable[[float], float], root: fl
         asked.append(length)
         return law(length)
 
-    found = located(lasts, 1.2, 1e-12)
+    found = locate_event(lasts, 1.2, 1e-12)
     assert root <= found + 1e-15
     assert found - root < 1e-12
     assert asked[-1] == found, "the step that is kept is the last one that was taken"
@@ -48,19 +48,19 @@ def test_an_event_is_located_from_behind(law: Callable[[float], float], root: fl
 def test_smooth_laws_take_few_steps() -> None:
     for law, _ in LAWS[:3]:
         asked: list[float] = []
-        located(lambda h, law=law, asked=asked: asked.append(h) or law(h), 1.2, 1e-12)  # type: ignore[misc]
+        locate_event(lambda h, law=law, asked=asked: asked.append(h) or law(h), 1.2, 1e-12)  # type: ignore[misc]
         assert len(asked) <= 11
 
 
 def gear() -> FlatModel:
-    inside = (("spring", TorsionSpring(stiffness=50.0)),)
+    inside = (("spring", Spring(stiffness=50.0, domain=ROTATION)),)
     return flatten(
         assembly(
             "gear",
             motor=Inertia(inertia=1e-3),
             load=Inertia(inertia=2e-3),
-            play=tie(Play(gap=0.02, members=inside), "motor", "load"),
-            rub=tie(DryFriction(sliding_torque=0.03), "motor"),
+            play=tie(Backlash(gap=0.02, members=inside), "motor", "load"),
+            rub=tie(CoulombFriction(sliding_effort=0.03), "motor"),
         )
     )
 
@@ -104,8 +104,8 @@ def test_other_views_keep_switches_or_refuse() -> None:
         assembly(
             "a",
             wheel=Inertia(inertia=1e-3),
-            s=tie(TorsionSpring(stiffness=2.0), "wheel"),
-            rub=tie(DryFriction(sliding_torque=0.03), "wheel"),
+            s=tie(Spring(stiffness=2.0, domain=ROTATION), "wheel"),
+            rub=tie(CoulombFriction(sliding_effort=0.03), "wheel"),
         )
     )
     with pytest.raises(ArrangementError, match=r"'rub' is not smooth.*smoothed\(assembly\)"):
@@ -115,7 +115,7 @@ def test_other_views_keep_switches_or_refuse() -> None:
 def test_equations_at_rest_are_those_of_sticking() -> None:
     """Without simulation too: at exactly zero speed the friction holds, just beside it slips."""
     model = flatten(
-        assembly("a", wheel=Inertia(inertia=1e-3), rub=tie(DryFriction(sliding_torque=0.03), "wheel"))
+        assembly("a", wheel=Inertia(inertia=1e-3), rub=tie(CoulombFriction(sliding_effort=0.03), "wheel"))
     )
     assert model.evaluate([0.0, 0.0], [0.02])["rub.torque"] == 0.02
     assert model.evaluate([0.0, 0.0], [0.02])["der(wheel.speed)"] == 0.0

@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     Assembly,
     Dashpot,
     Domain,
     Driven,
-    DrivenPoint,
     Encoder,
     Fixed,
     GearedMotor,
@@ -28,8 +29,6 @@ from nlsdesign.components import (
     Pulley,
     Spring,
     StrainStiffening,
-    TorsionDashpot,
-    TorsionSpring,
     ViscousMaterial,
     series,
     specimen,
@@ -38,7 +37,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.components.core.element import TRANSLATION, Element, Scope
+from nlsdesign.components.core.element import Element, Scope
 from nlsdesign.components.core.part import parameter
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ArrangementError, NlsError, UnitError, UnknownNameError, ValueRangeError
@@ -79,7 +78,7 @@ def bench() -> Assembly:
         motor=GearedMotor(inertia=6e-4, gear_ratio=4, torque_constant=0.055),
         hand=Driven(),
         spring=tie(through(Pulley(radius=0.01), rubber=rubber), "motor", "hand"),
-        bearing=tie(TorsionDashpot(damping=1e-3), "motor"),
+        bearing=tie(Dashpot(damping=1e-3, domain=ROTATION), "motor"),
         encoder=Encoder(of="motor.angle", quantum=1e-3),
     )
 
@@ -89,7 +88,9 @@ def bench() -> Assembly:
 
 def test_parameters_stand_in_written_order_whatever_the_laws_ask_first() -> None:
     made = assembly(
-        "a", p=DrivenPoint(), s=tie(series(x=Backwards(first=1, second=2), y=Spring(stiffness=3)), "p")
+        "a",
+        p=Driven(domain=TRANSLATION),
+        s=tie(series(x=Backwards(first=1, second=2), y=Spring(stiffness=3)), "p"),
     )
     assert [v.name for v in flatten(made).parameters] == ["s.x.first", "s.x.second", "s.y.stiffness"]
 
@@ -204,7 +205,9 @@ def test_a_body_keeps_its_motion_even_if_nothing_asks_for_it() -> None:
 def test_a_state_that_changes_nothing_is_dropped() -> None:
     """The place of a dashpot between dashpots: only its rate matters."""
     model = flatten(
-        assembly("a", p=DrivenPoint(), s=tie(series(x=Dashpot(damping=1), y=Dashpot(damping=2)), "p"))
+        assembly(
+            "a", p=Driven(domain=TRANSLATION), s=tie(series(x=Dashpot(damping=1), y=Dashpot(damping=2)), "p")
+        )
     )
     assert all(np.isfinite(list(model.evaluate([0.0] * len(model.states), [0.0, 1.0]).values())))
     assert model.evaluate([0.0] * len(model.states), [0.0, 3.0])["s.force"] == pytest.approx(2.0)
@@ -216,14 +219,16 @@ SINGULAR = {
     "a torsion dashpot of zero in series": lambda: assembly(
         "a",
         p=Driven(),
-        s=tie(series(k=TorsionSpring(stiffness=1.0), c=TorsionDashpot(damping=0.0)), "p"),
+        s=tie(series(k=Spring(stiffness=1.0, domain=ROTATION), c=Dashpot(damping=0.0, domain=ROTATION)), "p"),
     ),
     "two dashpots of zero in series": lambda: assembly(
-        "a", p=Driven(), s=tie(series(k=TorsionDashpot(damping=0.0), c=TorsionDashpot(damping=0.0)), "p")
+        "a",
+        p=Driven(),
+        s=tie(series(k=Dashpot(damping=0.0, domain=ROTATION), c=Dashpot(damping=0.0, domain=ROTATION)), "p"),
     ),
     "two springs of zero in series": lambda: assembly(
         "a",
-        p=DrivenPoint(),
+        p=Driven(domain=TRANSLATION),
         s=tie(series(k=Backwards(first=0.0, second=0.0), c=Backwards(first=0.0, second=0.0)), "p"),
     ),
 }
@@ -349,10 +354,14 @@ def test_model_looks_its_tables_up_by_state_and_input() -> None:
 
 def test_reactions_hold_what_the_elements_ask() -> None:
     """Newton's third law: what moves the one end is what the other end holds."""
-    made = assembly("a", m=Mass(mass=2.0), p=DrivenPoint(), s=tie(Spring(stiffness=5.0), "p", "m"))
+    made = assembly(
+        "a", m=Mass(mass=2.0), p=Driven(domain=TRANSLATION), s=tie(Spring(stiffness=5.0), "p", "m")
+    )
     at = flatten(made, outputs=["s.force"]).evaluate([0.0, 0.0], [0.0, 0.3, 0.0])
     assert at["s.force"] == pytest.approx(1.5)
     assert at["p.reaction"] == pytest.approx(1.5)
     assert at["m.acceleration"] == pytest.approx(0.75)
-    wall = assembly("b", m=Inertia(inertia=2.0), w=Fixed(), s=tie(TorsionSpring(stiffness=5.0), "m", "w"))
+    wall = assembly(
+        "b", m=Inertia(inertia=2.0), w=Fixed(), s=tie(Spring(stiffness=5.0, domain=ROTATION), "m", "w")
+    )
     assert flatten(wall).evaluate([0.3, 0.0])["w.reaction"] == pytest.approx(-1.5)

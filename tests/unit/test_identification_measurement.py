@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly, Encoder, Inertia, TorqueSensor, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Assembly, Encoder, Inertia, Spring, TorqueSensor, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import RecordSet, load_record, load_records
@@ -20,7 +20,10 @@ HEADS = ("t_s", "theta_deg", "torque_Nm")
 
 def wheel(**sensors: object) -> Assembly:
     return assembly(
-        "wheel", wheel=Inertia(inertia=0.01), spring=tie(TorsionSpring(stiffness=3.0), "wheel"), **sensors
+        "wheel",
+        wheel=Inertia(inertia=0.01),
+        spring=tie(Spring(stiffness=3.0, domain=ROTATION), "wheel"),
+        **sensors,
     )
 
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
     LinearElastic,
     SlidingFillers,
+    Spring,
     StrainStiffening,
-    TorsionSpring,
     ViscousMaterial,
     series,
     specimen,
@@ -149,7 +150,9 @@ def test_the_published_form_has_the_same_interface(model: FlatModel) -> None:
 
 
 def test_a_linear_spring_needs_no_inner_state() -> None:
-    parts = dict(ob.actuator().parts) | {"spring": tie(TorsionSpring(stiffness=1.7), "motor", "load")}
+    parts = dict(ob.actuator().parts) | {
+        "spring": tie(Spring(stiffness=1.7, domain=ROTATION), "motor", "load")
+    }
     model = flatten(assembly("soft", **parts), outputs=["motor.angle", "spring.torque"])
     design = observer_design(model)
     assert whole_contour(model).upper == pytest.approx(np.pi / 2.0)

@@ -1,4 +1,4 @@
-"""Work shared out among processes: same results, same order, nobody left behind."""
+"""Parallel map: same results, same order, no process left behind."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.parallel_map import parallel_map
+from nlsdesign.parallel import parallel_map
 
 ENDLESS = """
 import time
-from nlsdesign.parallel_map import parallel_map
+from nlsdesign.parallel import parallel_map
 
 def work(number):
     print("at work", flush=True)

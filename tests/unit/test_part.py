@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     Assembly,
     Dashpot,
     Driven,
-    DrivenPoint,
     Encoder,
     Fixed,
     ForceSensor,
@@ -27,7 +28,6 @@ from nlsdesign.components import (
     Specimen,
     Spring,
     StrainStiffening,
-    TorsionSpring,
     parallel,
     pull_only,
     series,
@@ -208,9 +208,9 @@ def test_a_part_is_found_replaced_added_and_taken_away() -> None:
     assert stiffer.with_part("spring.rubber.relaxing.spring", LinearElastic(modulus=5e5)) == first
     more = first.with_part("spring.rubber.second", LinearElastic(modulus=1e5))
     assert isinstance(more["spring.rubber.second"], LinearElastic)
-    kept = first.with_part("spring", TorsionSpring(stiffness=3.0))
+    kept = first.with_part("spring", Spring(stiffness=3.0, domain=ROTATION))
     assert kept["spring"].between == ("shaft", "frame")  # type: ignore[attr-defined]
-    added = first.with_part("brake", tie(TorsionSpring(stiffness=1.0), "shaft"))
+    added = first.with_part("brake", tie(Spring(stiffness=1.0, domain=ROTATION), "shaft"))
     assert added.without_part("brake") == first
     assert first.element("spring.rubber") == rubber()
 
@@ -239,24 +239,30 @@ REFUSED = {
     "two members of one name": lambda: Parallel(
         members=(("a", Spring(stiffness=1)), ("a", Spring(stiffness=2)))
     ),
-    "two parts of one name": lambda: Assembly("a", (("p", DrivenPoint()), ("p", Mass(mass=1)))),
+    "two parts of one name": lambda: Assembly("a", (("p", Driven(domain=TRANSLATION)), ("p", Mass(mass=1)))),
     "a name with a dot": lambda: parallel(**{"a.b": Spring(stiffness=1)}),
-    "a name with a bracket": lambda: assembly("a", **{"p[1]": DrivenPoint()}),
+    "a name with a bracket": lambda: assembly("a", **{"p[1]": Driven(domain=TRANSLATION)}),
     "a member called like a number": lambda: Specimen(
         area=1e-4, rest_length=0.1, members=(("area", LinearElastic(modulus=1e6)),)
     ),
     "a member called like a key of a deck": lambda: parallel(between=Spring(stiffness=1)),
-    "a part called like the head of a deck": lambda: assembly("a", deck=DrivenPoint()),
+    "a part called like the head of a deck": lambda: assembly("a", deck=Driven(domain=TRANSLATION)),
     "nothing in series": lambda: series(),
     "a body in series": lambda: series(a=Mass(mass=1)),
-    "angle and extension in parallel": lambda: parallel(a=Spring(stiffness=1), b=TorsionSpring(stiffness=1)),
-    "extension and angle in series": lambda: series(a=TorsionSpring(stiffness=1), b=Spring(stiffness=1)),
-    "a spring of N/m in a specimen": lambda: specimen(area=1e-4, rest_length=0.1, a=Spring(stiffness=1)),
-    "a material on a point": lambda: assembly("a", p=DrivenPoint(), s=tie(LinearElastic(modulus=1e6), "p")),
-    "a torsion spring on a point": lambda: assembly(
-        "a", p=DrivenPoint(), s=tie(TorsionSpring(stiffness=1), "p")
+    "angle and extension in parallel": lambda: parallel(
+        a=Spring(stiffness=1), b=Spring(stiffness=1, domain=ROTATION)
     ),
-    "an angle behind a cam": lambda: through(Pulley(radius=0.01), a=TorsionSpring(stiffness=1)),
+    "extension and angle in series": lambda: series(
+        a=Spring(stiffness=1, domain=ROTATION), b=Spring(stiffness=1)
+    ),
+    "a spring of N/m in a specimen": lambda: specimen(area=1e-4, rest_length=0.1, a=Spring(stiffness=1)),
+    "a material on a point": lambda: assembly(
+        "a", p=Driven(domain=TRANSLATION), s=tie(LinearElastic(modulus=1e6), "p")
+    ),
+    "a torsion spring on a point": lambda: assembly(
+        "a", p=Driven(domain=TRANSLATION), s=tie(Spring(stiffness=1, domain=ROTATION), "p")
+    ),
+    "an angle behind a cam": lambda: through(Pulley(radius=0.01), a=Spring(stiffness=1, domain=ROTATION)),
     "a body behind a cam": lambda: through(Pulley(radius=0.01), a=Mass(mass=1)),
     "a sensor behind a cam": lambda: through(Pulley(radius=0.01), a=Encoder(of="x", quantum=1)),
     "a spring for a cam": lambda: through(Spring(stiffness=1), a=Spring(stiffness=1)),
@@ -267,14 +273,16 @@ REFUSED = {
     "a spring to nobody": lambda: tie(Spring(stiffness=1)),
     "a spring between three": lambda: tie(Spring(stiffness=1), "a", "b", "c"),
     "a body for an element": lambda: tie(Mass(mass=1), "a"),
-    "a spring to a stranger": lambda: assembly("a", p=DrivenPoint(), s=tie(Spring(stiffness=1), "q")),
+    "a spring to a stranger": lambda: assembly(
+        "a", p=Driven(domain=TRANSLATION), s=tie(Spring(stiffness=1), "q")
+    ),
     "a spring from a body to itself": lambda: assembly(
-        "a", p=DrivenPoint(), s=tie(Spring(stiffness=1), "p", "p")
+        "a", p=Driven(domain=TRANSLATION), s=tie(Spring(stiffness=1), "p", "p")
     ),
     "a spring between two walls": lambda: assembly(
-        "a", p=Fixed(), q=Fixed(), s=tie(TorsionSpring(stiffness=1), "p", "q")
+        "a", p=Fixed(), q=Fixed(), s=tie(Spring(stiffness=1, domain=ROTATION), "p", "q")
     ),
-    "an element without a tie": lambda: assembly("a", p=DrivenPoint(), s=Dashpot(damping=1)),
+    "an element without a tie": lambda: assembly("a", p=Driven(domain=TRANSLATION), s=Dashpot(damping=1)),
     "no body": lambda: assembly("a"),
 }
 
@@ -288,4 +296,4 @@ def test_impossible_arrangements_are_refused(name: str) -> None:
 
 
 def test_a_shaft_is_driven_a_point_is_not() -> None:
-    assert assembly("a", p=Driven(), s=tie(TorsionSpring(stiffness=1), "p"))["p"] == Driven()
+    assert assembly("a", p=Driven(), s=tie(Spring(stiffness=1, domain=ROTATION), "p"))["p"] == Driven()

@@ -13,7 +13,8 @@ from click.testing import CliRunner
 
 from nlsdesign.cli.main import program
 from nlsdesign.components import (
-    DrivenPoint,
+    TRANSLATION,
+    Driven,
     LinearElastic,
     NeoHooke,
     Spring,
@@ -76,7 +77,7 @@ def test_a_member_in_series_is_watched_by_its_own_strain() -> None:
     assert simulate(inside, TIMES, inputs={"grip.position": 0.6 * LENGTH}).warnings
     piece = specimen(area=1e-4, rest_length=LENGTH, law=NeoHooke(shear_modulus=0.4e6))
     chain = {"soft": Spring(stiffness=100.0), "piece": piece}
-    made = assembly("chain", grip=DrivenPoint(), line=tie(series(**chain), "grip"))
+    made = assembly("chain", grip=Driven(domain=TRANSLATION), line=tie(series(**chain), "grip"))
     trace = simulate(flatten(made), TIMES, inputs={"grip.position": 0.6 * LENGTH})
     assert trace.warnings == ()
     assert 0.0 < trace["line.piece.law.strain"][0] < 0.1
@@ -96,7 +97,8 @@ DECK = """
 name = "pulled"
 description = "a piece of rubber in a grip"
 [grip]
-component = "DrivenPoint"
+component = "Driven"
+domain = "translation"
 [rubber]
 component = "Specimen"
 between = ["grip"]
@@ -140,8 +142,8 @@ def test_the_report_lists_what_was_left_and_says_so_if_nothing_was() -> None:
     assert table.marked == {0}
     quiet = range_table("Stated ranges", {"soft pull": stretched_to(0.2)})
     assert quiet.rows == ()
-    assert "within the range" in quiet.caption
-    assert "within the range" in report_text(Path(), [quiet], title="quiet")
+    assert "within its stated range" in quiet.caption
+    assert "within its stated range" in report_text(Path(), [quiet], title="quiet")
 
 
 def test_a_piecewise_law_of_tension_says_when_it_is_compressed() -> None:

@@ -20,7 +20,7 @@ import pytest
 import sympy
 
 from nlsdesign import report
-from nlsdesign.components import Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
@@ -72,7 +72,7 @@ class Page(HTMLParser):
 
 
 def swing(name: str = "swing") -> Any:
-    spring, damper = TorsionSpring(stiffness=2.0), TorsionDashpot(damping=0.01)
+    spring, damper = Spring(stiffness=2.0, domain=ROTATION), Dashpot(damping=0.01, domain=ROTATION)
     return assembly(
         name, wheel=Inertia(inertia=1e-3), spring=tie(spring, "wheel"), damper=tie(damper, "wheel")
     )
@@ -478,7 +478,9 @@ def test_a_missing_folder_is_made(tmp_path: Path) -> None:
 
 
 def test_a_report_on_a_diagnosis_has_units_on_every_axis() -> None:
-    wheel = assembly("wheel", load=Inertia(inertia=1e-3), spring=tie(TorsionSpring(stiffness=2.0), "load"))
+    wheel = assembly(
+        "wheel", load=Inertia(inertia=1e-3), spring=tie(Spring(stiffness=2.0, domain=ROTATION), "load")
+    )
     bins = SimpleNamespace(centre=np.linspace(0.0, 1.0, 5), mean=np.linspace(0.1, 0.2, 5))
     time = np.linspace(0.0, 1.0, 50)
     diagnosis = SimpleNamespace(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import (
+    ROTATION,
     Assembly,
     CurrentSensor,
     Encoder,
@@ -16,9 +17,9 @@ from nlsdesign.components import (
     SampleAndHold,
     SampledEncoder,
     Sensor,
+    Spring,
     Tachometer,
     TorqueSensor,
-    TorsionSpring,
     tie,
 )
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
@@ -31,7 +32,9 @@ from nlsdesign.simulation import Trace, measure
 
 def bench(**sensors: Sensor) -> Assembly:
     motor = GearedMotor(inertia=1e-3, gear_ratio=4.0, torque_constant=0.05)
-    return assembly("bench", motor=motor, spring=tie(TorsionSpring(stiffness=2.0), "motor"), **sensors)
+    return assembly(
+        "bench", motor=motor, spring=tie(Spring(stiffness=2.0, domain=ROTATION), "motor"), **sensors
+    )
 
 
 WRONG = {

@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 from scipy.interpolate import pade
 
 from nlsdesign.components import (
+    TRANSLATION,
     Assembly,
     CurrentSensor,
     DelayedForceSensor,
-    DrivenPoint,
+    Driven,
     Encoder,
     ForceSensor,
     GearedMotor,
@@ -37,7 +38,9 @@ DELAY = 2e-3
 
 
 def pulled(**sensor: Sensor) -> Assembly:
-    return assembly("pulled", grip=DrivenPoint(), spring=tie(Spring(stiffness=1000.0), "grip"), **sensor)
+    return assembly(
+        "pulled", grip=Driven(domain=TRANSLATION), spring=tie(Spring(stiffness=1000.0), "grip"), **sensor
+    )
 
 
 @given(st.floats(-10.0, 10.0), st.sampled_from([0.767e-3, 1e-3, 0.25]))

@@ -18,16 +18,16 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from nlsdesign.components import (
+    ROTATION,
+    TRANSLATION,
     Assembly,
     CoulombFriction,
     Dashpot,
     Driven,
-    DrivenPoint,
     Inertia,
     Mass,
+    Smooth,
     Spring,
-    TorsionDashpot,
-    TorsionSpring,
     parallel,
     series,
     tie,
@@ -129,8 +129,8 @@ def test_dry_friction_against_another_integrator() -> None:
     made = assembly(
         "rub",
         wheel=Inertia(inertia=1e-3),
-        spring=tie(TorsionSpring(stiffness=2.0), "wheel"),
-        rub=tie(CoulombFriction(sliding_torque=0.05, creep_speed=0.01), "wheel"),
+        spring=tie(Spring(stiffness=2.0, domain=ROTATION), "wheel"),
+        rub=tie(CoulombFriction(sliding_effort=0.05, contact=Smooth(creep_speed=0.01)), "wheel"),
     )
     times = np.linspace(0.0, 0.5, 51)
     run = simulate(flatten(made), times, start={"wheel.angle": 0.3}, tolerance=1e-11)
@@ -145,7 +145,9 @@ def test_dry_friction_against_another_integrator() -> None:
 
 def test_energy_of_inertia_and_spring_stays() -> None:
     """A hundred swings without loss: ½Jω² + ½kθ² stays to 1e-8, and the phase is √(k/J)·t."""
-    made = assembly("w", wheel=Inertia(inertia=0.02), spring=tie(TorsionSpring(stiffness=8.0), "wheel"))
+    made = assembly(
+        "w", wheel=Inertia(inertia=0.02), spring=tie(Spring(stiffness=8.0, domain=ROTATION), "wheel")
+    )
     period = 2 * math.pi / math.sqrt(8.0 / 0.02)
     times = np.linspace(0.0, 100 * period, 2001)
     run = simulate(flatten(made), times, start={"wheel.angle": 0.5})
@@ -201,7 +203,9 @@ def test_stiff_models_are_handed_over(drive: str) -> None:
 def test_both_methods_agree_with_several_inputs(hold: bool) -> None:
     """A mass between a force and a moving grip: three inputs, none of which may be taken for another."""
     inside = parallel(k=Spring(stiffness=40.0), c=Dashpot(damping=0.5))
-    made = assembly("m", mass=Mass(mass=1.3), grip=DrivenPoint(), link=tie(inside, "mass", "grip"))
+    made = assembly(
+        "m", mass=Mass(mass=1.3), grip=Driven(domain=TRANSLATION), link=tie(inside, "mass", "grip")
+    )
     model, times, draw = flatten(made), np.linspace(0.0, 1.0, 21), np.random.default_rng(6)
     given = {v.name: draw.normal(size=21) for v in model.inputs}
     drives = drives_of(model, times, given, hold=hold)
@@ -274,7 +278,11 @@ def test_a_trace_holds_everything_by_name_with_units() -> None:
 
 def test_models_without_states_are_evaluated() -> None:
     model = flatten(
-        assembly("s", p=DrivenPoint(), s=tie(parallel(k=Spring(stiffness=3), c=Dashpot(damping=2)), "p"))
+        assembly(
+            "s",
+            p=Driven(domain=TRANSLATION),
+            s=tie(parallel(k=Spring(stiffness=3), c=Dashpot(damping=2)), "p"),
+        )
     )
     run = simulate(model, TIMES, inputs={"p.position": np.sin(TIMES), "p.speed": np.cos(TIMES)})
     assert run["s.force"] == pytest.approx(3 * np.sin(TIMES) + 2 * np.cos(TIMES), abs=1e-13)
@@ -388,7 +396,13 @@ def test_an_equation_that_was_not_solved_is_an_error() -> None:
     made = assembly(
         "slip",
         shaft=Driven(),
-        s=tie(series(k=TorsionSpring(stiffness=1.0), brake=CoulombFriction(sliding_torque=0.1)), "shaft"),
+        s=tie(
+            series(
+                k=Spring(stiffness=1.0, domain=ROTATION),
+                brake=CoulombFriction(sliding_effort=0.1, contact=Smooth(creep_speed=0.02)),
+            ),
+            "shaft",
+        ),
     )
     model = flatten(made)
     ramp = {"shaft.angle": lambda t: 0.05 * t, "shaft.speed": lambda t: 0.05}
@@ -412,8 +426,8 @@ def test_no_oscillation_is_lost_on_a_coarse_grid() -> None:
     made = assembly(
         "w",
         wheel=Inertia(inertia=0.02),
-        d=tie(TorsionDashpot(damping=1e-4), "wheel"),
-        spring=tie(TorsionSpring(stiffness=8.0), "wheel"),
+        d=tie(Dashpot(damping=1e-4, domain=ROTATION), "wheel"),
+        spring=tie(Spring(stiffness=8.0, domain=ROTATION), "wheel"),
     )
     run = simulate(flatten(made), np.array([0.0, 5.0, 10.0]), start={"wheel.angle": 0.5})
     decay = 1e-4 / 0.04

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nlsdesign.components import Driven, DrivenPoint, Encoder, ForceSensor, SampleAndHold, Spring, tie
+from nlsdesign.components import TRANSLATION, Driven, Encoder, ForceSensor, SampleAndHold, Spring, tie
 from nlsdesign.components import assembly as assemble
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
@@ -59,7 +59,7 @@ def test_what_only_pushes_or_rubs_is_no_spring() -> None:
 
 
 def test_a_prescribed_motion_is_a_body_without_inertia() -> None:
-    pulled = assemble("pulled", grip=DrivenPoint(), rubber=tie(Spring(stiffness=100.0), "grip"))
+    pulled = assemble("pulled", grip=Driven(domain=TRANSLATION), rubber=tie(Spring(stiffness=100.0), "grip"))
     (grip,) = flatten(pulled).bodies
     assert grip.prescribed
     assert (grip.motion, grip.rate, grip.drives) == ("grip.position", "grip.speed", ())
@@ -69,7 +69,7 @@ def test_a_reading_names_the_whole_chain_of_sensors() -> None:
     chain = assemble(
         "chain",
         shaft=Driven(),
-        grip=DrivenPoint(),
+        grip=Driven(domain=TRANSLATION),
         rubber=tie(Spring(stiffness=100.0), "grip"),
         encoder=Encoder(of="shaft.angle", quantum=1e-3),
         latch=SampleAndHold(of="encoder.reading", sample_rate=1e3),

@@ -14,13 +14,16 @@ from typing import Any
 from ...deck import NUMBER_FIELDS, Deck
 from ...errors import DeckError, NlsError, nearest, unknown_name
 from ...quantity import Quantity
+from ..core.domain import Domain
 from ..core.element import Combination, Element
+from ..core.parameters import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.part import Part
 from ..core.tie import Tie
 from ..mechanics.bodies import Body
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
+from .renamed import NUMBERS, renamed
 
 
 @functools.cache
@@ -73,20 +76,22 @@ class Builder:
         children = {key: self.part(f"{path}.{key}", raw) for key, raw in inner.items()}
         if kind is None:
             return None
-        fields = self.numbers(path, table, kind)
+        made = {key: child for key, child in children.items() if child is not None}
+        fields = self.fields(path, table, kind, next(iter(made.values()), None))
         if inner and not issubclass(kind, Combination | Through):
             self._problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
-        complete = {key: child for key, child in children.items() if child is not None}
-        if len(self.problems) > before or len(complete) < len(children):
+        if len(self.problems) > before or len(made) < len(children):
             return None
         try:
-            return kind(**fields, **_structure(kind, table, complete))
+            return kind(**fields, **_structure(kind, table, made))
         except NlsError as error:
             self.problems.append(error.at(self.deck.place(path)))
             return None
 
-    def numbers(self, path: str, table: Mapping[str, Any], kind: type[Part]) -> dict[str, Quantity]:
-        """Return the numbers of a part; fields that it does not have or that are missing are problems.
+    def fields(
+        self, path: str, table: Mapping[str, Any], kind: type[Part], inner: Part | None = None
+    ) -> dict[str, Any]:
+        """Return the numbers, readings and domain of a part; what it lacks or does not have are problems.
 
         Parameters
         ----------
@@ -94,38 +99,95 @@ class Builder:
             As for :meth:`part`.
         kind
             The component.
+        inner
+            A part inside, whose domain is that of the numbers; ``None`` where there is none.
         """
-        infos, quantities = kind.parameter_infos(), {}
+        names, keys = kind.parameter_infos(), self._keys(path, kind)
+        given: dict[str, Quantity] = {}
         intended: set[str | None] = set()
-        keys = self._keys(path, kind)
         for key, raw in table.items():
             full = f"{path}.{key}"
-            if key in infos:
+            if key in names:
                 try:
-                    given = self.deck.number(full, raw)
+                    given[key] = self.deck.number(full, raw)
                 except NlsError as error:
                     self.problems.append(error)
-                    continue
-                try:
-                    quantities[key] = infos[key].checked(key, given)
-                except NlsError as error:
-                    self.problems.append(error.at(self.deck.place(full)))
             elif key not in keys and not _is_part(raw):
-                rule, step = (
-                    f"{kind.__name__} has no field '{key}'",
-                    f"fields are: {', '.join([*keys, *infos])}",
-                )
-                intended.add(nearest(key, [*keys, *infos]))
-                self._problem(full, rule, did_you_mean=nearest(key, [*keys, *infos]), next_step=step)
-        for field in dataclasses.fields(kind):
-            # A misspelt field has been reported already.
-            missing = field.name in infos and field.name not in table and field.name not in intended
-            if missing and field.default is dataclasses.MISSING:
-                step = (
-                    f'add {field.name} = {{value = ..., unit = "{infos[field.name].unit}", source = "..."}}'
-                )
-                self._problem(path, f"{kind.__name__} needs '{field.name}'", next_step=step)
-        return quantities
+                valid = [*keys, *names]
+                new = NUMBERS.get(key)
+                near = new if new in names else nearest(key, valid)
+                intended.add(near)
+                step = f"fields are: {', '.join(valid)}"
+                rule = f"{kind.__name__} has no field '{key}'"
+                self._problem(full, rule, did_you_mean=near, next_step=step)
+        stated = self._stated_domain(path, table, kind)
+        domain = stated or _domain_of(kind, given, inner)
+        infos = kind.parameter_infos(domain)
+        sound: dict[str, Quantity] = {}
+        for key, number in given.items():
+            try:
+                sound[key] = infos[key].checked(key, number)
+            except NlsError as error:
+                self.problems.append(error.at(self.deck.place(f"{path}.{key}")))
+        # What stands there misspelt, or is not sound, has been named already.
+        there = {*table, *intended}
+        self._missing(path, kind, kind, infos, there)
+        fields: dict[str, Any] = {name: q for name, q in sound.items() if name in templates(kind)}
+        if stated:
+            fields["domain"] = stated
+        return fields | {
+            name: reading
+            for name, kinds in readings(kind).items()
+            if (reading := self._reading(path, kind, kinds, infos, (there, sound))) is not None
+        }
+
+    def _reading(
+        self,
+        path: str,
+        kind: type[Part],
+        kinds: tuple[type[Reading], ...],
+        infos: Mapping[str, ParameterInfo],
+        numbers: tuple[set[str | None], Mapping[str, Quantity]],
+    ) -> Reading | None:
+        """Return the reading whose numbers a table has; where it has none the part takes its own."""
+        there, sound = numbers
+        asked = {name for each in kinds for name in templates(each)} & there
+        fitting = [each for each in kinds if asked <= set(templates(each))]
+        if not fitting:
+            ways = "; or ".join(f"{' and '.join(templates(e))} ({e.__name__})" for e in kinds if templates(e))
+            rule = f"{kind.__name__} has either {ways}, not {' and '.join(sorted(map(str, asked)))}"
+            self._problem(path, rule, next_step="keep those of one way")
+            return None
+        holder = next(f for f in dataclasses.fields(kind) if f.metadata.get("readings") == kinds)
+        if not asked and holder.default is not dataclasses.MISSING:
+            return None
+        best = min(fitting, key=lambda each: len(_needed(each) - asked))
+        self._missing(path, kind, best, infos, there)
+        numbers_of_it = {name: q for name, q in sound.items() if name in templates(best)}
+        return best(**numbers_of_it) if _needed(best) <= set(numbers_of_it) else None
+
+    def _missing(
+        self,
+        path: str,
+        kind: type[Part],
+        holder: type,
+        infos: Mapping[str, ParameterInfo],
+        there: set[str | None],
+    ) -> None:
+        for name in templates(holder):
+            if name in _needed(holder) and name not in there:
+                step = f'add {name} = {{value = ..., unit = "{infos[name].unit}", source = "..."}}'
+                self._problem(path, f"{kind.__name__} needs '{name}'", next_step=step)
+
+    def _stated_domain(self, path: str, table: Mapping[str, Any], kind: type[Part]) -> Domain | None:
+        if "domain" not in table or "domain" not in self._keys(path, kind):
+            return None
+        known = {domain.name: domain for domain in kind.domains()}
+        if table["domain"] not in known:
+            rule = f"is {table['domain']!r}, not a domain of {kind.__name__}"
+            self._problem(f"{path}.domain", rule, next_step=f"write one of: {', '.join(known)}")
+            return None
+        return known[table["domain"]]
 
     def tied(self, name: str, element: Part | None, table: Mapping[str, Any]) -> Tie | None:
         """Return an element of the top level with the bodies at its ends.
@@ -186,6 +248,10 @@ class Builder:
                 next_step='write component = "..."',
             )
             return None
+        old = renamed(str(name))
+        if old:
+            self.problems.append(old.at(self.deck.place(f"{path}.component")))
+            return None
         if not isinstance(name, str) or name not in self.classes:
             self._problem(
                 f"{path}.component",
@@ -203,7 +269,8 @@ class Builder:
 
     def _keys(self, path: str, kind: type[Part]) -> list[str]:
         tied = (issubclass(kind, Element) and "." not in path) or issubclass(kind, Gear)
-        return ["component"] + ["between"] * tied + ["of"] * issubclass(kind, Sensor)
+        free = any("domains" in field.metadata for field in dataclasses.fields(kind))
+        return ["component"] + ["between"] * tied + ["of"] * issubclass(kind, Sensor) + ["domain"] * free
 
     def _problem(
         self, full_name: str, rule: str, *, did_you_mean: str | None = None, next_step: str | None = None
@@ -215,6 +282,26 @@ class Builder:
 def _is_part(raw: object) -> bool:
     """Tell a table of a part, even one whose component is missing, from a number."""
     return isinstance(raw, dict) and ("component" in raw or not set(raw) & set(NUMBER_FIELDS))
+
+
+def _needed(holder: type) -> set[str]:
+    """Return the names of the numbers without a default."""
+    fields = {field.name: field for field in dataclasses.fields(holder)}
+    return {name for name in templates(holder) if fields[name].default is dataclasses.MISSING}
+
+
+def _domain_of(kind: type[Part], given: Mapping[str, Quantity], inner: Part | None) -> Domain | None:
+    """Return the domain that the part inside has, or that the units tell."""
+    if not kind.domains():
+        return None
+    if isinstance(inner, Element) and inner.domain in kind.domains():
+        return inner.domain
+    named = {
+        name: template
+        for holder in (kind, *(each for kinds in readings(kind).values() for each in kinds))
+        for name, template in templates(holder).items()
+    }
+    return domain_by_units(kind.domains(), named, given)
 
 
 def _is_pair(raw: object) -> bool:

@@ -111,6 +111,9 @@ def write_deck(assembly: Assembly, path: Path) -> None:
 
 def _table(path: str, part: Part, structure: list[str]) -> list[str]:
     lines = ["", f"[{path}]", f"component = {_string(type(part).__name__)}", *structure]
+    domain = part.stated_domain()
+    if domain:
+        lines.append(f"domain = {_string(domain.name)}")
     lines += [f"{name} = {_number(q)}" for name, q in part.parameters().items()]
     for name, child in part.children().items():
         lines += _table(f"{path}.{name}", child, [])
@@ -140,7 +143,7 @@ def _string(text: str) -> str:
 
 
 def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
-    """Return the numbers that stand directly in one table of a deck, by field name.
+    """Return the numbers and readings that stand directly in one table of a deck, by field name.
 
     Parameters
     ----------
@@ -165,7 +168,7 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
             deck.place(path), rule, next_step="use declare(deck), which takes any deck as it stands"
         )
     builder = Builder(deck)
-    quantities = builder.numbers(path, table, kind)
+    quantities = builder.fields(path, table, kind)
     if builder.problems:
         raise builder.problems[0]
     return quantities

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...errors import ArrangementError, NlsError, unknown_name
 from ...quantity import Quantity
-from ..core.element import Element
+from ..core.element import Element, Parallel
 from ..core.part import Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, Fixed
@@ -163,6 +163,33 @@ class Assembly:
             raise unknown_name("part", name, dict(self.parts))
         return replace(self, parts=tuple((n, p) for n, p in self.parts if n != name))
 
+    def has(self, path: str, phenomenon: str) -> bool:
+        """Tell whether a body or a part has a phenomenon already.
+
+        Parameters
+        ----------
+        path
+            Of a body: all that is tied to it is looked at. Of another part: the part, what is inside it and
+            what is around it.
+        phenomenon
+            As parts state it in :attr:`Part.phenomena`, for instance ``"dry friction"``.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest path that exists.
+        """
+        if isinstance(self[path], Body):
+            ties = {name for name, part in self.parts if isinstance(part, Tie) and path in part.between}
+            near = [part for where, part in self.walk() if where.partition(".")[0] in {*ties, path}]
+        else:
+            near = [
+                part
+                for where, part in self.walk()
+                if f"{where}.".startswith(f"{path}.") or path.startswith(f"{where}.")
+            ]
+        return any(phenomenon in (part.element if isinstance(part, Tie) else part).phenomena for part in near)
+
     def __str__(self) -> str:
         return draw(f"{self.name}: {self.description}".rstrip(": "), self.parts)
 
@@ -210,6 +237,34 @@ def arrangement_problems(
                 ),
             )
     yield from gear_problems(parts, unreadable)
+    yield from _twofold(parts)
+
+
+def _twofold(parts: Sequence[tuple[str, Part]]) -> Iterator[tuple[str, NlsError]]:
+    """Yield the ties that bring dry friction where another one has brought it between the same bodies."""
+    first: dict[frozenset[str], str] = {}
+    for name, part in parts:
+        if not isinstance(part, Tie) or not _rubs(part.element):
+            continue
+        ends = frozenset(part.between)
+        if ends in first:
+            where = " and ".join(f"'{end}'" for end in part.between)
+            yield (
+                name,
+                ArrangementError(
+                    f"parts '{first[ends]}' and '{name}'",
+                    f"both bring dry friction to {where}, and hold the same motion",
+                    next_step="take one of them, with the sum of both",
+                ),
+            )
+        first.setdefault(ends, name)
+
+
+def _rubs(element: Element) -> bool:
+    """Tell whether dry friction acts on the motion of an element as a whole."""
+    if isinstance(element, Parallel):
+        return any(_rubs(member) for _, member in element.members)
+    return "dry friction" in element.phenomena
 
 
 def _tie_problems(name: str, part: Tie, bodies: Mapping[str, Body]) -> Iterator[NlsError]:

@@ -14,35 +14,12 @@ from typing import ClassVar, Protocol, Self, TypeAlias
 
 from ...errors import ArrangementError
 from ...symbolic import Expression
+from .domain import MATERIAL as MATERIAL
+from .domain import ROTATION as ROTATION
+from .domain import TRANSLATION as TRANSLATION
+from .domain import Domain as Domain
 from .part import RESERVED, Part, check_names
 from .switches import Switches
-
-
-@dataclass(frozen=True)
-class Domain:
-    """Names and units of the pair of quantities that an element relates.
-
-    Parameters
-    ----------
-    motion, motion_unit
-        Strain in 1, extension in m, or angle in rad.
-    rate, rate_unit
-        Its derivative.
-    effort, effort_unit
-        Stress in Pa, force in N, or torque in N·m.
-    """
-
-    motion: str
-    motion_unit: str
-    rate: str
-    rate_unit: str
-    effort: str
-    effort_unit: str
-
-
-MATERIAL = Domain("strain", "1", "strain_rate", "1/s", "stress", "Pa")
-TRANSLATION = Domain("extension", "m", "rate", "m/s", "force", "N")
-ROTATION = Domain("angle", "rad", "speed", "rad/s", "torque", "N*m")
 
 Range: TypeAlias = tuple[float, float]
 UNBOUNDED: Range = (-math.inf, math.inf)
@@ -140,6 +117,21 @@ class Element(Part):
         return False
 
     @property
+    def is_smooth(self) -> bool:
+        """Whether the law has no corner that simulation must locate."""
+        return True
+
+    def smooth(self, width: float | None = None) -> Element:
+        """Return the smooth form of a law that is not smooth; how far it differs stands in its description.
+
+        Parameters
+        ----------
+        width
+            Speed, angle, extension, strain or force over which it is rounded; the law proposes one.
+        """
+        return self
+
+    @property
     def valid(self) -> Range:
         """Least and greatest motion for which the law is stated to hold; results name it when it is left."""
         return UNBOUNDED
@@ -186,11 +178,15 @@ class Combination(Element):
     """
 
     picture: ClassVar[str] = "around"
+    takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION, ROTATION, MATERIAL)
+    """Domains of the members that it can hold."""
+
+    placing: ClassVar[str | None] = None
+    """Where to put it instead, when it is put around something else."""
 
     members: tuple[tuple[str, Element], ...]
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         kind = type(self).__name__
         if not self.members:
             raise ArrangementError(
@@ -209,6 +205,14 @@ class Combination(Element):
                     f"{self._inner.motion} and {self._inner.effort}",
                     next_step="put a cam or pulley (through) or a specimen between the two",
                 )
+        if self._inner not in self.takes:
+            pairs = " or ".join(f"{domain.motion} and {domain.effort}" for domain in self.takes)
+            raise ArrangementError(
+                f"{kind} member '{self.members[0][0]}'",
+                f"relates {self._inner.motion} and {self._inner.effort}; {kind} acts on {pairs}",
+                next_step=self.placing,
+            )
+        super().__post_init__()
 
     @property
     def _inner(self) -> Domain:
@@ -218,6 +222,29 @@ class Combination(Element):
     def domain(self) -> Domain:
         """The domain of the members."""
         return self._inner
+
+    @classmethod
+    def domains(cls) -> tuple[Domain, ...]:
+        """Return its own domain, or those of the members that it can hold."""
+        return super().domains() or cls.takes
+
+    @property
+    def needs_rate(self) -> bool:
+        """True if any member needs the rate."""
+        return any(member.needs_rate for _, member in self.members)
+
+    def inside(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the sum of the efforts of the members, which share a motion.
+
+        Parameters
+        ----------
+        scope
+            Of the combination.
+        motion, rate
+            What the members see.
+        """
+        efforts = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
+        return sum(efforts[1:], start=efforts[0])
 
     @property
     def restores(self) -> bool:
@@ -240,15 +267,9 @@ class Parallel(Combination):
 
     picture: ClassVar[str] = "none"
 
-    @property
-    def needs_rate(self) -> bool:
-        """True if any member needs the rate."""
-        return any(member.needs_rate for _, member in self.members)
-
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the sum of the efforts."""
-        efforts = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
-        return sum(efforts[1:], start=efforts[0])
+        return self.inside(scope, motion, rate)
 
 
 def parallel(**members: Element) -> Parallel:

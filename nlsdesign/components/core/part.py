@@ -3,140 +3,124 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 from abc import ABC
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
-from ...errors import ArrangementError, UnitError, ValueRangeError, unknown_name
-from ...quantity import Quantity, parse_unit, same_dimension
+from ...errors import ArrangementError, UnitError, unknown_name
+from ...quantity import Quantity, same_dimension
+from .domain import Domain
+from .parameters import ParameterInfo as ParameterInfo
+from .parameters import Reading, Template, domain_by_units, readings, templates
+from .parameters import parameter as parameter
 
-RESERVED = frozenset({"component", "between", "of"})
+RESERVED = frozenset({"component", "between", "of", "domain"})
 """Keys of a deck that say what a part is and where it sits."""
-
-
-@dataclass(frozen=True)
-class ParameterInfo:
-    """What a part says of one of its numbers.
-
-    Parameters
-    ----------
-    unit
-        SI unit.
-    description
-        Meaning in words.
-    minimum, maximum
-        Range in which the law holds and beyond which a number is taken for a slip of units; inclusive.
-    row
-        Whether it may be a row of numbers.
-    """
-
-    unit: str
-    description: str
-    minimum: float
-    maximum: float
-    row: bool = False
-
-    def checked(self, name: str, given: Quantity | float | tuple[float, ...] | list[float]) -> Quantity:
-        """Return the number as a quantity of the right dimension and size.
-
-        Parameters
-        ----------
-        name
-            Name of the field, for messages.
-        given
-            A quantity, or bare number(s) in SI.
-
-        Raises
-        ------
-        UnitError
-            If the unit measures something else.
-        ValueRangeError
-            If a number lies outside the range, or a row stands where one number belongs.
-        """
-        result = given if isinstance(given, Quantity) else Quantity(given, self.unit)  # type: ignore[arg-type]
-        if isinstance(result.value, tuple) and not self.row:
-            raise ValueRangeError(
-                f"{name} = {result}",
-                f"is a row of {len(result.values)} numbers; {self.description} is one number",
-                next_step="give one number without brackets",
-            )
-        if not same_dimension(result.unit, self.unit):
-            raise UnitError(
-                f"{name} = {result}",
-                f"'{result.unit}' does not measure {self.description}",
-                next_step=f"give it in a unit like '{self.unit}'",
-            )
-        for value in result.values:
-            if not self.minimum <= value <= self.maximum:
-                raise ValueRangeError(
-                    f"{name} = {result}",
-                    f"{self.description} must lie in [{self.minimum:g}, {self.maximum:g}] {self.unit}",
-                    next_step=self._slip(result, value),
-                )
-        return result
-
-    def _slip(self, given: Quantity, value: float) -> str | None:
-        number = value / parse_unit(given.unit).factor
-        for unit in [prefix + given.unit for prefix in ("m", "k", "M", "c")] + ["%"]:
-            try:
-                factor = parse_unit(unit).factor
-            except UnitError:
-                continue
-            if same_dimension(unit, self.unit) and self.minimum <= number * factor <= self.maximum:
-                return f"was '{unit}' meant? {number:g} {unit} is in the range"
-        return None
-
-
-def parameter(
-    unit: str,
-    description: str,
-    *,
-    minimum: float = 0.0,
-    maximum: float = math.inf,
-    default: float | tuple[float, ...] | None = None,
-    row: bool = False,
-) -> Any:
-    """Declare a number of a part as a dataclass field.
-
-    Parameters
-    ----------
-    unit
-        SI unit.
-    description
-        Meaning in words, without an article.
-    minimum, maximum
-        Inclusive range.
-    default
-        Value in SI where there is a natural one; such a value is marked as assumed.
-    row
-        Whether it may be a row of numbers.
-    """
-    info = ParameterInfo(unit, description, minimum, maximum, row)
-    if default is None:
-        return dataclasses.field(metadata={"parameter": info})
-    value = Quantity(default, unit, "assumed: default of the component")
-    return dataclasses.field(default=value, metadata={"parameter": info})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
     """Base of everything that is declared: its numbers are the fields made by :func:`parameter`."""
 
+    phenomena: ClassVar[frozenset[str]] = frozenset()
+    """What the part brings into a system, in the terms of the field; the parts inside say their own."""
+
     def __post_init__(self) -> None:
-        for name, info in self.parameter_infos().items():
+        for field in dataclasses.fields(self):
+            if "domains" in field.metadata:
+                object.__setattr__(self, "domain", self._decided(field.metadata["domains"]))
+        for name, template in templates(type(self)).items():
+            info = template.within(self._domain)
             object.__setattr__(self, name, info.checked(name, getattr(self, name)))
+        for name, kinds in readings(type(self)).items():
+            object.__setattr__(self, name, self._reading(name, kinds).within(self._domain))
+
+    @property
+    def _domain(self) -> Domain | None:
+        return getattr(self, "domain", None)
+
+    def _decided(self, domains: tuple[Domain, ...]) -> Domain:
+        if self._domain is None:
+            return domain_by_units(domains, self._templates(), self.parameters())
+        if self._domain not in domains:
+            raise ArrangementError(
+                f"{type(self).__name__}: domain = {self._domain!r}",
+                f"must be one of {', '.join(domain.name for domain in domains)}",
+                next_step=f"for instance domain={domains[0].name.upper()}",
+            )
+        return self._domain
+
+    def _reading(self, name: str, kinds: tuple[type[Reading], ...]) -> Reading:
+        reading = getattr(self, name)
+        if not isinstance(reading, kinds):
+            raise ArrangementError(
+                f"{type(self).__name__}: {name} = {reading!r}",
+                f"must be one of {', '.join(f'{kind.__name__}(...)' for kind in kinds)}",
+            )
+        assert isinstance(reading, Reading)
+        return reading
+
+    def _templates(self) -> dict[str, Template]:
+        kinds = [type(self), *(type(getattr(self, name)) for name in readings(type(self)))]
+        return {name: template for kind in kinds for name, template in templates(kind).items()}
 
     @classmethod
-    def parameter_infos(cls) -> dict[str, ParameterInfo]:
-        """Return unit, description and range of each number by field name."""
-        return {f.name: f.metadata["parameter"] for f in dataclasses.fields(cls) if "parameter" in f.metadata}
+    def domains(cls) -> tuple[Domain, ...]:
+        """Return the domains in which the part can be, the usual one first; none where it has none."""
+        for field in dataclasses.fields(cls):
+            if "domains" in field.metadata:
+                return tuple(field.metadata["domains"])
+        own = getattr(cls, "domain", None)
+        return (own,) if isinstance(own, Domain) else ()
+
+    @classmethod
+    def parameter_infos(cls, domain: Domain | None = None) -> dict[str, ParameterInfo]:
+        """Return unit, description and range of each number that may be given, by field name.
+
+        Parameters
+        ----------
+        domain
+            Whose units; by default the usual one of the class.
+        """
+        where = domain or next(iter(cls.domains()), None)
+        kinds = [cls, *(kind for several in readings(cls).values() for kind in several)]
+        return {name: each.within(where) for kind in kinds for name, each in templates(kind).items()}
+
+    def infos(self) -> dict[str, ParameterInfo]:
+        """Return unit, description and range of each number that this part has, in its own domain."""
+        return {name: template.within(self._domain) for name, template in self._templates().items()}
 
     def parameters(self) -> dict[str, Quantity]:
-        """Return the numbers of this part alone by field name."""
-        return {name: getattr(self, name) for name in self.parameter_infos()}
+        """Return the numbers of this part alone by field name, those of its readings among them."""
+        holders = [self, *(getattr(self, name) for name in readings(type(self)))]
+        return {name: getattr(holder, name) for holder in holders for name in templates(type(holder))}
+
+    def with_numbers(self, numbers: Mapping[str, Quantity]) -> Self:
+        """Return a copy with other numbers of this part alone.
+
+        Parameters
+        ----------
+        numbers
+            By field name.
+        """
+        own = {name: number for name, number in numbers.items() if name in templates(type(self))}
+        changed: dict[str, Any] = dict(own)
+        for field in readings(type(self)):
+            reading = getattr(self, field)
+            inside = {n: q for n, q in numbers.items() if n in templates(type(reading))}
+            changed[field] = dataclasses.replace(reading, **inside)
+        return dataclasses.replace(self, **changed)
+
+    def stated_domain(self) -> Domain | None:
+        """Return the domain if it must be stated because the units of the numbers do not tell it."""
+        choices = next(
+            (f.metadata["domains"] for f in dataclasses.fields(self) if "domains" in f.metadata), ()
+        )
+        if not choices or self._domain == domain_by_units(choices, self._templates(), self.parameters()):
+            return None
+        return self._domain
 
     def children(self) -> Mapping[str, Part]:
         """Return the parts inside this one by name."""
@@ -156,8 +140,10 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
 
     def title(self) -> str:
         """Return one line that names the law and its numbers."""
-        numbers = ", ".join(f"{n} = {_short(q)}" for n, q in self.parameters().items())
-        return f"{type(self).__name__}({numbers})"
+        numbers = [f"{n} = {_short(q)}" for n, q in self.parameters().items()]
+        domain = self.stated_domain()
+        stated = [f"domain = {domain.name}"] if domain else []
+        return f"{type(self).__name__}({', '.join(numbers + stated)})"
 
 
 def _short(given: Quantity) -> str:
@@ -286,7 +272,7 @@ def with_values(part: Part, values: Mapping[str, Quantity | float | tuple[float,
     # All numbers of a part change at once: rules between them, such as ascending knots, hold at the end.
     for owner, fields in changes.items():
         target = find(part, owner) if owner else part
-        part = replaced(part, owner, dataclasses.replace(target, **fields))
+        part = replaced(part, owner, target.with_numbers(fields))
     return part
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,8 +12,10 @@ import casadi as ca
 from ...errors import ValueRangeError
 from ...quantity import Quantity
 from ...symbolic import Expression, positive_part
-from .element import MATERIAL, ROTATION, TRANSLATION, Domain, Element, Range, Scope
-from .part import parameter
+from .contacts import WithCorners
+from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
+from .element import UNBOUNDED, Element, Range, Scope
+from .parameters import one_of, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +23,7 @@ class Elastic(Element):
     """Base of the laws without rate."""
 
     picture: ClassVar[str] = "spring"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"elasticity"})
 
     @property
     def needs_rate(self) -> bool:
@@ -33,74 +37,65 @@ class Elastic(Element):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spring(Elastic):
-    """Hooke's law F = k·e.
+class Hooke(Elastic):
+    """Base of Hooke's law: effort = constant × motion."""
 
-    Valid for small extensions of a metal spring. Source: Hooke 1678.
+    constant: ClassVar[str] = "stiffness"
+    """Name of the number."""
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return constant × motion."""
+        return scope.parameter(self.constant) * motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spring(Hooke):
+    """Hooke's law F = k·e, or T = k·θ where the stiffness is in N·m/rad.
+
+    Valid for small extensions of a metal spring, below the yield angle of one that is twisted. Source: Hooke
+    1678.
 
     Examples
     --------
     >>> Spring(stiffness=2500.0).title()
     'Spring(stiffness = 2500 N/m)'
+    >>> Spring(stiffness=Quantity(3.4, "N*m/rad")).domain.effort
+    'torque'
     """
 
-    stiffness: Quantity = parameter("N/m", "stiffness", minimum=1e-6, maximum=1e12)
-
-    @property
-    def domain(self) -> Domain:
-        """Extension and force."""
-        return TRANSLATION
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return F = k·e."""
-        return scope.parameter("stiffness") * motion
+    domain: Domain = one_of(TRANSLATION, ROTATION)
+    stiffness: Quantity = parameter(
+        "{effort}/{motion}", "stiffness",
+        minimum={TRANSLATION: 1e-6, ROTATION: 1e-9}, maximum={TRANSLATION: 1e12, ROTATION: 1e9},
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
-class TorsionSpring(Elastic):
-    """Hooke's law T = k·θ.
-
-    Valid below the yield angle of the spring. Source: Hooke 1678.
-    """
-
-    stiffness: Quantity = parameter("N*m/rad", "stiffness", minimum=1e-9, maximum=1e9)
-
-    @property
-    def domain(self) -> Domain:
-        """Angle and torque."""
-        return ROTATION
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return T = k·θ."""
-        return scope.parameter("stiffness") * motion
-
-
-@dataclass(frozen=True, kw_only=True)
-class LinearElastic(Elastic):
+class LinearElastic(Hooke):
     """Hooke's law of a material, σ = k·ε, with nominal stress and nominal strain.
 
     Rubber follows it to a few per cent strain. Source: Austin et al. 2015, eq. (1).
     """
 
+    domain: ClassVar[Domain] = MATERIAL
+    constant: ClassVar[str] = "modulus"
+
     modulus: Quantity = parameter("Pa", "modulus", minimum=1.0, maximum=1e12)
-
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return σ = k·ε."""
-        return scope.parameter("modulus") * motion
 
 
 @dataclass(frozen=True, kw_only=True)
-class StrainStiffening(Elastic):
-    """Equilibrium law of the paper: σ = Σ kᵢ·H(ε − εᵢ)·(ε − εᵢ), piecewise linear.
+class StrainStiffening(WithCorners, Elastic):
+    """Equilibrium law of the paper: σ = Σ kᵢ·(⟨ε − εᵢ⟩ − ⟨−εᵢ⟩), one modulus more from each knot εᵢ on.
 
-    Valid for ε ≥ 0; the slope jumps at each knot, so a cam designed on it has a radius of curvature of
-    −∞ there: design on :class:`SmoothStrainStiffening`. Source: Austin et al. 2015, eq. (1), Table I.
+    With a sharp contact it is piecewise linear, ⟨v⟩ = max(v, 0), valid for ε ≥ 0; the slope jumps at each
+    knot, so a cam designed on it has a radius of curvature of −∞ there. With a rounded one it is C∞,
+    σ(0) = 0, and differs by at most w·ln 2·Σkᵢ: design on that. A knot at zero is not rounded, for rubber in
+    tension has no corner there. Source: Austin et al. 2015, eq. (1), Table I.
     """
+
+    domain: ClassVar[Domain] = MATERIAL
+    rounding: ClassVar[Mapping[Domain, float]] = {MATERIAL: 0.01}
+    phenomena: ClassVar[frozenset[str]] = frozenset({"elasticity", "strain stiffening"})
 
     modulus: Quantity = parameter(
         "Pa", "moduli that engage one after the other", minimum=0.0, maximum=1e12, row=True
@@ -112,81 +107,29 @@ class StrainStiffening(Elastic):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_knots(self.modulus, self.knots)
-
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
 
     @property
     def valid(self) -> Range:
-        """Tension: in compression the law gives no stress at all."""
-        return (0.0, math.inf)
+        """Tension where the contact is sharp: in compression the law then gives no stress at all."""
+        return UNBOUNDED if self.is_smooth else (0.0, math.inf)
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the sum over the engaged moduli."""
-        knots = zip(scope.row("knots"), self.knots.values, strict=True)
-        for number, (at, value) in enumerate(knots, start=1):
-            # Rubber in tension has no corner at zero.
-            if value > 0.0:
-                words = f"engages modulus {number}", f"leaves modulus {number}"
-                scope.corner(motion - at, above=words[0], below=words[1], name=f"knot_{number}")
-        pairs = zip(scope.row("modulus"), scope.row("knots"), strict=True)
-        return sum((k * ca.fmax(motion - at, 0) for k, at in pairs), start=ca.SX(0))
-
-    def smooth(self, width: float = 0.01) -> Element:
-        """Return the law with rounded knots, C∞; the stress differs by at most width·ln 2·Σkᵢ.
-
-        Parameters
-        ----------
-        width
-            Strain over which a knot is rounded.
-        """
-        return SmoothStrainStiffening(
-            modulus=self.modulus, knots=self.knots,
-            width=Quantity(width, "1", "assumed: width of the smooth form"),
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class SmoothStrainStiffening(Elastic):
-    """The law of :class:`StrainStiffening` with rounded knots, C∞.
-
-    σ = Σ kᵢ·(s(ε − εᵢ) − s(−εᵢ)) with s(v) = w·ln(1 + e^(v/w)); σ(0) = 0, and σ differs from the sharp law
-    by at most w·ln 2·Σkᵢ. A knot at zero is not rounded: rubber in tension has no corner there.
-    Source: the law of Austin et al. 2015, eq. (1); softplus of Dugas et al. 2001.
-    """
-
-    modulus: Quantity = parameter(
-        "Pa", "moduli that engage one after the other", minimum=0.0, maximum=1e12, row=True
-    )
-    knots: Quantity = parameter(
-        "1", "strains at which the moduli engage", minimum=0.0, maximum=20.0, row=True
-    )
-    width: Quantity = parameter("1", "strain over which a knot is rounded", minimum=1e-6, maximum=1.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_knots(self.modulus, self.knots)
-
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the sum over the softly engaged moduli."""
-        width = scope.parameter("width")
         rows = zip(scope.row("modulus"), scope.row("knots"), self.knots.values, strict=True)
-        return sum(
-            (
-                k * motion
-                if number == 0.0
-                else k * (positive_part(motion - at, width) - positive_part(-at, width))
-                for k, at, number in rows
-            ),
-            start=ca.SX(0),
-        )
+        total = ca.SX(0)
+        for number, (modulus, at, value) in enumerate(rows, start=1):
+            total += modulus * self._engaged(scope, motion, at, (number, value))
+        return total
+
+    def _engaged(
+        self, scope: Scope, motion: Expression, at: Expression, knot: tuple[int, float]
+    ) -> Expression:
+        number, value = knot
+        if value == 0.0:
+            return motion if self.is_smooth else ca.fmax(motion - at, 0)
+        words = f"engages modulus {number}", f"leaves modulus {number}"
+        engaged, _ = self.corner.positive_part(scope, motion - at, words, name=f"knot_{number}")
+        return engaged - positive_part(-at, scope.parameter("width")) if self.is_smooth else engaged
 
 
 def check_knots(modulus: Quantity, knots: Quantity) -> None:

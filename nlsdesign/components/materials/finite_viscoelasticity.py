@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -29,13 +30,11 @@ class FlowingChains(Element):
     'FlowingChains(shear_modulus = 100000 Pa, viscosity = 300000 Pa·s)'
     """
 
+    domain: ClassVar[Domain] = MATERIAL
+    phenomena: ClassVar[frozenset[str]] = frozenset({"relaxation"})
+
     shear_modulus: Quantity = parameter("Pa", "shear modulus µ of the chains", minimum=1.0, maximum=1e12)
     viscosity: Quantity = parameter("Pa*s", "shear viscosity η of the flow", minimum=1e-6, maximum=1e15)
-
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
 
     @property
     def needs_rate(self) -> bool:

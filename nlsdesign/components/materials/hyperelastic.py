@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -29,10 +30,7 @@ _SHARE_OF_LIMIT = 0.9
 class Hyperelastic(Elastic):
     """Base of the laws that are given by their strain energy."""
 
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
+    domain: ClassVar[Domain] = MATERIAL
 
     @abstractmethod
     def energy(self, scope: Scope, stretch: Expression) -> Expression:

@@ -63,7 +63,7 @@ def standard_linear_solid(equilibrium: Element | Number, *, modulus: Number, vis
 
     The loss tangent has one peak, at ω = (E/η)·√(E∞/(E∞ + E)), and falls with the frequency ratio to either
     side; that of rubber hardly changes over decades.
-    With :class:`StrainStiffening` or :class:`SmoothStrainStiffening` as equilibrium law it is the law of the
+    With :class:`StrainStiffening` as equilibrium law it is the law of the
     published actuator. Sources: Zener 1948; Austin et al. 2015, eq. (1).
 
     Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -26,17 +27,15 @@ class SlidingFillers(Element):
     smooth form of one).
     """
 
+    domain: ClassVar[Domain] = MATERIAL
+    phenomena: ClassVar[frozenset[str]] = frozenset({"hysteresis"})
+
     modulus: Quantity = parameter(
         "Pa", "modulus Eₜ of all sliders together from rest", minimum=0.0, maximum=1e12
     )
     yield_stress: Quantity = parameter(
         "Pa", "stress of all sliders together while sliding", minimum=1e-6, maximum=1e12
     )
-
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
 
     @property
     def needs_rate(self) -> bool:

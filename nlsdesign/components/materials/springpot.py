@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -40,6 +40,9 @@ class Springpot(Element):
     'largest error 0.36 % from 0.01 Hz to 100 Hz)'
     """
 
+    domain: ClassVar[Domain] = MATERIAL
+    phenomena: ClassVar[frozenset[str]] = frozenset({"relaxation"})
+
     modulus: Quantity = parameter(
         "Pa", "size E₁ of the complex modulus at the reference frequency", minimum=1.0, maximum=1e12
     )
@@ -55,11 +58,6 @@ class Springpot(Element):
                 f"lower = {self.lower}, upper = {self.upper}",
                 "the band must rise from its lower to its upper end",
             )
-
-    @property
-    def domain(self) -> Domain:
-        """Strain and stress."""
-        return MATERIAL
 
     @property
     def needs_rate(self) -> bool:

@@ -1,68 +1,62 @@
-"""Laws that remember the hardest pull so far: stress softening and permanent set."""
+"""Stress softening: rubber is softer below the hardest pull so far."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
 from ...errors import ArrangementError
 from ...quantity import Quantity
 from ...symbolic import Expression, positive_part
-from ..core.element import MATERIAL, Combination, Scope, observed_effort
-from ..core.part import parameter
+from ..core.domain import MATERIAL, Domain
+from ..core.element import Combination, Scope
+from ..core.parameters import Reading, parameter, read_as
 from .hyperelastic import Hyperelastic
+from .memory import following, rising
+
+_LEAST_RATIO = 1e-3
 
 
-@dataclass(frozen=True, kw_only=True)
-class MaterialCombination(Combination):
-    """Base of wrappers around laws of stress and strain, which act in parallel inside."""
+@dataclass(frozen=True)
+class SofteningCurve(Reading):
+    """Base of the ways in which the share that is lost follows from the hardest pull so far."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self._inner != MATERIAL:
-            raise ArrangementError(
-                type(self).__name__, "acts on strain and stress",
-                next_step="put it inside a specimen",
-            )  # fmt: skip
-
-    @property
-    def needs_rate(self) -> bool:
-        """True if any law inside needs the rate."""
-        return any(member.needs_rate for _, member in self.members)
-
-    def stress_inside(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the sum of the stresses inside.
+    @abstractmethod
+    def softened(
+        self, held: Combination, scope: Scope, motion: Expression, rate: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return the share that is left, and the effort of the elements inside as if nothing were lost.
 
         Parameters
         ----------
-        scope
-            Of the wrapper.
-        motion, rate
-            What the laws inside see.
+        held
+            Holds the elements.
+        scope, motion, rate
+            As for :meth:`Element.effort`.
         """
-        stresses = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
-        return sum(stresses[1:], start=stresses[0])
 
 
-@dataclass(frozen=True, kw_only=True)
-class Softening(MaterialCombination):
-    """Stress softening (Mullins effect): σ = η·dW/dλ with η = 1 − erf((W_m − W)/m)/r.
+@dataclass(frozen=True)
+class OgdenRoxburgh(SofteningCurve):
+    """Softening by energy: η = 1 − erf((W_m − W)/m)/r, for laws that say their strain energy.
 
     W is the energy of the laws inside and W_m the greatest so far, a state that rises with W and never falls.
     η is 1 on first loading and again where W reaches W_m. The sharp law has a corner there; here W_m − W and
     the switch of the state are rounded over ``width``·m: σ is C∞ in strain and state, the rate of W_m C⁰ at a
     reversal, and W_m lags by about seven widths, so η is off by about ten times ``width``/r. What softens is
-    lost: (erf(W_m/m) − erf((W_m − W)/m))/r per rise of W_m. Valid for what the first pull to a strain does;
-    there is no recovery, no set and no loss on reloading. Source: Ogden and Roxburgh 1999.
+    lost: (erf(W_m/m) − erf((W_m − W)/m))/r per rise of W_m. Source: Ogden and Roxburgh 1999.
 
     Examples
     --------
-    >>> from nlsdesign.components import NeoHooke
-    >>> gum = NeoHooke(shear_modulus=0.6e6)
-    >>> Softening(members=(("gum", gum),), strength=1.8, scale=0.12e6).domain.motion
-    'strain'
+    >>> OgdenRoxburgh(strength=1.8, scale=0.12e6).width.number
+    0.001
     """
+
+    takes: ClassVar[tuple[Domain, ...]] = (MATERIAL,)
+    placing: ClassVar[str | None] = "put it inside a specimen"
 
     strength: Quantity = parameter(
         "1", "r: the stress never falls below 1 − 1/r of that of first loading", minimum=1.0, maximum=1e6
@@ -72,76 +66,94 @@ class Softening(MaterialCombination):
         "1", "part of m over which corners are rounded", minimum=1e-6, maximum=0.1, default=1e-3
     )
 
+    def softened(
+        self, held: Combination, scope: Scope, motion: Expression, rate: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return η and the stress inside."""
+        scale, strength = scope.parameter("scale"), scope.parameter("strength")
+        width = scope.parameter("width") * scale
+        stress = held.inside(scope, motion, rate)
+        laws = [(n, m) for n, m in held.members if isinstance(m, Hyperelastic)]
+        energy = sum((m.energy(scope.child(n), 1 + motion) for n, m in laws), start=ca.SX(0))
+        state = ("greatest_energy", "Pa", f"greatest strain energy of {scope.path} so far")
+        greatest, growth = rising(scope, state, energy, stress * rate, width)
+
+        def lost(below: Expression) -> Expression:
+            return ca.erf(positive_part(below, width) / scale) / strength
+
+        share = lost(greatest - energy)
+        scope.loss((lost(greatest) - share) * growth)
+        return 1 - share, stress
+
+
+@dataclass(frozen=True)
+class LargestMotion(SofteningCurve):
+    """Softening by motion: 1 − s·(1 − (x/x_max)^p), for any element, with x_max the largest motion so far.
+
+    At small motion the share s is lost; p = 1 makes the loss fall linearly with the motion. The memory starts
+    at the first motion and follows a growing motion with the time constant ``following``, which must be short
+    against the motion; it never heals. Valid for one sense of loading from zero. Sources: Mullins 1969 (the
+    effect); Ogden and Roxburgh 1999 (one factor on the virgin effort, kept from the largest load).
+
+    Examples
+    --------
+    >>> LargestMotion(softening=0.2).exponent.number
+    1.0
+    """
+
+    softening: Quantity = parameter("1", "share s that is lost at small motion", minimum=0.0, maximum=0.99)
+    exponent: Quantity = parameter(
+        "1", "exponent p of the return to virgin rubber", minimum=0.1, maximum=20.0, default=1.0
+    )
+    following: Quantity = parameter(
+        "s", "time in which the memory follows the motion", minimum=1e-5, maximum=10.0, default=5e-3
+    )
+
+    def softened(
+        self, held: Combination, scope: Scope, motion: Expression, rate: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return the share and the effort inside."""
+        domain = held.domain
+        state = ("largest", domain.motion_unit, f"largest {domain.motion} of {scope.path} so far")
+        largest = following(scope, state, motion, scope.parameter("following"))
+        ratio = ca.fmin(ca.fmax(motion / ca.fmax(largest, 1e-12), _LEAST_RATIO), 1)
+        lost = scope.parameter("softening") * (1 - ratio ** scope.parameter("exponent"))
+        return 1 - lost, held.inside(scope, motion, rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressSoftening(Combination):
+    """Stress softening (Mullins effect): F = η·F_in, softer below the hardest pull so far.
+
+    Virgin rubber, and rubber pulled harder than ever before, is not softened. How η follows is ``curve``:
+    :class:`OgdenRoxburgh` where the laws say their strain energy, :class:`LargestMotion` around any element,
+    a specimen or a piece whose section and length are not known apart. Valid for what the first pull does;
+    there is no recovery, no set and no loss on reloading. Sources: Mullins 1969; Ogden and Roxburgh 1999.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import NeoHooke
+    >>> gum = (("gum", NeoHooke(shear_modulus=0.6e6)),)
+    >>> StressSoftening(members=gum, curve=OgdenRoxburgh(strength=1.8, scale=0.12e6)).domain.motion
+    'strain'
+    """
+
+    phenomena: ClassVar[frozenset[str]] = frozenset({"stress softening"})
+
+    curve: SofteningCurve = read_as(OgdenRoxburgh, LargestMotion)
+
     def __post_init__(self) -> None:
         super().__post_init__()
         for name, member in self.members:
-            if not isinstance(member, Hyperelastic):
+            if isinstance(self.curve, OgdenRoxburgh) and not isinstance(member, Hyperelastic):
                 raise ArrangementError(
-                    f"Softening member '{name}'",
+                    f"StressSoftening member '{name}'",
                     f"is a {type(member).__name__}, which does not say its strain energy",
                     next_step="use a law such as NeoHooke, Yeoh or Ogden; dashpots belong beside it",
                 )
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the softened stress."""
-        scale, strength = scope.parameter("scale"), scope.parameter("strength")
-        width = scope.parameter("width") * scale
-        stress = self.stress_inside(scope, motion, rate)
-        laws = [(n, m) for n, m in self.members if isinstance(m, Hyperelastic)]
-        energy = sum((m.energy(scope.child(n), 1 + motion) for n, m in laws), start=ca.SX(0))
-        meaning = f"greatest strain energy of {scope.path} so far"
-        greatest, growth = _greatest(scope, ("greatest_energy", "Pa", meaning), energy, stress * rate, width)
-
-        def softened(below: Expression) -> Expression:
-            return ca.erf(positive_part(below, width) / scale) / strength
-
-        softness = softened(greatest - energy)
-        scope.loss((softened(greatest) - softness) * growth)
-        scope.signal("softening", 1 - softness, "1", f"stress of {scope.path} over that of first loading")
-        return (1 - softness) * stress
-
-
-@dataclass(frozen=True, kw_only=True)
-class PermanentSet(MaterialCombination):
-    """A rest length that grows: the laws inside see ε − s with s = c·ε_m, ε_m the greatest strain so far.
-
-    ε_m is a state that rises with ε and never falls; its switch is rounded over ``width``, so σ is C∞ in
-    strain and state and the rate of ε_m is C⁰ at a reversal. What is lost is σ·ds/dt, never negative for laws
-    whose memory fades. A set that is known and no longer grows is :class:`Slack`. Valid for c up to a few
-    tenths, as tension sets are measured. Source: ISO 2285 (tension set as a part of the strain).
-
-    Examples
-    --------
-    >>> from nlsdesign.components import NeoHooke
-    >>> gum = NeoHooke(shear_modulus=0.6e6)
-    >>> PermanentSet(members=(("gum", gum),), share=0.05).title()
-    'PermanentSet(share = 0.05, width = 0.0001)'
-    """
-
-    share: Quantity = parameter("1", "part c of the greatest strain that stays", minimum=0.0, maximum=0.9)
-    width: Quantity = parameter(
-        "1", "strain over which the corner is rounded", minimum=1e-7, maximum=0.1, default=1e-4
-    )
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the stress of the laws inside at what is left of the strain."""
-        meaning = f"greatest strain of {scope.path} so far"
-        state = ("greatest_strain", "1", meaning)
-        greatest, growth = _greatest(scope, state, motion, rate, scope.parameter("width"))
-        share = scope.parameter("share")
-        stress = self.stress_inside(scope, motion - share * greatest, rate - share * growth)
-        scope.loss(stress * share * growth)
-        return stress
-
-
-def _greatest(
-    scope: Scope, state: tuple[str, str, str], value: Expression, rate: Expression, width: Expression
-) -> tuple[Expression, Expression]:
-    """Return the greatest value so far, a state with name, unit and meaning, and its rate.
-
-    The state follows the value up, behind it by ``width``·ln(1 + value/width), whatever the speed.
-    """
-    greatest = scope.state(*state)
-    growth = (1 + ca.tanh((value - greatest) / (2 * width))) / 2 * ca.fmax(rate, 0)
-    scope.derive(greatest, growth)
-    return greatest, growth
+        """Return the softened effort."""
+        share, effort = self.curve.softened(self, scope, motion, rate)
+        scope.signal("softness", share, "1", f"share of the virgin effort that {scope.path} has")
+        return share * effort

@@ -11,7 +11,8 @@ import casadi as ca
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
-from ..core.part import Part, parameter
+from ..core.parameters import one_of, parameter
+from ..core.part import Part
 
 
 class Motion(NamedTuple):
@@ -81,12 +82,9 @@ class Free(Body):
 class Inertia(Free):
     """A turning body, J·ω̇ = ΣT + load torque."""
 
-    inertia: Quantity = parameter("kg*m^2", "moment of inertia", minimum=1e-12, maximum=1e6)
+    domain: ClassVar[Domain] = ROTATION
 
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
+    inertia: Quantity = parameter("kg*m^2", "moment of inertia", minimum=1e-12, maximum=1e6)
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the torque from outside, an input."""
@@ -101,14 +99,11 @@ class Inertia(Free):
 class Mass(Free):
     """A sliding body, m·v̇ = ΣF + outer force."""
 
+    domain: ClassVar[Domain] = TRANSLATION
+
     inertia_name: ClassVar[str] = "mass"
 
     mass: Quantity = parameter("kg", "mass", minimum=1e-9, maximum=1e9)
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return the force from outside, an input."""
@@ -127,17 +122,14 @@ class GearedMotor(Free):
     friction is an element of its own. Source: any text on electric drives.
     """
 
+    domain: ClassVar[Domain] = ROTATION
+
     inertia: Quantity = parameter(
         "kg*m^2", "moment of inertia at the gear's output", minimum=1e-12, maximum=1e6
     )
     gear_ratio: Quantity = parameter("1", "motor turns per output turn", minimum=1e-3, maximum=1e4)
     torque_constant: Quantity = parameter("N*m/A", "motor torque per current", minimum=1e-6, maximum=1e3)
     current_limit: Quantity = parameter("A", "largest current", minimum=1e-6, maximum=1e4, default=20.0)
-
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return n·k_T·I with the current held within its limit."""
@@ -154,12 +146,9 @@ class GearedMotor(Free):
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed(Body):
-    """A body that does not turn: the bench."""
+    """A body that does not turn: the bench. With ``domain=TRANSLATION`` the clamp of a tensile machine."""
 
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
+    domain: Domain = one_of(ROTATION, TRANSLATION)
 
     def motion(self, scope: Scope) -> Motion:
         """Return zero."""
@@ -171,23 +160,13 @@ class Fixed(Body):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FixedPoint(Fixed):
-    """A point that does not move: the clamp of a tensile machine."""
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION
-
-
-@dataclass(frozen=True, kw_only=True)
 class Driven(Body):
-    """A body whose angle is prescribed from outside: angle and speed are inputs."""
+    """A body whose motion is prescribed from outside: angle, or position, and speed are inputs.
 
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
+    With ``domain=TRANSLATION`` the grip of a tensile machine.
+    """
+
+    domain: Domain = one_of(ROTATION, TRANSLATION)
 
     def motion(self, scope: Scope) -> Motion:
         """Declare motion and speed as inputs."""
@@ -200,13 +179,3 @@ class Driven(Body):
     def balance(self, scope: Scope, motion: Motion, effort: Expression) -> None:
         """Name the effort that the prescribed motion takes."""
         scope.signal("reaction", -effort, self.domain.effort_unit, f"what moves {scope.path}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class DrivenPoint(Driven):
-    """A point whose position is prescribed from outside: the grip of a tensile machine."""
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION

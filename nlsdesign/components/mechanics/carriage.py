@@ -1,4 +1,4 @@
-"""A positioning drive along a line: its carriage, and the friction and constant force that act on it."""
+"""A positioning drive along a line: its carriage, and a constant force that acts on it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import ClassVar
 import casadi as ca
 
 from ...quantity import Quantity
-from ...symbolic import Expression, smooth_sign
-from ..core.dampers import Viscous
+from ...symbolic import Expression
 from ..core.element import TRANSLATION, Domain, Scope
 from ..core.part import parameter
 from ..core.springs import Elastic
@@ -30,6 +29,8 @@ class LinearDrive(Free):
     'LinearDrive(mass = 95.1 kg, force_constant = 35.15 N/V, voltage_limit = 10 V)'
     """
 
+    domain: ClassVar[Domain] = TRANSLATION
+
     inertia_name: ClassVar[str] = "mass"
 
     mass: Quantity = parameter("kg", "mass that moves, reflected to the line", minimum=1e-9, maximum=1e9)
@@ -37,11 +38,6 @@ class LinearDrive(Free):
         "N/V", "force on the carriage per voltage", minimum=1e-9, maximum=1e9
     )
     voltage_limit: Quantity = parameter("V", "largest voltage", minimum=1e-6, maximum=1e4)
-
-    @property
-    def domain(self) -> Domain:
-        """Translation."""
-        return TRANSLATION
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return g·V with the voltage held within its limit."""
@@ -57,34 +53,6 @@ class LinearDrive(Free):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlidingFriction(Viscous):
-    """Dry friction along a line, F = F_c·tanh(v/v_s), C∞; at rest it creeps instead of sticking.
-
-    The counterpart of :class:`CoulombFriction`. Source: Coulomb 1785; the smooth form e.g. in
-    Armstrong-Hélouvry 1991.
-
-    Examples
-    --------
-    >>> SlidingFriction(sliding_force=20.4).title()
-    'SlidingFriction(sliding_force = 20.4 N, creep_speed = 0.001 m/s)'
-    """
-
-    sliding_force: Quantity = parameter("N", "friction force while sliding", minimum=0.0, maximum=1e9)
-    creep_speed: Quantity = parameter(
-        "m/s", "speed at which 76 % of the friction force acts", minimum=1e-9, maximum=10.0, default=1e-3
-    )
-
-    @property
-    def domain(self) -> Domain:
-        """Extension and force."""
-        return TRANSLATION
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return F = F_c·tanh(v/v_s)."""
-        return scope.parameter("sliding_force") * smooth_sign(rate, scope.parameter("creep_speed"))
-
-
-@dataclass(frozen=True, kw_only=True)
 class ConstantForce(Elastic):
     """A force that never changes, F = F₀, positive against positive motion: a weight, an amplifier's offset.
 
@@ -97,7 +65,10 @@ class ConstantForce(Elastic):
     'ConstantForce(load = -3.16 N)'
     """
 
+    domain: ClassVar[Domain] = TRANSLATION
+
     picture: ClassVar[str] = "box"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"constant force"})
 
     # Not named "force": every element between bodies has a signal of that name.
     load: Quantity = parameter("N", "constant force", minimum=-1e9, maximum=1e9)
@@ -106,11 +77,6 @@ class ConstantForce(Elastic):
     def restores(self) -> bool:
         """False: it pushes the same way at every place."""
         return False
-
-    @property
-    def domain(self) -> Domain:
-        """Extension and force."""
-        return TRANSLATION
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return F₀."""

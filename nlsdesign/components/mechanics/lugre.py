@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.dampers import Viscous
-from ..core.element import ROTATION, Domain, Scope
-from ..core.part import parameter
+from ..core.domain import ROTATION, TRANSLATION, Domain
+from ..core.element import Scope
+from ..core.parameters import one_of, parameter
+from .friction import stribeck
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,15 +26,23 @@ class LuGreFriction(Viscous):
     Sources: Canudas de Wit, Olsson, Åström, Lischinsky 1995; Dupont, Hayward, Armstrong, Altpeter 2002.
     """
 
-    stiffness: Quantity = parameter("N*m/rad", "stiffness σ₀ of the bristles", minimum=1e-3, maximum=1e9)
-    bristle_damping: Quantity = parameter("N*m*s/rad", "damping σ₁ of bristles", minimum=0.0, maximum=1e6)
-    damping: Quantity = parameter("N*m*s/rad", "viscous friction b", minimum=0.0, maximum=1e9)
-    sliding_torque: Quantity = parameter("N*m", "friction T_c while sliding", minimum=1e-9, maximum=1e6)
+    phenomena: ClassVar[frozenset[str]] = frozenset({"dry friction", "viscous friction"})
+
+    domain: Domain = one_of(ROTATION, TRANSLATION)
+
+    stiffness: Quantity = parameter(
+        "{effort}/{motion}", "stiffness σ₀ of the bristles", minimum=1e-3, maximum=1e9
+    )
+    bristle_damping: Quantity = parameter(
+        "{effort}*s/{motion}", "damping σ₁ of bristles", minimum=0.0, maximum=1e6
+    )
+    damping: Quantity = parameter("{effort}*s/{motion}", "viscous friction b", minimum=0.0, maximum=1e9)
+    sliding_effort: Quantity = parameter("{effort}", "friction T_c while sliding", minimum=1e-9, maximum=1e6)
     breakaway: Quantity = parameter(
-        "N*m", "friction ΔT beyond sliding at low speed", minimum=0.0, maximum=1e6
+        "{effort}", "friction ΔT beyond sliding at low speed", minimum=0.0, maximum=1e6
     )
     stribeck_speed: Quantity = parameter(
-        "rad/s", "speed ω_St at which 37 % of that is left", minimum=1e-6, maximum=1e4
+        "{rate}", "speed ω_St at which 37 % of that is left", minimum=1e-6, maximum=1e4
     )
     elastic_share: Quantity = parameter(
         "1",
@@ -42,11 +53,6 @@ class LuGreFriction(Viscous):
     )
 
     @property
-    def domain(self) -> Domain:
-        """Angle and torque."""
-        return ROTATION
-
-    @property
     def dissipates(self) -> bool:
         """False: the bristles store."""
         return False
@@ -54,9 +60,11 @@ class LuGreFriction(Viscous):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T."""
         stiffness, share = scope.parameter("stiffness"), scope.parameter("elastic_share")
-        bent = scope.state("deflection", "rad", f"deflection of the bristles of {scope.path}")
-        fall = ca.exp(-((rate / scope.parameter("stribeck_speed")) ** 2))
-        most = (scope.parameter("sliding_torque") + scope.parameter("breakaway") * fall) / stiffness
+        bent = scope.state(
+            "deflection", self.domain.motion_unit, f"deflection of the bristles of {scope.path}"
+        )
+        fall = stribeck(rate, scope.parameter("stribeck_speed"))
+        most = (scope.parameter("sliding_effort") + scope.parameter("breakaway") * fall) / stiffness
         # From 0 at the break-away deflection to 1 at the largest.
         place = ca.fmin(ca.fmax((ca.fabs(bent) / most - share) / (1 - share), 0), 1)
         plastic = ca.if_else(bent * rate > 0, (1 - ca.cos(ca.pi * place)) / 2, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -21,16 +22,13 @@ class ElectricMotor(Free):
     two sides. Source: any text on electric drives.
     """
 
+    domain: ClassVar[Domain] = ROTATION
+
     inertia: Quantity = parameter("kg*m^2", "moment of inertia of the rotor", minimum=1e-12, maximum=1e6)
     torque_constant: Quantity = parameter("N*m/A", "torque per current", minimum=1e-6, maximum=1e3)
     resistance: Quantity = parameter("Ohm", "resistance of the winding", minimum=1e-6, maximum=1e6)
     current_limit: Quantity = parameter("A", "largest current of the amplifier", minimum=1e-6, maximum=1e4)
     voltage_limit: Quantity = parameter("V", "largest voltage of the supply", minimum=1e-3, maximum=1e5)
-
-    @property
-    def domain(self) -> Domain:
-        """Rotation."""
-        return ROTATION
 
     def inertia_of(self, scope: Scope) -> Expression:
         """Return J."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,15 +10,14 @@ import casadi as ca
 
 from ...errors import ValueRangeError
 from ...quantity import Quantity
-from ...symbolic import Expression, positive_part, symbol
+from ...symbolic import Expression, symbol
+from ..core.contacts import WithCorners
 from ..core.dampers import Viscous
-from ..core.element import ROTATION, Domain, Element, Scope
-from ..core.part import parameter
+from ..core.domain import ROTATION, TRANSLATION, Domain
+from ..core.element import Element, Scope
+from ..core.parameters import one_of, parameter
 from ..core.springs import Elastic
 from ..core.switches import Hold
-
-WIDTH = 1e-3
-"""Angle over which a stop is rounded unless another one is asked for, in rad."""
 
 
 def _check_order(lower: Quantity, upper: Quantity) -> None:
@@ -29,16 +28,26 @@ def _check_order(lower: Quantity, upper: Quantity) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ElasticStops(Viscous):
-    """Base of the elastic stops at both ends of the way."""
+class EndStop(WithCorners, Viscous):
+    """Elastic stops at both ends of the way: T = k·p·⟨1 + d·ṗ⟩ beyond a stop, p the penetration; else 0.
+
+    The loss grows with the penetration, so the torque does not jump on contact and the stop never pulls;
+    an impact at the speed v rebounds with e ≈ 1 − 2·d·v/3 as long as d·v is small. The torque has a corner at
+    each stop; with ``contact=Rounded(width=...)`` it is C∞ in the motion and differs by at most k·w·ln 2 at
+    rest. The factor ⟨1 + d·ṗ⟩ keeps its corner where a body leaves faster than 1/d. Source: Hunt and Crossley
+    1975, with the exponent 1.
+    """
 
     picture: ClassVar[str] = "box"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"stops"})
+    rounding: ClassVar[Mapping[Domain, float]] = {ROTATION: 1e-3, TRANSLATION: 1e-5}
 
-    lower: Quantity = parameter("rad", "angle of the lower stop", minimum=-1e3, maximum=1e3)
-    upper: Quantity = parameter("rad", "angle of the upper stop", minimum=-1e3, maximum=1e3)
-    stiffness: Quantity = parameter("N*m/rad", "stiffness of a stop", minimum=1e-6, maximum=1e9)
+    domain: Domain = one_of(ROTATION, TRANSLATION)
+    lower: Quantity = parameter("{motion}", "place of the lower stop", minimum=-1e3, maximum=1e3)
+    upper: Quantity = parameter("{motion}", "place of the upper stop", minimum=-1e3, maximum=1e3)
+    stiffness: Quantity = parameter("{effort}/{motion}", "stiffness of a stop", minimum=1e-6, maximum=1e12)
     damping: Quantity = parameter(
-        "s/rad", "share of the torque lost per speed of penetration", minimum=0.0, maximum=1e3
+        "s/{motion}", "share of the effort lost per speed of penetration", minimum=0.0, maximum=1e3
     )
 
     def __post_init__(self) -> None:
@@ -46,70 +55,20 @@ class ElasticStops(Viscous):
         _check_order(self.lower, self.upper)
 
     @property
-    def domain(self) -> Domain:
-        """Angle and torque."""
-        return ROTATION
-
-    @property
     def dissipates(self) -> bool:
-        """False: a stop stores, and loses what its torque is beyond k·p."""
+        """False: a stop stores, and loses what its effort is beyond k·p."""
         return False
-
-    @abstractmethod
-    def depths(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
-        """Return the penetration of the upper and of the lower stop."""
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T."""
-        over, under = self.depths(scope, motion)
-        return _hunt_crossley(scope, over, rate) - _hunt_crossley(scope, under, -rate)
-
-
-@dataclass(frozen=True, kw_only=True)
-class EndStop(ElasticStops):
-    """Elastic stops at both ends of the way: T = k·p·⟨1 + d·ṗ⟩ beyond a stop, p the penetration; else 0.
-
-    The loss grows with the penetration, so the torque does not jump on contact and the stop never pulls;
-    an impact at the speed v rebounds with e ≈ 1 − 2·d·v/3 as long as d·v is small. The torque has a corner at
-    each stop. Source: Hunt and Crossley 1975, with the exponent 1.
-    """
-
-    def depths(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
-        """Return the penetrations, with their corners."""
         over, under = motion - scope.parameter("upper"), scope.parameter("lower") - motion
-        scope.corner(over, above="meets the upper stop", below="leaves the upper stop", name="upper_stop")
-        scope.corner(under, above="meets the lower stop", below="leaves the lower stop", name="lower_stop")
-        return ca.fmax(over, 0), ca.fmax(under, 0)
-
-    def smooth(self, width: float = WIDTH) -> Element:
-        """Return the same with rounded corners, C∞ in the angle; it differs by at most k·width·ln 2 at rest.
-
-        Parameters
-        ----------
-        width
-            Angle over which a corner is rounded, in rad.
-        """
-        return RoundedEndStop(
-            lower=self.lower, upper=self.upper, stiffness=self.stiffness, damping=self.damping,
-            width=Quantity(width, "rad", "assumed: width of the smooth form"),
+        over, under = (
+            self.corner.positive_part(scope, value, (f"meets the {stop}", f"leaves the {stop}"), name=name)[0]
+            for value, stop, name in (
+                (over, "upper stop", "upper_stop"), (under, "lower stop", "lower_stop"),
+            )
         )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class RoundedEndStop(ElasticStops):
-    """The law of :class:`EndStop` with p = w·ln(1 + e^((θ − θ_stop)/w)): C∞ in the angle.
-
-    The factor ⟨1 + d·ṗ⟩ keeps its corner where a body leaves faster than 1/d. Source: Hunt and Crossley 1975,
-    with the exponent 1, rounded.
-    """
-
-    width: Quantity = parameter("rad", "angle over which a stop is rounded", minimum=1e-9, maximum=0.1)
-
-    def depths(self, scope: Scope, motion: Expression) -> tuple[Expression, Expression]:
-        """Return the rounded penetrations."""
-        width = scope.parameter("width")
-        over = positive_part(motion - scope.parameter("upper"), width)
-        return over, positive_part(scope.parameter("lower") - motion, width)
+        return _hunt_crossley(scope, over, rate) - _hunt_crossley(scope, under, -rate)
 
 
 def _hunt_crossley(scope: Scope, depth: Expression, rate: Expression) -> Expression:
@@ -129,7 +88,10 @@ class RigidStop(Elastic):
     Pfeiffer and Glocker 1996.
     """
 
+    domain: ClassVar[Domain] = ROTATION
+
     picture: ClassVar[str] = "box"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"stops"})
 
     lower: Quantity = parameter("rad", "angle of the lower stop", minimum=-1e3, maximum=1e3)
     upper: Quantity = parameter("rad", "angle of the upper stop", minimum=-1e3, maximum=1e3)
@@ -146,11 +108,6 @@ class RigidStop(Elastic):
     def restores(self) -> bool:
         """False: it leaves the body free between the stops."""
         return False
-
-    @property
-    def domain(self) -> Domain:
-        """Angle and torque."""
-        return ROTATION
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return what holds the body at a stop."""
@@ -174,7 +131,12 @@ class RigidStop(Elastic):
             )
         )  # fmt: skip
 
-    def smooth(self, width: float = WIDTH, stiffness: float = 1e3, speed: float = 1.0) -> Element:
+    @property
+    def is_smooth(self) -> bool:
+        """False: an impact is located."""
+        return False
+
+    def smooth(self, width: float | None = None, stiffness: float = 1e3, speed: float = 1.0) -> Element:
         """Return an elastic stop with rounded corners that rebounds alike at one speed of impact.
 
         Parameters
@@ -188,7 +150,8 @@ class RigidStop(Elastic):
         """
         why = "assumed: smooth form of a rigid stop"
         damping = 1.5 * (1.0 - self.restitution.number) / speed
-        return RoundedEndStop(
+        stop = EndStop(
             lower=self.lower, upper=self.upper, stiffness=Quantity(stiffness, "N*m/rad", why),
-            damping=Quantity(damping, "s/rad", why), width=Quantity(width, "rad", why),
+            damping=Quantity(damping, "s/rad", why),
         )  # fmt: skip
+        return stop.smooth(width)

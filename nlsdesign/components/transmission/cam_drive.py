@@ -1,4 +1,4 @@
-"""Wrappers that carry an element from one domain to another: specimen, cam, pull-only contact."""
+"""A cam carries an element of extension and force to angle and torque."""
 
 from __future__ import annotations
 
@@ -8,61 +8,12 @@ from typing import ClassVar, Self
 
 from ...errors import ArrangementError
 from ...quantity import Quantity
-from ...symbolic import Expression, positive_part
-from ..core.element import (
-    MATERIAL,
-    ROTATION,
-    TRANSLATION,
-    Combination,
-    Domain,
-    Element,
-    Scope,
-    observed_effort,
-)
-from ..core.part import RESERVED, Part, check_names, parameter
+from ...symbolic import Expression
+from ..core.domain import ROTATION, TRANSLATION, Domain
+from ..core.element import Element, Scope, observed_effort
+from ..core.parameters import parameter
+from ..core.part import RESERVED, Part, check_names
 from .cam import Cam
-
-
-@dataclass(frozen=True, kw_only=True)
-class Specimen(Combination):
-    """A piece of material: ε = e/L₀, F = A₀·Σσ of the laws inside, which act in parallel.
-
-    Nominal stress and nominal strain, as in the paper: A₀ and L₀ are those of the unstretched piece.
-    Source: Austin et al. 2015, eq. (1), with a = A₀/L₀.
-    """
-
-    picture: ClassVar[str] = "none"
-
-    area: Quantity = parameter("m^2", "cross-section of the unstretched piece", minimum=1e-8, maximum=1.0)
-    rest_length: Quantity = parameter("m", "length of the unstretched piece", minimum=1e-4, maximum=5.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self._inner != MATERIAL:
-            raise ArrangementError(
-                f"Specimen member '{self.members[0][0]}'",
-                "a specimen needs laws of stress and strain",
-                next_step="use for instance LinearElastic instead of Spring",
-            )
-
-    @property
-    def domain(self) -> Domain:
-        """Extension and force."""
-        return TRANSLATION
-
-    @property
-    def needs_rate(self) -> bool:
-        """True if any law inside needs the rate."""
-        return any(member.needs_rate for _, member in self.members)
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return F = A₀·Σσ(e/L₀)."""
-        length = scope.parameter("rest_length")
-        stresses = [
-            observed_effort(m, scope.child(n), motion / length, rate / length) for n, m in self.members
-        ]
-        scope.signal("strain", motion / length, "1", f"strain of {scope.path}")
-        return scope.parameter("area") * sum(stresses[1:], start=stresses[0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +29,9 @@ class Through(Element):
     behind
         Name and element.
     """
+
+    domain: ClassVar[Domain] = ROTATION
+    phenomena: ClassVar[frozenset[str]] = frozenset({"cam"})
 
     cam: Cam
     behind: tuple[str, Element]
@@ -101,11 +55,6 @@ class Through(Element):
                 f"relates {element.domain.motion} and {element.domain.effort}; a cam needs a force",
                 next_step="put a specimen around a material, or use a linear spring",
             )
-
-    @property
-    def domain(self) -> Domain:
-        """Angle and torque."""
-        return ROTATION
 
     @property
     def needs_rate(self) -> bool:
@@ -140,35 +89,6 @@ class Through(Element):
         return inside.parameter("elements") * lever_arm * force
 
 
-@dataclass(frozen=True, kw_only=True)
-class PullOnly(Combination):
-    """A cable that only pulls: F = max(F inside, 0), rounded over ``width``, C∞.
-
-    While the cable is slack the element inside is still led by the extension, so its memory is that of a
-    rod, not of a free piece: good for short slack times, see the known gaps.
-    Source: Signorini 1933 (unilateral contact); this rounding is the softplus of Dugas et al. 2001.
-    """
-
-    width: Quantity = parameter(
-        "N", "force over which the corner is rounded", minimum=1e-6, maximum=1e3, default=0.1
-    )
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self._inner != TRANSLATION:
-            raise ArrangementError("PullOnly", "acts on extension and force")
-
-    @property
-    def needs_rate(self) -> bool:
-        """True if any element inside needs the rate."""
-        return any(member.needs_rate for _, member in self.members)
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return the smooth positive part of the sum of forces."""
-        forces = [observed_effort(m, scope.child(n), motion, rate) for n, m in self.members]
-        return positive_part(sum(forces[1:], start=forces[0]), scope.parameter("width"))
-
-
 def through(cam: Cam, *, pretension: Quantity | float | None = None, **behind: Element) -> Through:
     """Put an element behind a cam or pulley.
 
@@ -196,29 +116,3 @@ def through(cam: Cam, *, pretension: Quantity | float | None = None, **behind: E
     if pretension is None:
         return Through(cam=cam, behind=from_name)
     return Through(cam=cam, behind=from_name, pretension=pretension)  # type: ignore[arg-type]
-
-
-def specimen(*, area: Quantity | float, rest_length: Quantity | float, **laws: Element) -> Specimen:
-    """Make a piece of material from laws of stress and strain that act in parallel.
-
-    Parameters
-    ----------
-    area
-        Cross-section in m².
-    rest_length
-        Unstretched length in m.
-    **laws
-        Elements by name.
-    """
-    return Specimen(area=area, rest_length=rest_length, members=tuple(laws.items()))  # type: ignore[arg-type]
-
-
-def pull_only(**elements: Element) -> PullOnly:
-    """Let elements in parallel only pull.
-
-    Parameters
-    ----------
-    **elements
-        Elements of extension and force by name.
-    """
-    return PullOnly(members=tuple(elements.items()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -22,6 +23,8 @@ class MisshapenCam(TwoSidedCam):
     same on both sides, and h ≡ dδ/dθ holds with it: lever arm and extension are wrong together. Beyond the
     contour's end E stays what it was there. Valid while H + E > 0. Source: virtual work, as for the cam.
     """
+
+    phenomena: ClassVar[frozenset[str]] = frozenset({"profile error"})
 
     error: Quantity = parameter(
         "m", "control values of the error of the lever arm", minimum=-0.05, maximum=0.05, row=True

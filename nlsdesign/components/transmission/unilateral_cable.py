@@ -1,17 +1,43 @@
-"""A cable that only pulls, with true contact: what it pulls is free while the cable is slack."""
+"""Cables that only pull: the force cut off smoothly, or true contact that frees what is pulled."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
 from ...errors import ArrangementError
 from ...quantity import Quantity
-from ...symbolic import Expression, symbol
-from ..core.element import TRANSLATION, Combination, Element, Scope, observed_effort
-from .cam_drive import PullOnly
+from ...symbolic import Expression, positive_part, symbol
+from ..core.domain import TRANSLATION, Domain
+from ..core.element import Combination, Element, Scope
+from ..core.parameters import parameter
 from .stretchy_cable import newton_root
+
+
+@dataclass(frozen=True, kw_only=True)
+class PullOnly(Combination):
+    """A cable that only pulls: F = max(F inside, 0), rounded over ``width``, C∞.
+
+    A law of its own beside :class:`InextensibleCable`, not another reading of it: this one cuts the force of
+    a piece that goes on moving, the other frees the piece, so they differ where the piece remembers.
+    While the cable is slack the element inside is still led by the extension, so its memory is that of a
+    rod, not of a free piece: good for short slack times, see the known gaps.
+    Source: Signorini 1933 (unilateral contact); this rounding is the softplus of Dugas et al. 2001.
+    """
+
+    takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION,)
+    placing: ClassVar[str | None] = "put it behind the cam: through(cam, cable=...)"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"unilateral contact"})
+
+    width: Quantity = parameter(
+        "N", "force over which the corner is rounded", minimum=1e-6, maximum=1e3, default=0.1
+    )
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the smooth positive part of the sum of forces."""
+        return positive_part(self.inside(scope, motion, rate), scope.parameter("width"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,10 +50,12 @@ class InextensibleCable(Combination):
     Source: complementarity, e.g. Acary and Brogliato 2008.
     """
 
+    takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION,)
+    placing: ClassVar[str | None] = "put it behind the cam: through(cam, cable=...)"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"unilateral contact"})
+
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.domain != TRANSLATION:
-            raise ArrangementError("InextensibleCable", "acts on extension and force")
         for name, member in self.members:
             if member.needs_rate:
                 raise ArrangementError(
@@ -44,8 +72,7 @@ class InextensibleCable(Combination):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return ΣF(max(e, y₀))."""
         left, left_rate = symbol(f"{scope.path}.left"), symbol(f"{scope.path}.left_rate")
-        forces = [observed_effort(m, scope.child(n), left, left_rate) for n, m in self.members]
-        force = sum(forces[1:], start=forces[0])
+        force = self.inside(scope, left, left_rate)
         resting = newton_root(force, left, motion)
         place = ca.fmax(motion, resting)
         # While taut this is the positive force itself; while slack it must vanish.
@@ -56,7 +83,12 @@ class InextensibleCable(Combination):
         scope.define(left_rate, ca.if_else(motion >= resting, rate, 0))
         return ca.fmax(ca.substitute(force, left, place), 0)
 
-    def smooth(self, width: float = 0.1) -> Element:
+    @property
+    def is_smooth(self) -> bool:
+        """False: where it becomes taut is located."""
+        return False
+
+    def smooth(self, width: float | None = None) -> Element:
         """Return :class:`PullOnly`, C∞; the force differs by at most width·ln 2 while nothing relaxes inside.
 
         Parameters
@@ -64,5 +96,16 @@ class InextensibleCable(Combination):
         width
             Force over which the corner is rounded, in N.
         """
-        rounded = Quantity(width, "N", "assumed: width of the smooth form")
+        rounded = Quantity(0.1 if width is None else width, "N", "assumed: width of the smooth form")
         return PullOnly(width=rounded, members=self.members)
+
+
+def pull_only(**elements: Element) -> PullOnly:
+    """Let elements in parallel only pull.
+
+    Parameters
+    ----------
+    **elements
+        Elements of extension and force by name.
+    """
+    return PullOnly(members=tuple(elements.items()))

@@ -1,87 +1,57 @@
-"""The catalogue of missing effects: functions that return an assembly with the effect in it."""
+"""The catalogue of missing effects, in tables: each row is an effect, and makes assemblies that have it.
 
-from .ageing import permanent_set, self_heating, stress_softening
-from .cable import cable_compliance, cable_friction, cable_slack, cam_angle_offset, cam_profile_error
-from .candidate import Candidate, Effect, Unknown, wrapped
-from .drive import drive_delay, torque_constant_saturation
-from .friction import (
-    backlash,
-    coulomb_friction,
-    load_dependent_friction,
-    quadratic_drag,
-    stribeck_friction,
-    torque_ripple,
-)
-from .rubber import rate_independent_hysteresis, second_relaxation, strain_stiffening
-from .sensing import (
-    angle_sensor_eccentricity,
-    current_sensor_bias,
-    force_sensor_bias,
-    force_sensor_delay,
-    force_sensor_drift,
-    force_sensor_gain,
-)
-from .sliding import constant_force
+A row, or a function with a rank, is found by standing in a module of this room; it needs to be in no list.
+"""
 
-ALL: tuple[Effect, ...] = (
-    coulomb_friction,
-    stribeck_friction,
-    load_dependent_friction,
-    quadratic_drag,
-    torque_ripple,
-    backlash,
-    current_sensor_bias,
-    cable_compliance,
-    cable_slack,
-    cam_angle_offset,
-    second_relaxation,
-    rate_independent_hysteresis,
-    force_sensor_delay,
-    force_sensor_bias,
-    force_sensor_gain,
-    drive_delay,
-    torque_constant_saturation,
-    strain_stiffening,
-    cam_profile_error,
-    angle_sensor_eccentricity,
-    stress_softening,
-    permanent_set,
-    self_heating,
-    cable_friction,
-    force_sensor_drift,
-    constant_force,
-)
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Iterator
+
+from ...errors import unknown_name
+from .candidate import Candidate, EffectFunction, Unknown, wrapped
+from .effect import Edit, Effect, Form, Ranked, ranked
+
+
+def _rows() -> Iterator[Effect | Ranked]:
+    for found in pkgutil.iter_modules(__path__, f"{__name__}."):
+        module = importlib.import_module(found.name)
+        yield from (value for value in vars(module).values() if isinstance(value, Effect | Ranked))
+
+
+def catalogue() -> tuple[Effect | Ranked, ...]:
+    """Return the effects of all modules of this room, in the order of their ranks.
+
+    The order decides between effects that the records cannot tell apart.
+    """
+    by_name = {row.__name__: row for row in _rows()}
+    return tuple(sorted(by_name.values(), key=lambda row: row.rank))
+
+
+ALL: tuple[Effect | Ranked, ...] = catalogue()
+
+
+def __getattr__(name: str) -> Effect | Ranked:
+    """Return an effect of the catalogue by its identifier."""
+    for row in ALL:
+        if row.__name__ == name:
+            return row
+    if name.startswith("__"):
+        raise AttributeError(name)
+    raise AttributeError(str(unknown_name("effect", name, [row.__name__ for row in ALL])))
+
 
 __all__ = [
     "ALL",
     "Candidate",
+    "Edit",
     "Effect",
+    "EffectFunction",
+    "Form",
+    "Ranked",
     "Unknown",
-    "angle_sensor_eccentricity",
-    "backlash",
-    "cable_compliance",
-    "cable_friction",
-    "cable_slack",
-    "cam_angle_offset",
-    "cam_profile_error",
-    "constant_force",
-    "coulomb_friction",
-    "current_sensor_bias",
-    "drive_delay",
-    "force_sensor_bias",
-    "force_sensor_delay",
-    "force_sensor_drift",
-    "force_sensor_gain",
-    "load_dependent_friction",
-    "permanent_set",
-    "quadratic_drag",
-    "rate_independent_hysteresis",
-    "second_relaxation",
-    "self_heating",
-    "strain_stiffening",
-    "stress_softening",
-    "stribeck_friction",
-    "torque_constant_saturation",
-    "torque_ripple",
+    "catalogue",
+    "ranked",
     "wrapped",
 ]

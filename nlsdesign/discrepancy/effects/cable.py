@@ -1,242 +1,207 @@
-"""Effects of cam and cable: compliance, slack, a turned cam."""
+"""Effects of cam and cable: compliance, slack, friction on a guide, a turned cam, a cam cut wrongly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator
 
 from ...components import (
     Assembly,
-    CableGuide,
+    CapstanFriction,
+    Element,
     InextensibleCable,
     MisshapenCam,
     PullOnly,
     Slack,
+    Specimen,
     StretchyCable,
     Tie,
     Turned,
     TwoSidedCam,
+    WrapProduct,
 )
-from ...components.core.element import ROTATION, TRANSLATION, Element
+from ...components.core.domain import TRANSLATION
+from ...components.core.part import Part
 from ...components.transmission.cam_drive import Through
 from ...quantity import Quantity
-from .candidate import SOURCE, Candidate, Unknown, numbers_of, wrapped
-from .large_strain import buckling
+from .candidate import SOURCE, Unknown, numbers_of, wrapped
+from .effect import Edit, Effect, Form
+from .friction import number
+from .places import laws, stretched, turning_ties, wrapping
 
 _CONTROL_VALUES = 7
 """Of the error of a contour: four spans, a quarter of the contour each."""
+_CREEP_SPEED = 2e-4
+"""Speed in m/s at which a fitted cable still creeps over its guide."""
 
 
-def stretched(assembly: Assembly) -> list[str]:
-    """Return the paths of what a cam stretches: behind the cam, and inside a cable that only pulls.
+def _without_rate(assembly: Assembly) -> list[str]:
+    return [path for path in stretched(assembly) if not assembly.element(path).needs_rate]
 
-    Parameters
-    ----------
-    assembly
-        As declared.
+
+def _stretchy(assembly: Assembly, path: str) -> Iterator[Edit]:
+    edited = wrapped(assembly, path, "elastic", wrapping(StretchyCable, stiffness=number(1e5, "N/m")))
+    name = f"{path.rpartition('.')[0]}.elastic.stiffness"
+    yield Edit(edited, (Unknown(name, (3e4, 3e5), 1e3, 1e7),))
+
+
+def _pulled(assembly: Assembly) -> list[str]:
+    """Return what a cam stretches, with the cable of true contact that it may hang on.
+
+    True contact asks where the piece inside rests; inside a slack wrapper it would rest anywhere.
     """
-    found = []
-    for path, part in assembly.walk():
-        element = part.element if isinstance(part, Tie) else part
-        if isinstance(element, Through):
-            inner = f"{path}.{element.behind[0]}"
-            while (
-                isinstance(assembly[inner], PullOnly | InextensibleCable | Slack | CableGuide)
-                and len(assembly[inner].children()) == 1
-            ):
-                inner = f"{inner}.{next(iter(assembly[inner].children()))}"
-            found.append(inner)
-    return found
-
-
-def is_inside(assembly: Assembly, path: str, kind: type[Element]) -> bool:
-    """Tell whether a part, or any part around it, is of a kind.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    path
-        Of the part.
-    kind
-        Of element.
-    """
-    owners = path.split(".")
-    parts = [assembly[".".join(owners[: i + 1])] for i in range(len(owners))]
-    return any(isinstance(p.element if isinstance(p, Tie) else p, kind) for p in parts)
-
-
-def cable_compliance(assembly: Assembly) -> Sequence[Candidate]:
-    """A cable that stretches, in series with what the cam stretches.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
-    found = []
+    paths = []
     for path in stretched(assembly):
-        if is_inside(assembly, path, StretchyCable) or assembly.element(path).needs_rate:
-            continue
-        stiffness = Quantity(1e5, "N/m", SOURCE)
-        edited = wrapped(assembly, path, "elastic", _stretchy(stiffness))
-        name = f"{path.rpartition('.')[0]}.elastic.stiffness"
-        found.append(
-            Candidate(
-                "cable_compliance",
-                path,
-                edited,
-                (Unknown(name, (3e4, 3e5), 1e3, 1e7),),
-                "force that falls short the more, the larger it is, without loss",
-                "Hooke 1678",
-            )
-        )
-    return found
+        if assembly.element(path).domain == TRANSLATION:
+            outer, owner = path, path.rpartition(".")[0]
+            while owner and isinstance(assembly[owner], InextensibleCable):
+                outer, owner = owner, owner.rpartition(".")[0]
+            paths.append(outer)
+    return paths
 
 
-def cable_slack(assembly: Assembly) -> Sequence[Candidate]:
-    """A cable that is too long, rubber that has set, or a piece that buckles instead of pushing.
+def _slack(assembly: Assembly, path: str) -> Iterator[Edit]:
+    def around(name: str, element: Element) -> Element:
+        return Slack(members=((name, element),), length=number(1e-4, "m")).smooth()
 
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
-    found = []
-    for inner in stretched(assembly):
-        if is_inside(assembly, inner, Slack) or assembly[inner].domain != TRANSLATION:  # type: ignore[attr-defined]
-            continue
-        # True contact asks where the piece inside rests; inside a slack wrapper it would rest anywhere.
-        path, owner = inner, inner.rpartition(".")[0]
-        while owner and isinstance(assembly[owner], InextensibleCable):
-            path, owner = owner, owner.rpartition(".")[0]
-        length = Quantity(1e-4, "m", SOURCE)
-        edited = wrapped(assembly, path, "slack", _slack(length))
-        of = f"{path}.extension"
-        found.append(
-            Candidate(
-                "cable_slack",
-                path,
-                edited,
-                (Unknown(f"{path.rpartition('.')[0]}.slack.length", (0.02, 0.1), 1e-4, 0.8, of),),
-                "no force until a certain extension, the same at any speed",
-                "geometry",
-            )
-        )
-    return [*found, *buckling(assembly)]
+    length = Unknown(f"{path.rpartition('.')[0]}.slack.length", (0.02, 0.1), 1e-4, 0.8, f"{path}.extension")
+    yield Edit(wrapped(assembly, path, "slack", around), (length,))
 
 
-def cable_friction(assembly: Assembly) -> Sequence[Candidate]:
-    """A cable that rubs on a guide: between load cell and cam, or where nothing reads its force, anywhere.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
-    found = []
-    for path, part in assembly.walk():
-        element = part.element if isinstance(part, Tie) else part
-        if not isinstance(element, Through) or isinstance(element.behind[1], CableGuide):
-            continue
-        for outside in (False, True) if _is_read(assembly, f"{path}.{element.behind[0]}") else (False,):
-            edited = wrapped(assembly, f"{path}.{element.behind[0]}", "guide", _guide, read_outside=outside)
-            found.append(
-                Candidate(
-                    "cable_friction",
-                    f"{path}.{element.behind[0]}",
-                    edited,
-                    (Unknown(f"{path}.guide.wrap", (0.05,), 1e-3, 2.0),),
-                    "force in proportion to the load, against the motion, between motor and load cell"
-                    if not outside
-                    else "a loop of force over extension in proportion to the force, at any speed",
-                    "Euler 1769, Eytelwein 1808",
-                )
-            )
-    return found
+def _tied_specimens(assembly: Assembly) -> list[str]:
+    return [n for n, p in assembly.parts if isinstance(p, Tie) and isinstance(p.element, Specimen)]
 
 
-def _guide(name: str, element: Element) -> Element:
-    return CableGuide(members=((name, element),), wrap=Quantity(0.01, "1", SOURCE))
+def _buckling(assembly: Assembly, name: str) -> Iterator[Edit]:
+    # A sensor of the force between the bodies goes on reading that, not what the piece would push.
+    pulled = PullOnly(members=(("piece", assembly.element(name)),), width=number(1e-3, "N"))
+    width = Unknown(f"{name}.width", (0.01,), 1e-4, 0.2, f"{name}.force")
+    yield Edit(assembly.with_part(name, pulled), (width,))
 
 
-def _is_read(assembly: Assembly, path: str) -> bool:
-    return any(sensor.of.startswith(f"{path}.") for sensor in assembly.sensors().values())
+def _behind_cams(assembly: Assembly) -> list[str]:
+    return [f"{path}.{p.behind[0]}" for path, p in laws(assembly) if isinstance(p, Through)]
 
 
-def cam_angle_offset(assembly: Assembly) -> Sequence[Candidate]:
-    """A cam that sits turned on its shaft.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
-    found = []
-    for name, part in assembly.parts:
-        if not isinstance(part, Tie) or part.element.domain != ROTATION or not _holds_cam(assembly, name):
-            continue
-        if isinstance(part.element, Turned):
-            continue
-        edited = wrapped(
-            assembly,
-            name,
-            "turned",
-            lambda n, e: Turned(members=((n, e),), offset=Quantity(0.0, "rad", SOURCE)),
-        )
-        found.append(
-            Candidate(
-                "cam_angle_offset",
-                name,
-                edited,
-                (Unknown(f"{name}.offset", (-0.02, 0.02), -0.5, 0.5),),
-                "more force on one side than at the same angle on the other",
-                "geometry",
-            )
-        )
-    return found
+def _read_behind_cams(assembly: Assembly) -> list[str]:
+    read = [sensor.of for sensor in assembly.sensors().values()]
+    return [path for path in _behind_cams(assembly) if any(of.startswith(f"{path}.") for of in read)]
 
 
-def cam_profile_error(assembly: Assembly) -> Sequence[Candidate]:
-    """A cam that was not cut as it was drawn.
-
-    Parameters
-    ----------
-    assembly
-        As declared; pulleys have no profile.
-    """
-    found = []
-    for path, part in assembly.walk():
-        if not isinstance(part, TwoSidedCam) or isinstance(part, MisshapenCam):
-            continue
-        error = Quantity((0.0,) * _CONTROL_VALUES, "m", SOURCE)
-        of = f"{path}.lever_arm_now"
-        found.append(
-            Candidate(
-                "cam_profile_error",
-                path,
-                assembly.with_part(path, MisshapenCam(**numbers_of(part), error=error)),
-                tuple(
-                    Unknown(f"{path}.error[{i}]", (0.0,), -0.5, 0.5, of)
-                    for i in range(1, _CONTROL_VALUES + 1)
-                ),
-                "force and torque over the angle that are off together, at any speed and on both sides alike",
-                "virtual work",
-            )
-        )
-    return found
-
-
-def _holds_cam(assembly: Assembly, name: str) -> bool:
-    return any(
-        isinstance(p.element if isinstance(p, Tie) else p, Through)
-        for path, p in assembly.walk()
-        if path == name or path.startswith(name + ".")
+def _guided(assembly: Assembly, path: str, *, read_outside: bool = False) -> Iterator[Edit]:
+    guide = wrapping(
+        CapstanFriction, guide=WrapProduct(wrap=number(0.01, "1")), creep_speed=number(_CREEP_SPEED, "m/s")
     )
+    edited = wrapped(assembly, path, "guide", guide, read_outside=read_outside)
+    yield Edit(edited, (Unknown(f"{path.rpartition('.')[0]}.guide.wrap", (0.05,), 1e-3, 2.0),))
 
 
-def _stretchy(stiffness: Quantity) -> Callable[[str, Element], Element]:
-    return lambda name, element: StretchyCable(members=((name, element),), stiffness=stiffness)
+def _guided_inside(assembly: Assembly, path: str) -> Iterator[Edit]:
+    return _guided(assembly, path, read_outside=True)
 
 
-def _slack(length: Quantity) -> Callable[[str, Element], Element]:
-    return lambda name, element: Slack(members=((name, element),), length=length)
+def _holds_cam(part: Part) -> bool:
+    return isinstance(part, Through)
+
+
+def _turning_cams(assembly: Assembly) -> list[str]:
+    return turning_ties(assembly, _holds_cam)
+
+
+def _turned(assembly: Assembly, name: str) -> Iterator[Edit]:
+    edited = wrapped(assembly, name, "turned", wrapping(Turned, offset=number(0.0, "rad")))
+    yield Edit(edited, (Unknown(f"{name}.offset", (-0.02, 0.02), -0.5, 0.5),))
+
+
+def _contours(assembly: Assembly) -> list[str]:
+    return [path for path, part in assembly.walk() if isinstance(part, TwoSidedCam)]
+
+
+def _misshapen(assembly: Assembly, path: str) -> Iterator[Edit]:
+    error = Quantity((0.0,) * _CONTROL_VALUES, "m", SOURCE)
+    cam = MisshapenCam(**numbers_of(assembly[path]), error=error)
+    of = f"{path}.lever_arm_now"
+    items = range(1, _CONTROL_VALUES + 1)
+    unknowns = tuple(Unknown(f"{path}.error[{i}]", (0.0,), -0.5, 0.5, of) for i in items)
+    yield Edit(assembly.with_part(path, cam), unknowns)
+
+
+cable_compliance = Effect(
+    "cable_compliance",
+    "A cable that stretches, in series with what the cam stretches.",
+    80,
+    (
+        Form(
+            _without_rate,
+            _stretchy,
+            "force that falls short the more, the larger it is, without loss",
+            "Hooke 1678",
+            "cable compliance",
+        ),
+    ),
+)
+cable_slack = Effect(
+    "cable_slack",
+    "A cable that is too long, rubber that has set, or a piece that buckles instead of pushing.",
+    90,
+    (
+        Form(
+            _pulled, _slack, "no force until a certain extension, the same at any speed", "geometry", "slack"
+        ),
+        Form(
+            _tied_specimens,
+            _buckling,
+            "no force on the way back from where the memory of the piece would have to push",
+            "geometry",
+            "unilateral contact",
+        ),
+    ),
+)
+cam_angle_offset = Effect(
+    "cam_angle_offset",
+    "A cam that sits turned on its shaft.",
+    100,
+    (
+        Form(
+            _turning_cams,
+            _turned,
+            "more force on one side than at the same angle on the other",
+            "geometry",
+            "angle offset",
+        ),
+    ),
+)
+cam_profile_error = Effect(
+    "cam_profile_error",
+    "A cam that was not cut as it was drawn; pulleys have no profile.",
+    190,
+    (
+        Form(
+            _contours,
+            _misshapen,
+            "force and torque over the angle that are off together, at any speed and on both sides alike",
+            "virtual work",
+            "profile error",
+        ),
+    ),
+)
+cable_friction = Effect(
+    "cable_friction",
+    "A cable that rubs on a guide: between load cell and cam, or where nothing reads its force, anywhere.",
+    240,
+    (
+        Form(
+            _behind_cams,
+            _guided,
+            "force in proportion to the load, against the motion, between motor and load cell",
+            "Euler 1769, Eytelwein 1808",
+            "cable friction",
+        ),
+        Form(
+            _read_behind_cams,
+            _guided_inside,
+            "a loop of force over extension in proportion to the force, at any speed",
+            "Euler 1769, Eytelwein 1808",
+            "cable friction",
+        ),
+    ),
+)

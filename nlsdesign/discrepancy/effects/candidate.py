@@ -71,7 +71,7 @@ class Candidate:
     explains_lag: bool = False
 
 
-Effect: TypeAlias = Callable[[Assembly], Sequence[Candidate]]
+EffectFunction: TypeAlias = Callable[[Assembly], Sequence[Candidate]]
 """A function from an assembly to the ways in which it can have the effect; none where it cannot."""
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ...components import Assembly, DelayedMotor, GearedMotor, SaturatingMotor
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, numbers_of
+from .effect import ranked
 
 
 def _ideal_motors(assembly: Assembly) -> list[tuple[str, GearedMotor]]:
@@ -14,6 +15,7 @@ def _ideal_motors(assembly: Assembly) -> list[tuple[str, GearedMotor]]:
     return [(n, p) for n, p in assembly.parts if isinstance(p, GearedMotor) and type(p) is GearedMotor]
 
 
+@ranked(160)
 def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
     """A motor whose torque follows the measured current late.
 
@@ -29,13 +31,14 @@ def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
             assembly.with_part(name, DelayedMotor(**numbers_of(motor), delay=Quantity(1e-3, "s", SOURCE))),
             (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
             "torque that follows the current late, the more the faster the current changes",
-            "Golub and Van Loan (Padé table)",
+            "Golub and Van Loan 2013 (Padé table)",
             explains_lag=True,
         )
         for name, motor in _ideal_motors(assembly)
     ]
 
 
+@ranked(170)
 def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
     """A motor whose iron saturates.
 
@@ -54,7 +57,7 @@ def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
             ),
             (Unknown(f"{name}.saturation_current", (1.5,), 0.2, 50.0, f"{name}.current"),),
             "torque that falls short the more, the larger the current, with either sign",
-            "Froelich's curve of magnetisation; Hanselman 2003",
+            "Hanselman 2003 (saturation; Froelich's curve of magnetisation)",
         )
         for name, motor in _ideal_motors(assembly)
     ]

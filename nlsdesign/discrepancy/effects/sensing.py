@@ -16,8 +16,10 @@ from ...components import (
 )
 from ...quantity import Quantity
 from .candidate import SOURCE, Candidate, Unknown, numbers_of
+from .effect import ranked
 
 
+@ranked(130)
 def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell whose reading comes late.
 
@@ -44,13 +46,14 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
                 assembly.with_part(name, late),
                 (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
                 "force that follows the motion late, the more the faster; as much in the torque balance",
-                "Golub and Van Loan (Padé table)",
+                "Golub and Van Loan 2013 (Padé table)",
                 explains_lag=True,
             )
         )
     return found
 
 
+@ranked(140)
 def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell whose zero is off.
 
@@ -73,6 +76,7 @@ def force_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(150)
 def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell that reads too much or too little in proportion.
 
@@ -95,6 +99,7 @@ def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(70)
 def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     """An ammeter whose zero is off, or a constant torque on the body that the current drives.
 
@@ -117,6 +122,7 @@ def current_sensor_bias(assembly: Assembly) -> Sequence[Candidate]:
     ]
 
 
+@ranked(200)
 def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
     """An encoder whose disc sits off its shaft, on the shaft that is read or on the motor in front of a gear.
 
@@ -145,7 +151,7 @@ def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
                     assembly.with_part(name, faulty),
                     tuple(unknowns),
                     "force, torque and inertia that are off together, as a sine of the angle",
-                    "geometry; data sheets of encoders",
+                    "geometry; data sheets",
                 )
             )
     return found
@@ -160,6 +166,7 @@ def _disc_orders(assembly: Assembly, read: str) -> list[Quantity]:
     return [once]
 
 
+@ranked(250)
 def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
     """A load cell whose zero wanders from the start of each record.
 

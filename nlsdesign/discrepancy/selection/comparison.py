@@ -19,7 +19,7 @@ from ...identification.estimation.parameters import declared_parameter, free_par
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
 from ...model import Assembly, Variable
-from ...parallel_map import parallel_map
+from ...parallel import parallel_map
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Tally

@@ -10,8 +10,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 from ...errors import ConvergenceError
-from ...parallel_map import parallel_map
-from ..effects.candidate import Candidate, Effect
+from ...parallel import parallel_map
+from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
 from .criteria import (
     DECLARED,
@@ -108,7 +108,10 @@ class Outcome:
 
 
 def search(
-    comparison: Comparison, base: Hypothesis, catalogue: Sequence[Effect], progress: Callable[[str], None]
+    comparison: Comparison,
+    base: Hypothesis,
+    catalogue: Sequence[EffectFunction],
+    progress: Callable[[str], None],
 ) -> Outcome:
     """Add effects to a hypothesis while a block stays open and one helps.
 
@@ -131,7 +134,7 @@ class _Search:
     """Tries candidates on hypotheses, on all cores, and keeps account of what could not be tried."""
 
     comparison: Comparison
-    catalogue: Sequence[Effect]
+    catalogue: Sequence[EffectFunction]
     progress: Callable[[str], None]
     skipped: list[Skipped] = field(default_factory=list)
     ranking: tuple[tuple[Candidate, float], ...] = ()

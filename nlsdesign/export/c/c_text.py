@@ -1,4 +1,4 @@
-"""Words of C99: number types, literals, identifiers and comments."""
+"""C99 text: number types, literals, identifiers and comments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...errors import ExportError, nearest
 
 # C99 and C++ together: the headers are meant to be included from both.
 _KEYWORDS = frozenset(
-    word
+    keyword
     for line in (
         "auto break case char const continue default do double else enum extern float for goto if",
         "inline int long register restrict return short signed sizeof static struct switch typedef",
@@ -22,7 +22,7 @@ _KEYWORDS = frozenset(
         "nullptr operator or private protected public requires template this thread_local throw true",
         "try typeid typename using virtual wchar_t xor",
     )
-    for word in line.split()
+    for keyword in line.split()
 )
 
 
@@ -73,7 +73,7 @@ class Real:
         """
         if math.isnan(value):
             raise ExportError(
-                "the equations", "contain the constant NaN", next_step="mend the law that makes it"
+                "the equations", "contain the constant NaN", next_step="correct the law that contains it"
             )
         if math.isinf(value):
             return f"({'-' if value < 0 else ''}({self.name})INFINITY)"
@@ -141,12 +141,12 @@ def identifier(text: str) -> str:
     Parameters
     ----------
     text
-        Any name; what an identifier cannot hold becomes ``_``.
+        Any name; other characters become ``_``.
     """
-    word = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
-    if word[0].isdigit():
-        word = "_" + word
-    return word + "_" if word in _KEYWORDS else word
+    name = re.sub(r"[^A-Za-z0-9_]", "_", text) or "_"
+    if name[0].isdigit():
+        name = "_" + name
+    return name + "_" if name in _KEYWORDS else name
 
 
 def comment(text: str) -> str:
@@ -155,7 +155,7 @@ def comment(text: str) -> str:
     Parameters
     ----------
     text
-        Any text; line breaks become blanks.
+        Any text; line breaks become spaces.
     """
     flat = " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
     return flat.rstrip("\\")
@@ -176,7 +176,7 @@ def wrapped(text: str) -> list[str]:
 
 
 def signature(head: str, *parameters: str) -> str:
-    """Return the head of a function, its parameters on lines of their own if they do not fit on one.
+    """Return the head of a function, with one parameter per line if they do not fit on one line.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def string(text: str) -> str:
     Parameters
     ----------
     text
-        Any text; line breaks become blanks.
+        Any text; line breaks become spaces.
     """
     flat = " ".join(text.split())
     return '"' + flat.replace("\\", "\\\\").replace('"', '\\"').replace("??", '?""?') + '"'

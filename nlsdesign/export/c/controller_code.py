@@ -1,8 +1,8 @@
 """C99 for the controller: a discrete model as ``init`` and ``step`` on a structure that the caller owns.
 
-No heap, no recursion, nothing mutable outside the caller's structure, tables ``static const``, no loop: the
-work of a step is a straight line. Whatever comes in, states and outputs stay finite, and the status word says
-what was held or saturated. CasADi writes the arithmetic (see :mod:`.instructions`).
+No heap, no recursion, no mutable data outside the caller's structure, tables ``static const``, no loop: a
+step is straight-line code. For any input states and outputs stay finite, and the status word tells what was
+held or saturated. CasADi generates the arithmetic (see :mod:`.instructions`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
 from .structures import initialiser, member_paths, structure
-from .table_lookup import placed, table_data
+from .table_lookup import indexed_tables, table_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class CSource:
     Parameters
     ----------
     name
-        First word of all C names and of the files.
+        Prefix of all C names and of the files.
     model
         The model they compute.
     real
@@ -59,11 +59,11 @@ def export_c(
     model
         Discrete model: observer or controller.
     folder
-        Where the files go; it is made if it is missing.
+        Folder of the files; it is made if it is missing.
     real
         ``"double"`` or ``"float"``.
     name
-        First word of all C names; made from the name of the model by default.
+        Prefix of all C names; made from the name of the model by default.
 
     Returns
     -------
@@ -75,16 +75,21 @@ def export_c(
     ExportError
         If the model is continuous, depends on time, cannot be written in C, or the folder cannot be written.
     """
-    number, word = real_type(real), identifier(name or model.name)
+    number, prefix = real_type(real), identifier(name or model.name)
     check_discrete(model)
     place = Path(folder)
     source = CSource(
-        word, model, real, place / f"{word}.h", place / f"{word}.c", place / f"{word}_selftest.c"
+        prefix,
+        model,
+        real,
+        place / f"{prefix}.h",
+        place / f"{prefix}.c",
+        place / f"{prefix}_selftest.c",
     )
     texts = {
-        source.header: header_text(model, word, number),
-        source.source: source_text(model, word, number),
-        source.selftest: selftest_source(model, word, number),
+        source.header: header_text(model, prefix, number),
+        source.source: source_text(model, prefix, number),
+        source.selftest: selftest_source(model, prefix, number),
     }
     write_all(texts)
     return source
@@ -127,13 +132,13 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
     model
         Discrete model.
     name
-        First word of all C names.
+        Prefix of all C names.
     real
         Number type.
     """
     upper = name.upper()
     bits = [
-        f"#define {upper}_{word} 0x{bit:x}u /* {meaning} */" for word, (bit, meaning) in STATUS_BITS.items()
+        f"#define {upper}_{flag} 0x{bit:x}u /* {meaning} */" for flag, (bit, meaning) in STATUS_BITS.items()
     ]
     lines = [
         *_title(model),
@@ -215,11 +220,11 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     model
         Discrete model.
     name
-        First word of all C names.
+        Prefix of all C names.
     real
         Number type.
     """
-    words = {"real": real.name, "zero": real.literal(0.0), "NAME": name.upper()}
+    values = {"real": real.name, "zero": real.literal(0.0), "NAME": name.upper()}
     step, used = step_function(model, name, real)
     lines = [
         *_title(model),
@@ -233,22 +238,22 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
         "#endif",
         "",
     ]
-    for each in placed(model):
+    for each in indexed_tables(model):
         if each.columns(used):
             lines += [*table_data(each, real), ""]
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
-    for group, values in (
+    for group, variables in (
         ("parameters", model.parameters),
         ("states", model.states),
         ("inputs", inputs),
         ("outputs", outputs),
     ):
-        lines += [f"static const {name}_{group} start_{group} = {{", *initialiser(values, real), "};", ""]
+        lines += [f"static const {name}_{group} start_{group} = {{", *initialiser(variables, real), "};", ""]
     if model.inputs:
-        lines += [filled("controller_guard.c", words)]
+        lines += [filled("controller_guard.c", values)]
     if model.parameters:
-        lines += [filled("controller_parameter.c", words)]
+        lines += [filled("controller_parameter.c", values)]
     return "\n".join([*lines, *_start(model, name, real), "", *step]) + "\n"
 
 
@@ -258,7 +263,7 @@ def _at(variable: Variable, start: float) -> Variable:
 
 def _start(model: FlatModel, name: str, real: Real) -> list[str]:
     paths = member_paths(model.parameters)
-    taken = [
+    assignments = [
         f"take_over(parameters->{paths[v.name]}, {real.bound(v.minimum)}, {real.bound(v.maximum)}, "
         f"&state->parameters.{paths[v.name]}, 0x{index_bit(i):x}u, &status);"
         for i, v in enumerate(model.parameters)
@@ -273,7 +278,7 @@ def _start(model: FlatModel, name: str, real: Real) -> list[str]:
         "{",
         "    uint32_t status = 0u;",
         "",
-        *[f"    {line}" for line in taken],
+        *[f"    {line}" for line in assignments],
         "    return status;",
         "}",
         "",

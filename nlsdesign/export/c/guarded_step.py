@@ -1,4 +1,4 @@
-"""The discrete model in Python with the guards that the C code has; expected values come from here."""
+"""The discrete model in Python with the guards of the C code; the reference for its self-test."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def index_bit(index: int) -> int:
 
 
 def first_outputs(model: FlatModel, real: Real = DOUBLE) -> list[float]:
-    """Return what stands in for very first outputs that are not finite: those at the start, or 0.
+    """Return the outputs held before the first finite ones: those at the start, or 0.
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def first_outputs(model: FlatModel, real: Real = DOUBLE) -> list[float]:
     real
         Number type of the C code.
     """
-    found = model.evaluate(model.start(model.states).tolist(), model.start(model.inputs).tolist())
-    values = [real.round(found[each.name]) for each in model.outputs]
+    start = model.evaluate(model.start(model.states).tolist(), model.start(model.inputs).tolist())
+    values = [real.round(start[each.name]) for each in model.outputs]
     return [value if math.isfinite(value) else 0.0 for value in values]
 
 
 @dataclass
 class GuardedModel:
-    """One running instance of a discrete model, evaluated by CasADi, guarded as the C code is.
+    """One running instance of a discrete model, evaluated by CasADi, with the guards of the C code.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class GuardedModel:
         Parameters
         ----------
         inputs
-            Shape (inputs,); may hold anything.
+            Shape (inputs,); any numbers, NaN and infinity too.
 
         Returns
         -------

@@ -17,8 +17,8 @@ SAMPLES = 120
 DOUBLE_TOLERANCE = 1e-12
 """Largest difference relative to the largest size of each output, for double."""
 FLOAT_TOLERANCE = 2e-4
-"""The same for float: some 3000 times its rounding error of 6e-8. That is room for the rounding of a few
-hundred operations, which stable poles sum up over some ten samples, and finer than any wrong term."""
+"""The same for float: some 3000 times its rounding error of 6e-8. This covers the rounding of a few
+hundred operations, accumulated by stable poles over some ten samples, and still reveals a wrong term."""
 
 
 def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
@@ -65,19 +65,19 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
     model
         Discrete model.
     name
-        First word of all C names.
+        Prefix of all C names.
     real
         Number type.
     """
     inputs = sample_inputs(model, real)
     run = GuardedModel(model, real)
-    found = [run.step(row) for row in inputs.tolist()]
-    outputs = np.array([y for y, _ in found]).reshape(len(found), len(model.outputs))
+    results = [run.step(row) for row in inputs.tolist()]
+    outputs = np.array([y for y, _ in results]).reshape(len(results), len(model.outputs))
     size = np.abs(outputs).max(axis=0, initial=0.0)
     relative = DOUBLE_TOLERANCE if real.name == "double" else FLOAT_TOLERANCE
     tolerance = [relative * float(v) + real.epsilon**2 for v in size]
     u, y = member_paths(model.inputs).values(), member_paths(model.outputs).values()
-    status = ", ".join(f"0x{s:x}u" for _, s in found)
+    status = ", ".join(f"0x{s:x}u" for _, s in results)
     lines = [
         f"/* Self-test of {name}: returns 0, or the number of the first sample that differs. */",
         "#include <math.h>",
@@ -86,7 +86,7 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
         "",
         f'#include "{name}.h"',
         "",
-        f"#define SAMPLES {len(found)}",
+        f"#define SAMPLES {len(results)}",
         "",
         *_rows("given", inputs.tolist(), real),
         *_rows("expected", outputs.tolist(), real),

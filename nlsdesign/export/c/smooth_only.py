@@ -1,4 +1,4 @@
-"""Models whose equations jump are not written as code: nothing there would find the moment."""
+"""Refusal of models with discontinuous equations: generated code does not locate events."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from ...model import FlatModel
 
 
 def refuse_jumps(model: FlatModel) -> None:
-    """Raise if the equations of a model jump, as with friction that sticks.
+    """Raise if the equations of a model are discontinuous, for instance with stiction.
 
     Parameters
     ----------
@@ -22,6 +22,6 @@ def refuse_jumps(model: FlatModel) -> None:
     if model.switching is not None and model.switching.jumps:
         raise ExportError(
             f"model '{model.name}': '{model.switching.jumps[0]}'",
-            "is not smooth, and an integrator with fixed steps would not find where it sticks or strikes",
+            "is not smooth, and an integrator with fixed steps does not locate sticking and impacts",
             next_step="export the smooth form: flatten(smoothed(assembly))",
         )

@@ -1,4 +1,4 @@
-"""C structures whose members are called as the variables are: ``spring.rubber.relaxing.dashpot.strain``."""
+"""C structures with members named as the variables: ``spring.rubber.relaxing.dashpot.strain``."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def _tree(variables: Iterable[Variable]) -> _Branch:
     root = _Branch()
     for variable in variables:
         here = root
-        for word in variable.name.split("."):
-            here = here.branches.setdefault(_word(word), _Branch())
+        for member in variable.name.split("."):
+            here = here.branches.setdefault(_member(member), _Branch())
         if here.leaf is not None:
             raise ExportError(
                 f"'{here.leaf.name}' and '{variable.name}'",
@@ -33,9 +33,9 @@ def _tree(variables: Iterable[Variable]) -> _Branch:
     return root
 
 
-def _leaf_name(word: str, branch: _Branch) -> str:
-    # A name that is also the beginning of longer ones ends in an underscore.
-    return word + "_" if branch.branches else word
+def _leaf_name(member: str, branch: _Branch) -> str:
+    # A name that is also a prefix of longer names gets a trailing underscore.
+    return member + "_" if branch.branches else member
 
 
 def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
@@ -54,10 +54,10 @@ def member_paths(variables: Sequence[Variable]) -> dict[str, str]:
     paths: dict[str, str] = {}
 
     def walk(branch: _Branch, path: str) -> None:
-        for word, below in branch.branches.items():
+        for member, below in branch.branches.items():
             if below.leaf is not None:
-                paths[below.leaf.name] = path + _leaf_name(word, below)
-            walk(below, f"{path}{word}.")
+                paths[below.leaf.name] = path + _leaf_name(member, below)
+            walk(below, f"{path}{member}.")
 
     walk(_tree(variables), "")
     return {variable.name: paths[variable.name] for variable in variables}
@@ -77,7 +77,7 @@ def structure(
     real
         Number type.
     title
-        What the structure holds.
+        Description of the structure.
     numbered
         Whether the members are numbered in the order of the model.
     """
@@ -87,14 +87,14 @@ def structure(
         lines.append("    char none; /* C99 knows no empty structure */")
 
     def walk(branch: _Branch, indent: str) -> None:
-        for word, below in branch.branches.items():
+        for member, below in branch.branches.items():
             if below.leaf is not None:
                 remark = numbers[below.leaf.name] + _remark(below.leaf)
-                lines.append(f"{indent}{real.name} {_leaf_name(word, below)}; /* {remark} */")
+                lines.append(f"{indent}{real.name} {_leaf_name(member, below)}; /* {remark} */")
             if below.branches:
                 lines.append(f"{indent}struct {{")
                 walk(below, indent + "    ")
-                lines.append(f"{indent}}} {word};")
+                lines.append(f"{indent}}} {member};")
 
     walk(_tree(variables), "    ")
     return [*lines, f"}} {name};"]
@@ -110,7 +110,7 @@ def initialiser(variables: Sequence[Variable], real: Real, indent: str = "    ")
     real
         Number type.
     indent
-        Blanks before each line.
+        Indentation of each line.
     """
     if not variables:
         return [f"{indent}.none = 0"]
@@ -126,5 +126,5 @@ def _remark(variable: Variable) -> str:
     return comment(f"[{variable.unit}{limits}] {variable.description}{source}")
 
 
-def _word(text: str) -> str:
+def _member(text: str) -> str:
     return identifier(re.sub(r"\[(\d+)\]$", r"_\1", text))

@@ -1,4 +1,4 @@
-"""The table look-up in C: linear, held at the ends, no search because the grid is uniform, safe from NaN."""
+"""Table look-up in C: linear, held at the ends, without search on a uniform grid, defined for NaN."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from .c_text import Real, wrapped
 
 
 @dataclass(frozen=True)
-class Placed:
-    """A table with the place of its first column among the looked-up numbers of the model.
+class IndexedTable:
+    """A table with the index of its first column in the looked-up numbers of the model.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ class Placed:
         return [c for c in range(len(self.table.columns)) if self.first + c in used]
 
 
-def placed(model: FlatModel) -> list[Placed]:
-    """Return the tables of a model with their places.
+def indexed_tables(model: FlatModel) -> list[IndexedTable]:
+    """Return the tables of a model with their indices.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def placed(model: FlatModel) -> list[Placed]:
     """
     result, first = [], 0
     for number, table in enumerate(model.tables):
-        result.append(Placed(table, number, first))
+        result.append(IndexedTable(table, number, first))
         first += len(table.columns)
     return result
 
 
-def table_data(each: Placed, real: Real) -> list[str]:
-    """Return the definition of one table, row by row as it is read.
+def table_data(each: IndexedTable, real: Real) -> list[str]:
+    """Return the definition of one table, row by row.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def look_up(model: FlatModel, real: Real, arguments: Mapping[str, str], used: se
     """
     lines: list[str] = []
     indexed: dict[tuple[str, float, float, int], int] = {}
-    for each in placed(model):
+    for each in indexed_tables(model):
         columns = each.columns(used)
         if not columns:
             continue
@@ -113,7 +113,7 @@ def look_up(model: FlatModel, real: Real, arguments: Mapping[str, str], used: se
     return lines
 
 
-def _index(each: Placed, real: Real, argument: str) -> list[str]:
+def _index(each: IndexedTable, real: Real, argument: str) -> list[str]:
     k, last = each.number, each.table.values.shape[0] - 1
     low, high = real.literal(0.0), real.literal(float(last))
     lower = each.table.lower

@@ -19,7 +19,7 @@ from .cross_compiler import cache_folder, compile_library
 def natively(function: ca.Function) -> ca.Function:
     """Return a function as compiled code, for ``simulate(..., translate=natively)``.
 
-    Compiling takes a second or so; what was compiled before is found again by the text of its code.
+    Compilation takes about a second; results are cached under a hash of the code.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def natively(function: ca.Function) -> ca.Function:
         with tempfile.TemporaryDirectory(dir=folder) as name:
             source = Path(name) / "step.c"
             source.write_text(text, encoding="utf-8")
-            # Without this word CasADi's code hides the names by which it is found again.
+            # Without this definition the generated code does not export its functions.
             flags = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")
             built = compile_library([source], Path(name) / library.name, flags=flags)
             write_bytes(library, built.read_bytes())

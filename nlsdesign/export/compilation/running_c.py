@@ -1,4 +1,4 @@
-"""Running generated C from Python: for tests, benchmarks, and to trust what was generated."""
+"""Running generated C from Python, for tests and benchmarks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class CompiledStep:
     Raises
     ------
     ExportError
-        If the compiler is missing or finds a mistake.
+        If the compiler is missing or reports an error.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class CompiledStep:
         self._library.adapter_size.restype = ctypes.c_size_t
         for function in ("adapter_init", "adapter_set_parameters", "adapter_step"):
             getattr(self._library, function).restype = ctypes.c_uint32
-        # Of doubles, so that it is aligned.
+        # An array of doubles is aligned.
         self._state = (ctypes.c_double * (self._library.adapter_size() // 8 + 1))()
         given = None if parameters is None else self._array(parameters)
         self.first_status = int(self._library.adapter_init(self._state, given))
@@ -90,9 +90,9 @@ class CompiledStep:
     @property
     def states(self) -> NDArray[np.float64]:
         """The states in the order of the model."""
-        found = self._array([0.0] * len(self._source.model.states))
-        self._library.adapter_states(self._state, found)
-        return self._plain(found, len(self._source.model.states))
+        values = self._array([0.0] * len(self._source.model.states))
+        self._library.adapter_states(self._state, values)
+        return self._plain(values, len(self._source.model.states))
 
     def _array(self, values: Sequence[float]) -> Any:
         return (self._type * max(1, len(values)))(*[float(v) for v in values])
@@ -103,7 +103,7 @@ class CompiledStep:
 
 
 def _adapter(source: CSource) -> str:
-    """Return C that gives the named structures as vectors in the order of the model."""
+    """Return C that converts between the named structures and vectors in the order of the model."""
     model, name, real = source.model, source.name, source.real
     x, u, p, y = (
         list(member_paths(group).values())

@@ -1,4 +1,4 @@
-"""One loaded instance of an FMU, the same to the caller for FMI 2.0 and 3.0."""
+"""One loaded instance of an FMU, with the same interface for FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class FmuInstance:
     path
         The FMU.
     folder
-        Where it is unpacked; whoever made the folder removes it, after :meth:`close`.
+        Folder for its files; the owner of the folder removes it after :meth:`close`.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class FmuInstance:
         except Exception as error:
             raise ExportError(f"instance '{self.name}'", f"its library does not load: {error}") from error
         finally:
-            os.chdir(here)  # fmpy leaves it where loading failed
+            os.chdir(here)  # fmpy does not restore it where loading fails
 
     def _instantiate(self) -> None:
         def log(status: int, message: bytes) -> None:
@@ -113,8 +113,8 @@ class FmuInstance:
     @property
     def sample_time(self) -> float | None:
         """Sample time in s that the FMU states, ``None`` for a continuous one."""
-        found = self.variables.get("sample.time")
-        return float(found.start) if found is not None and found.variability == "constant" else None
+        period = self.variables.get("sample.time")
+        return float(period.start) if period is not None and period.variability == "constant" else None
 
     def unit(self, variable: str) -> str | None:
         """Return the unit of a variable, ``None`` if the FMU gives none.
@@ -124,8 +124,8 @@ class FmuInstance:
         variable
             Name of a variable.
         """
-        found = self.variables[variable]
-        return found.unit or (found.declaredType.unit if found.declaredType else None)
+        described = self.variables[variable]
+        return described.unit or (described.declaredType.unit if described.declaredType else None)
 
     def begin(self, start: float, stop: float) -> None:
         """Enter the initialization mode.
@@ -159,7 +159,7 @@ class FmuInstance:
         Raises
         ------
         ExportError
-            With the words of the FMU if it refuses.
+            With the message of the FMU if it refuses.
         """
         if values:
             references = [self.variables[name].valueReference for name in values]
@@ -177,9 +177,9 @@ class FmuInstance:
         Raises
         ------
         ExportError
-            With the words of the FMU if it refuses.
+            With the message of the FMU if it refuses.
         """
-        found: dict[str, float] = {}
+        values: dict[str, float] = {}
         real, integer = (self._fmu.getReal, self._fmu.getInteger) if self._two else (
             self._fmu.getFloat64, self._fmu.getInt32,
         )  # fmt: skip
@@ -187,9 +187,9 @@ class FmuInstance:
             chosen = [name for name in names if self.variables[name].type in types]
             if chosen:
                 with self._explained("reading"):
-                    values = read([self.variables[name].valueReference for name in chosen])
-                found |= {name: float(value) for name, value in zip(chosen, values, strict=True)}
-        return found
+                    numbers = read([self.variables[name].valueReference for name in chosen])
+                values |= {name: float(number) for name, number in zip(chosen, numbers, strict=True)}
+        return values
 
     def step(self, time: float, length: float) -> None:
         """Advance by one communication step.
@@ -202,7 +202,7 @@ class FmuInstance:
         Raises
         ------
         ConvergenceError
-            With the words of the FMU if it cannot.
+            With the message of the FMU if it cannot.
         """
         with self._explained(f"step from {time:g} s", ConvergenceError):
             self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=length)
@@ -213,13 +213,13 @@ class FmuInstance:
             if self._running:
                 self._fmu.terminate()
         except FMICallException:
-            pass  # it has failed before, and that was said
+            pass  # it failed before, which was reported
         finally:
             self._fmu.freeInstance()
 
 
 def _why(messages: Sequence[str], error: BaseException) -> str:
-    """Return the last words of the FMU, or those of fmpy if it said nothing."""
+    """Return the last message of the FMU, or that of fmpy without one."""
     return messages[-1] if messages else str(error)
 
 

@@ -1,4 +1,4 @@
-"""What each output and derivative depends on, from the sparsity of the symbolic Jacobian."""
+"""Dependencies of outputs and derivatives, from the sparsity of the symbolic Jacobian."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ...model.flat import Symbols
-from .fmu_variables import FmuVariable, Layout
+from .fmu_variables import FmuLayout, FmuVariable
 
 
 @dataclass(frozen=True)
-class Unknown:
-    """One entry of the model structure.
+class FmiUnknown:
+    """One unknown of the model structure, as FMI calls it.
 
     Parameters
     ----------
@@ -39,15 +39,15 @@ class Structure:
     outputs, derivatives
         Depend on inputs, continuous states and time.
     initial
-        What is computed at the start; depends also on parameters and start values.
+        Computed at the start; these depend also on parameters and start values.
     """
 
-    outputs: tuple[Unknown, ...]
-    derivatives: tuple[Unknown, ...]
-    initial: tuple[Unknown, ...]
+    outputs: tuple[FmiUnknown, ...]
+    derivatives: tuple[FmiUnknown, ...]
+    initial: tuple[FmiUnknown, ...]
 
 
-def model_structure(layout: Layout) -> Structure:
+def model_structure(layout: FmuLayout) -> Structure:
     """Return the model structure of an FMU.
 
     Parameters
@@ -61,19 +61,19 @@ def model_structure(layout: Layout) -> Structure:
     own = {v.name: i for i, v in enumerate(model.outputs)}
     given += [(v, ca.densify(s.output)[own[v.variable.name]]) for v in layout.outputs]
     rates = [(v, ca.densify(s.derivative)[i]) for i, v in enumerate(layout.derivatives)]
-    found = {v.reference: slopes for v, slopes in _slopes(layout, s, [*given, *rates])}
+    dependencies = {v.reference: slopes for v, slopes in _slopes(layout, s, [*given, *rates])}
 
     running = {0, *[v.reference for v in layout.inputs]}
     if model.sample_time is None:
         running |= {v.reference for v in layout.states}
 
-    def entry(variable: FmuVariable, *, initial: bool) -> Unknown:
+    def entry(variable: FmuVariable, *, initial: bool) -> FmiUnknown:
         kinds = {
             reference: "dependent" if initial and kind != "constant" else kind
-            for reference, kind in sorted(found[variable.reference].items())
+            for reference, kind in sorted(dependencies[variable.reference].items())
             if initial or reference in running
         }
-        return Unknown(variable, tuple(kinds), tuple(kinds.values()))
+        return FmiUnknown(variable, tuple(kinds), tuple(kinds.values()))
 
     outputs, derivatives = [v for v, _ in given], [v for v, _ in rates]
     computed = sorted([*layout.outputs, *derivatives], key=lambda v: v.reference)
@@ -85,7 +85,7 @@ def model_structure(layout: Layout) -> Structure:
 
 
 def _slopes(
-    layout: Layout, s: Symbols, unknowns: Sequence[tuple[FmuVariable, ca.SX]]
+    layout: FmuLayout, s: Symbols, unknowns: Sequence[tuple[FmuVariable, ca.SX]]
 ) -> list[tuple[FmuVariable, dict[int, str]]]:
     """Return for each unknown the value references it depends on, each with the kind of its slope."""
     knowns = [layout.time, *layout.states, *layout.inputs, *layout.parameters]
@@ -95,15 +95,15 @@ def _slopes(
     changing = ca.vertcat(s.time, s.state, s.input, s.table)
     varied = set(ca.jacobian_sparsity(ca.SX(ca.vertcat(*cells)), changing).row()) if cells else set()
     tuned = "fixed" if layout.model.sample_time is None else "tunable"
-    found: list[dict[int, str]] = [{} for _ in unknowns]
+    kinds_of: list[dict[int, str]] = [{} for _ in unknowns]
     rows, columns = slopes.sparsity().get_triplet()
     for number, (row, column) in enumerate(zip(rows, columns, strict=True)):
         kind = "dependent" if number in varied else "constant" if cells[number].is_constant() else tuned
-        found[row][knowns[column].reference] = kind
-    # What is looked up changes with the argument of its table.
+        kinds_of[row][knowns[column].reference] = kind
+    # Looked-up numbers change with the argument of their table.
     reference = {v.variable.name: v.reference for v in (*layout.states, *layout.inputs)}
     arguments = [reference[table.argument] for table in layout.model.tables for _ in table.columns]
     rows, columns = ca.jacobian_sparsity(expressions, s.table).get_triplet()
     for row, column in zip(rows, columns, strict=True):
-        found[row][arguments[column]] = "dependent"
-    return [(variable, kinds) for (variable, _), kinds in zip(unknowns, found, strict=True)]
+        kinds_of[row][arguments[column]] = "dependent"
+    return [(variable, kinds) for (variable, _), kinds in zip(unknowns, kinds_of, strict=True)]

@@ -1,6 +1,6 @@
 """Functional mock-up units for co-simulation, FMI 3.0 and 2.0, of any flat model.
 
-A continuous model carries its own integrator, a discrete one the very C code that goes to the controller.
+A continuous model contains its own integrator, a discrete one the same C code as the controller.
 Archives are deterministic: the same model gives the same bytes, and the instantiation token is a hash of the
 content.
 """
@@ -46,7 +46,7 @@ def export_fmu(
     model
         Continuous (plant) or discrete (observer, controller).
     path
-        The file; nothing is left behind if something fails.
+        The file; it is not written if an error occurs.
     version
         ``"3.0"`` or ``"2.0"``.
     platforms
@@ -71,9 +71,9 @@ def export_fmu(
 
     Examples
     --------
-    >>> from nlsdesign.components import Inertia, TorsionSpring, assembly, tie
+    >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
     >>> from nlsdesign.model import flatten
-    >>> wheel, spring = Inertia(inertia=1e-3), tie(TorsionSpring(stiffness=2.0), "wheel")
+    >>> wheel, spring = Inertia(inertia=1e-3), tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
     >>> swing = assembly("swing", wheel=wheel, spring=spring)
     >>> export_fmu(flatten(swing), "out/swing.fmu").name  # doctest: +SKIP
     'swing.fmu'
@@ -129,12 +129,12 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
 
 
 def _token(texts: Mapping[str, str]) -> str:
-    """Return a token that belongs to this content and no other."""
+    """Return a token that identifies this content, a hash of it."""
     digest = hashlib.sha256()
     for name, text in sorted(texts.items()):
         digest.update(f"{name}\0{text}\0".encode())
-    word = digest.hexdigest()
-    return f"{{{word[:8]}-{word[8:12]}-{word[12:16]}-{word[16:20]}-{word[20:32]}}}"
+    text = digest.hexdigest()
+    return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:32]}}}"
 
 
 def _binaries(
@@ -188,7 +188,7 @@ def universal_binary(parts: Mapping[str, bytes]) -> bytes:
 
 
 def _write_archive(file: Path, contents: Mapping[str, bytes]) -> None:
-    # The description first, the rest in the order of the alphabet; no time of day, no rights of this machine.
+    # The description first, the rest in alphabetical order; no time stamps and no local permissions.
     names = sorted(contents, key=lambda name: (name != "modelDescription.xml", name))
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in names:

@@ -10,10 +10,10 @@ from html import escape
 
 from ...locations import version as own_version
 from ..files import filled
-from .fmu_variables import FmuVariable, Layout
+from .fmu_variables import FmuLayout, FmuVariable
 
 
-def page(layout: Layout) -> str:
+def page(layout: FmuLayout) -> str:
     """Return ``documentation/index.html``: a table of all variables, readable without a network.
 
     Parameters

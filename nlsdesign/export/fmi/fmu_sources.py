@@ -1,4 +1,4 @@
-"""The C sources of an FMU: the equations, generated; and the shells, fixed."""
+"""The C sources of an FMU: generated equations in fixed shells."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..c.controller_code import check_discrete, header_text, source_text
 from ..c.controller_step import step_function
 from ..c.instructions import named_indices, print_statements
 from ..c.structures import member_paths
-from ..c.table_lookup import look_up, placed, table_data
+from ..c.table_lookup import indexed_tables, look_up, table_data
 from ..files import shell
-from .fmu_variables import Layout
+from .fmu_variables import FmuLayout
 
 
-def fmu_sources(layout: Layout, version: str, token: str) -> dict[str, str]:
+def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
     """Return the sources by file name; the shell ``fmi2.c`` or ``fmi3.c`` is the only one to be compiled.
 
     Parameters
@@ -47,10 +47,10 @@ def fmu_sources(layout: Layout, version: str, token: str) -> dict[str, str]:
         texts["integrator.c"] = shell("integrator.c")
     else:
         check_discrete(model)
-        word = identifier(model.name)
-        body = _discrete(layout, word)
-        texts[f"{word}.h"] = header_text(model, word, DOUBLE)
-        texts[f"{word}.c"] = source_text(model, word, DOUBLE)
+        name = identifier(model.name)
+        body = _discrete(layout, name)
+        texts[f"{name}.h"] = header_text(model, name, DOUBLE)
+        texts[f"{name}.c"] = source_text(model, name, DOUBLE)
     texts["model.c"] = "\n".join([*_head(layout, token), *body]) + "\n"
     return texts
 
@@ -66,7 +66,7 @@ def main_source(version: str) -> str:
     return "fmi2.c" if version == "2.0" else "fmi3.c"
 
 
-def _head(layout: Layout, token: str) -> list[str]:
+def _head(layout: FmuLayout, token: str) -> list[str]:
     model, end = layout.model, [layout.extra]
     signals = layout.signals or end
     outputs = layout.outputs or signals
@@ -96,7 +96,7 @@ def _head(layout: Layout, token: str) -> list[str]:
         "",
         f"#define MODEL_TOKEN {string(token)}",
         "#define MODEL_LARGEST DBL_MAX",
-        *[f"#define MODEL_{word} {number}" for word, number in numbers.items()],
+        *[f"#define MODEL_{size} {number}" for size, number in numbers.items()],
     ]
     if model.sample_time is not None:
         lines.append(f"#define MODEL_SAMPLE_TIME {DOUBLE.literal(model.sample_time)}")
@@ -124,7 +124,7 @@ def _row(v: Variable) -> str:
 _POINT = "double t, const double x[], const double u[], const double p[]"
 
 
-def _continuous(layout: Layout) -> list[str]:
+def _continuous(layout: FmuLayout) -> list[str]:
     model = layout.model
     s = model.symbols()
     y, signals = _own(layout, s)
@@ -165,16 +165,16 @@ def _continuous(layout: Layout) -> list[str]:
     ]
 
 
-def _own(layout: Layout, s: Symbols) -> tuple[ca.SX, ca.SX]:
+def _own(layout: FmuLayout, s: Symbols) -> tuple[ca.SX, ca.SX]:
     """Return the outputs and signals that have a value reference of their own."""
-    found = []
+    selected = []
     for group, variables, kept in (
         (s.output, layout.model.outputs, layout.outputs),
         (s.signal, layout.model.signals, layout.signals),
     ):
         index = {v.name: i for i, v in enumerate(variables)}
-        found.append(ca.SX(ca.vertcat(*[ca.densify(group)[index[each.variable.name]] for each in kept])))
-    return found[0], found[1]
+        selected.append(ca.SX(ca.vertcat(*[ca.densify(group)[index[each.variable.name]] for each in kept])))
+    return selected[0], selected[1]
 
 
 def _cells(name: str, count: int) -> list[str]:
@@ -204,7 +204,7 @@ def _function(
     return [f"static void {signature}", "{", *[f"    {line}" for line in body], "}", ""]
 
 
-def _discrete(layout: Layout, name: str) -> list[str]:
+def _discrete(layout: FmuLayout, name: str) -> list[str]:
     model = layout.model
     x, u, p, y = (
         list(member_paths(group).values())
@@ -214,13 +214,15 @@ def _discrete(layout: Layout, name: str) -> list[str]:
     given = [path for path, v in zip(y, model.outputs, strict=True) if v.name in own]
     tables, signals, looked_up = _signals(layout)
     there = step_function(model, name, DOUBLE)[1]
-    missing = {each.number for each in placed(model) if each.columns(looked_up) and not each.columns(there)}
+    missing = {
+        each.number for each in indexed_tables(model) if each.columns(looked_up) and not each.columns(there)
+    }
     return [
         f'#include "{name}.c"',
         "",
         *[
             line
-            for each in placed(model)
+            for each in indexed_tables(model)
             if each.number in missing
             for line in [*table_data(each, DOUBLE), ""]
         ],
@@ -264,7 +266,7 @@ def _discrete(layout: Layout, name: str) -> list[str]:
     ]
 
 
-def _signals(layout: Layout) -> tuple[list[str], list[str], set[int]]:
+def _signals(layout: FmuLayout) -> tuple[list[str], list[str], set[int]]:
     """Return the look-ups and statements for the signals of a sample, and the looked-up numbers used."""
     model = layout.model
     s = model.symbols()

@@ -1,6 +1,6 @@
-"""The variables of an FMU: which there are, in which order, and what may be done with them.
+"""The variables of an FMU: their order, causality and variability.
 
-A value reference is an index into one array; the groups stand in it in the order time, states, derivatives,
+A value reference is an index into one array; the groups are in the order time, states, derivatives,
 inputs, parameters, outputs, signals, one extra, and behind them the status word. An output that is a state is
 one variable, as is a signal that is an output.
 """
@@ -57,7 +57,7 @@ class FmuVariable:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class FmuLayout:
     """All variables of an FMU by group.
 
     Parameters
@@ -65,8 +65,8 @@ class Layout:
     model
         The model.
     time, states, derivatives, inputs, parameters, outputs, signals, extra, status
-        The groups in the order of the value references. ``outputs`` and ``signals`` leave out what is a state
-        or has been named before; ``extra`` is the tolerance of the integrator, or the sample time.
+        The groups in the order of the value references. ``outputs`` and ``signals`` leave out states and
+        variables named before; ``extra`` is the tolerance of the integrator, or the sample time.
     """
 
     model: FlatModel
@@ -93,11 +93,11 @@ class Layout:
 
     @property
     def given_out(self) -> tuple[FmuVariable, ...]:
-        """What has the causality output, in the order of the value references."""
+        """Variables of causality output, in the order of the value references."""
         return tuple(each for each in self.reals if each.causality == "output")
 
 
-def layout(model: FlatModel) -> Layout:
+def layout(model: FlatModel) -> FmuLayout:
     """Return the variables of the FMU of a model.
 
     Parameters
@@ -132,13 +132,13 @@ def layout(model: FlatModel) -> Layout:
         for s in states
         if continuous
     )
-    return Layout(
+    return FmuLayout(
         model,
         time,
         states,
         derivatives,
         group(model.inputs, "input", changing, None),
-        # A plant is what it is, a controller may be tuned.
+        # Parameters of a plant are fixed, those of a controller tunable.
         group(model.parameters, "parameter", "fixed" if continuous else "tunable", None),
         group(outputs, "output", changing, "calculated"),
         group(signals, "local", changing, "calculated"),
@@ -167,8 +167,8 @@ def _status(reference: int) -> FmuVariable:
         "Status word of the last sample: bit 0 input held, 1 input saturated, 2 state held, 3 output held; "
         "bit 8 + i: input i"
     )
-    word = Variable("sample.status", "1", text)
-    return FmuVariable(reference, word, "local", "discrete", "calculated", integer=True)
+    status = Variable("sample.status", "1", text)
+    return FmuVariable(reference, status, "local", "discrete", "calculated", integer=True)
 
 
 def _check_names(model: FlatModel) -> None:
@@ -205,7 +205,7 @@ def _a(kind: str) -> str:
 
 
 def _named_once(model: FlatModel) -> tuple[list[Variable], list[Variable]]:
-    """Return outputs and signals without those that say again what has been named."""
+    """Return outputs and signals without those that repeat an earlier variable."""
     probes = _probes(model)
     rows = {v.name: probes["state"][i] for i, v in enumerate(model.states)}
     rows |= {v.name: probes["input"][i] for i, v in enumerate(model.inputs)}
@@ -230,16 +230,16 @@ def _named_once(model: FlatModel) -> tuple[list[Variable], list[Variable]]:
 
 
 def _probes(model: FlatModel, points: int = 5) -> dict[str, NDArray[np.float64]]:
-    """Return states, inputs, outputs and signals at a few points, to see which are the same."""
+    """Return states, inputs, outputs and signals at several points, to find equal ones."""
     generator = np.random.default_rng(1)
     parameters = model.start(model.parameters)
-    found: dict[str, list[NDArray[np.float64]]] = {"state": [], "input": [], "output": [], "signal": []}
+    samples: dict[str, list[NDArray[np.float64]]] = {"state": [], "input": [], "output": [], "signal": []}
     for _ in range(points):
         x, u = (_around(group, generator) for group in (model.states, model.inputs))
         _, y, s, _ = model.equations(0.0, x, u, parameters, model.look_up(x.tolist(), u.tolist()))
-        for kind, values in zip(found, (x, u, y, s), strict=True):
-            found[kind].append(np.array(values, dtype=float).reshape(-1))
-    return {kind: np.array(values).T for kind, values in found.items()}
+        for kind, values in zip(samples, (x, u, y, s), strict=True):
+            samples[kind].append(np.array(values, dtype=float).reshape(-1))
+    return {kind: np.array(values).T for kind, values in samples.items()}
 
 
 def _around(group: Sequence[Variable], generator: np.random.Generator) -> NDArray[np.float64]:

@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 from ...locations import version as own_version
 from ...quantity import BASE, parse_unit
 from ..c.c_text import identifier
-from .dependencies import Structure, Unknown, model_structure
+from .dependencies import FmiUnknown, Structure, model_structure
 from .fmu_sources import main_source
-from .fmu_variables import RELATIVE_TOLERANCE, FmuVariable, Layout
+from .fmu_variables import RELATIVE_TOLERANCE, FmuLayout, FmuVariable
 
 LOG_CATEGORIES = {
     "logStatusError": "What could not be done, and why",
@@ -22,7 +22,7 @@ LOG_CATEGORIES = {
 _SHOWN: Mapping[tuple[int, ...], str] = {(0, 0, 0, 0, 0, 1): "deg", (0, 0, -1, 0, 0, 1): "deg/s"}
 
 
-def model_description(layout: Layout, *, version: str, token: str, step: float) -> str:
+def model_description(layout: FmuLayout, *, version: str, token: str, step: float) -> str:
     """Return ``modelDescription.xml``.
 
     Parameters
@@ -65,7 +65,7 @@ def model_description(layout: Layout, *, version: str, token: str, step: float) 
     return _written(root)
 
 
-def build_description(layout: Layout) -> str:
+def build_description(layout: FmuLayout) -> str:
     """Return ``sources/buildDescription.xml`` of FMI 3.0.
 
     Parameters
@@ -90,7 +90,7 @@ def terminals_and_icons() -> str:
     return _written(root)
 
 
-def _co_simulation(root: ElementTree.Element, layout: Layout, two: bool) -> None:
+def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> None:
     continuous = layout.model.sample_time is None
     kind = _element(
         root,
@@ -108,7 +108,7 @@ def _co_simulation(root: ElementTree.Element, layout: Layout, two: bool) -> None
         kind.set("fixedInternalStepSize", _text(layout.model.sample_time))
 
 
-def _units(root: ElementTree.Element, layout: Layout) -> None:
+def _units(root: ElementTree.Element, layout: FmuLayout) -> None:
     definitions = ElementTree.SubElement(root, "UnitDefinitions")
     for text in sorted({each.variable.unit for each in layout.reals}):
         unit = parse_unit(text)
@@ -134,26 +134,26 @@ def display_unit(unit: str) -> str | None:
 def _attributes(each: FmuVariable) -> dict[str, object]:
     """Return unit, range and start as both versions name them."""
     v = each.variable
-    found: dict[str, object] = {"unit": v.unit}
+    attributes: dict[str, object] = {"unit": v.unit}
     if display_unit(v.unit):
-        found["displayUnit"] = display_unit(v.unit)
+        attributes["displayUnit"] = display_unit(v.unit)
     if v.minimum > -math.inf:
-        found["min"] = v.minimum
+        attributes["min"] = v.minimum
     if v.maximum < math.inf:
-        found["max"] = v.maximum
+        attributes["max"] = v.maximum
     if each.causality not in ("parameter", "independent") and each.variability == "continuous":
-        found["nominal"] = abs(v.nominal) or 1.0
+        attributes["nominal"] = abs(v.nominal) or 1.0
     if each.has_start:
-        found["start"] = v.start
-    return found
+        attributes["start"] = v.start
+    return attributes
 
 
 def _common(each: FmuVariable) -> dict[str, object]:
     v = each.variable
     text = v.description + (f" (source: {v.source})" if v.source else "")
-    found: dict[str, object] = {"name": v.name, "valueReference": each.reference, "description": text}
-    found |= {"causality": each.causality, "variability": each.variability}
-    return found | ({"initial": each.initial} if each.initial else {})
+    attributes: dict[str, object] = {"name": v.name, "valueReference": each.reference, "description": text}
+    attributes |= {"causality": each.causality, "variability": each.variability}
+    return attributes | ({"initial": each.initial} if each.initial else {})
 
 
 def _variable2(parent: ElementTree.Element, each: FmuVariable) -> None:
@@ -198,7 +198,7 @@ def _structure3(parent: ElementTree.Element, structure: Structure) -> None:
             _element(parent, name, valueReference=each.variable.reference, **_dependencies(each, 0))
 
 
-def _dependencies(each: Unknown, offset: int) -> Mapping[str, object]:
+def _dependencies(each: FmiUnknown, offset: int) -> Mapping[str, object]:
     return {
         "dependencies": " ".join(str(reference + offset) for reference in each.dependencies),
         "dependenciesKind": " ".join(each.kinds),

@@ -214,6 +214,11 @@ class Bench:
         All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
     blocks
         Of the declared model; they fix rows and noise floor.
+
+    Raises
+    ------
+    MeasurementError
+        If no record moves enough to say anything about a block.
     """
 
     def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:

@@ -38,6 +38,11 @@ class Shots:
     phases
         How many times windows apart are laid over a record, each time later by that share of their length;
         together they count as one. Where windows happen to begin then matters less.
+
+    Raises
+    ------
+    ValueRangeError
+        If ``phases`` is below one, or above one for windows that are joined.
     """
 
     length: float
@@ -119,10 +124,10 @@ class SimulationError:
         To be fitted.
     parameters
         What is free; delays of ``wiring.late_by`` among them.
-    wiring
-        Of measured signals; by name where ``None``.
     shots
         Windows.
+    wiring
+        Of measured signals; by name where ``None``.
     weights
         What counts how much; see :class:`Weights`.
     slopes

@@ -154,6 +154,11 @@ class Shooter:
         Integration steps from sample to sample.
     slopes
         Whether derivatives are wanted; without them their arrays have no columns.
+
+    Raises
+    ------
+    UnknownNameError
+        If a parameter has another name in the model.
     """
 
     def __init__(

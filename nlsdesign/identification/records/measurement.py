@@ -115,6 +115,11 @@ class RecordSet:
         ----------
         signal
             Full name.
+
+        Raises
+        ------
+        UnknownNameError
+            If the signal is not measured.
         """
         for each in self.columns:
             if each.signal == signal:

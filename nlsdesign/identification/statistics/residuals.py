@@ -17,8 +17,8 @@ _MEDIAN_OF_NORMAL = 0.6744897501960817
 def noise_of(signal: Array) -> float:
     """Estimate the standard deviation of the white noise in a sampled signal.
 
-    The fourth difference removes everything smooth; its median size is that of the noise. Source: the idea of
-    von Neumann et al. 1941, robust form e.g. in Gasser, Sroka and Jennen-Steinmetz 1986.
+    The fourth difference removes everything smooth; its median size is that of the noise. Source:
+    von Neumann et al. 1941 (the idea); Gasser et al. 1986 (a robust form).
 
     Parameters
     ----------

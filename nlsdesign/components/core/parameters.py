@@ -1,0 +1,269 @@
+"""Numbers of parts: unit, range and meaning of each, for every domain in which the part can be."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self, TypeAlias
+
+from ...errors import ArrangementError, UnitError, ValueRangeError
+from ...quantity import Quantity, parse_unit, same_dimension
+from .domain import Domain
+
+Given: TypeAlias = Quantity | float | tuple[float, ...] | list[float]
+"""What may be given for a number: a quantity, or bare number(s) in SI."""
+
+PerDomain: TypeAlias = float | Mapping[Domain, float]
+"""One number, or one for each domain."""
+
+
+@dataclass(frozen=True)
+class ParameterInfo:
+    """What a part says of one of its numbers.
+
+    Parameters
+    ----------
+    unit
+        SI unit.
+    description
+        Meaning in words.
+    minimum, maximum
+        Range in which the law holds and beyond which a number is taken for a slip of units; inclusive.
+    row
+        Whether it may be a row of numbers.
+    domain
+        Name of the domain that the unit is of; empty where there is but one.
+    """
+
+    unit: str
+    description: str
+    minimum: float
+    maximum: float
+    row: bool = False
+    domain: str = ""
+
+    def checked(self, name: str, given: Given) -> Quantity:
+        """Return the number as a quantity of the right dimension and size.
+
+        Parameters
+        ----------
+        name
+            Name of the field, for messages.
+        given
+            A quantity, or bare number(s) in SI.
+
+        Raises
+        ------
+        UnitError
+            If the unit measures something else.
+        ValueRangeError
+            If a number lies outside the range, or a row stands where one number belongs.
+        """
+        result = given if isinstance(given, Quantity) else Quantity(given, self.unit)  # type: ignore[arg-type]
+        if isinstance(result.value, tuple) and not self.row:
+            raise ValueRangeError(
+                f"{name} = {result}",
+                f"is a row of {len(result.values)} numbers; {self.description} is one number",
+                next_step="give one number without brackets",
+            )
+        if not same_dimension(result.unit, self.unit):
+            raise UnitError(
+                f"{name} = {result}",
+                f"'{result.unit}' does not measure {self.description}"
+                + (f" in {self.domain}" if self.domain else ""),
+                next_step=f"give it in a unit like '{self.unit}'",
+            )
+        for value in result.values:
+            if not self.minimum <= value <= self.maximum:
+                raise ValueRangeError(
+                    f"{name} = {result}",
+                    f"{self.description} must lie in [{self.minimum:g}, {self.maximum:g}] {self.unit}",
+                    next_step=self._slip(result, value),
+                )
+        return result
+
+    def _slip(self, given: Quantity, value: float) -> str | None:
+        number = value / parse_unit(given.unit).factor
+        for unit in [prefix + given.unit for prefix in ("m", "k", "M", "c")] + ["%"]:
+            try:
+                factor = parse_unit(unit).factor
+            except UnitError:
+                continue
+            if same_dimension(unit, self.unit) and self.minimum <= number * factor <= self.maximum:
+                return f"was '{unit}' meant? {number:g} {unit} is in the range"
+        return None
+
+
+@dataclass(frozen=True)
+class Template:
+    """What a class says of one of its numbers, for every domain.
+
+    Parameters
+    ----------
+    unit
+        SI unit; ``{motion}``, ``{rate}``, ``{effort}`` and ``{inertia}`` in it stand for those of a domain.
+    description, minimum, maximum, row
+        As in :class:`ParameterInfo`; the range may differ between domains.
+    """
+
+    unit: str
+    description: str
+    minimum: PerDomain
+    maximum: PerDomain
+    row: bool = False
+
+    def within(self, domain: Domain | None) -> ParameterInfo:
+        """Return what is said of the number in a domain.
+
+        Parameters
+        ----------
+        domain
+            Of the part; ``None`` where it has none and the unit is the same everywhere.
+        """
+        if domain is None:
+            return ParameterInfo(self.unit, self.description, _of(self.minimum), _of(self.maximum), self.row)
+        return ParameterInfo(
+            domain.unit(self.unit), self.description, _of(self.minimum, domain), _of(self.maximum, domain),
+            self.row, domain.name if "{" in self.unit else "",
+        )  # fmt: skip
+
+
+def _of(value: PerDomain, domain: Domain | None = None) -> float:
+    if not isinstance(value, Mapping):
+        return value
+    return value[domain] if domain is not None and domain in value else next(iter(value.values()))
+
+
+def parameter(
+    unit: str,
+    description: str,
+    *,
+    minimum: PerDomain = 0.0,
+    maximum: PerDomain = math.inf,
+    default: float | tuple[float, ...] | None = None,
+    row: bool = False,
+) -> Any:
+    """Declare a number of a part as a dataclass field.
+
+    Parameters
+    ----------
+    unit
+        SI unit; in a law of several domains a template, for instance ``"{effort}/{motion}"``.
+    description
+        Meaning in words, without an article.
+    minimum, maximum
+        Inclusive range, one for all domains or one for each.
+    default
+        Value in SI where there is a natural one; such a value is marked as assumed. Not for a template.
+    row
+        Whether it may be a row of numbers.
+    """
+    template = Template(unit, description, minimum, maximum, row)
+    if default is None:
+        return dataclasses.field(metadata={"parameter": template})
+    value = Quantity(default, unit, "assumed: default of the component")
+    return dataclasses.field(default=value, metadata={"parameter": template})
+
+
+def templates(kind: type) -> dict[str, Template]:
+    """Return what a class says of each of its own numbers, by field name.
+
+    Parameters
+    ----------
+    kind
+        A dataclass.
+    """
+    return {f.name: f.metadata["parameter"] for f in dataclasses.fields(kind) if "parameter" in f.metadata}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Base of small objects in a part that say how its law is read; they choose behaviour.
+
+    Their numbers are named as if they were the part's own: ``friction.creep_speed``, in decks and in models.
+    """
+
+    takes: ClassVar[tuple[Domain, ...]] = ()
+    """Domains of the parts that it can be in; empty where it can be in any."""
+
+    placing: ClassVar[str | None] = None
+    """Where to put the part instead, when it is in another domain."""
+
+    def within(self, domain: Domain | None) -> Self:
+        """Return a copy whose numbers are checked, with the units of a domain.
+
+        Parameters
+        ----------
+        domain
+            Of the part.
+        """
+        if self.takes and domain not in self.takes:
+            pairs = " or ".join(f"{each.motion} and {each.effort}" for each in self.takes)
+            raise ArrangementError(type(self).__name__, f"acts on {pairs}", next_step=self.placing)
+        infos = {name: template.within(domain) for name, template in templates(type(self)).items()}
+        return dataclasses.replace(self, **{n: i.checked(n, getattr(self, n)) for n, i in infos.items()})
+
+
+def read_as(*kinds: type[Reading], default: Reading | None = None) -> Any:
+    """Declare the field of a part that holds one of several readings.
+
+    Parameters
+    ----------
+    *kinds
+        Classes that may stand there; none has a number of the same name as another.
+    default
+        Reading where none is given.
+    """
+    if default is None:
+        return dataclasses.field(metadata={"readings": kinds})
+    return dataclasses.field(default=default, metadata={"readings": kinds})
+
+
+def readings(kind: type) -> dict[str, tuple[type[Reading], ...]]:
+    """Return the classes of readings that each field of a class may hold, by field name.
+
+    Parameters
+    ----------
+    kind
+        A dataclass.
+    """
+    return {f.name: f.metadata["readings"] for f in dataclasses.fields(kind) if "readings" in f.metadata}
+
+
+def one_of(*domains: Domain) -> Any:
+    """Declare the field ``domain`` of a part that can be in several.
+
+    Where none is given the units of the numbers tell it, and where no number has a unit it is the first.
+
+    Parameters
+    ----------
+    *domains
+        The usual one first.
+    """
+    return dataclasses.field(default=None, metadata={"domains": domains})
+
+
+def domain_by_units(
+    domains: Sequence[Domain], named: Mapping[str, Template], given: Mapping[str, object]
+) -> Domain:
+    """Return the domain whose units most of the given quantities have; the first of several.
+
+    A number that then does not fit is refused where it is checked.
+
+    Parameters
+    ----------
+    domains
+        To choose from.
+    named
+        What is said of each number.
+    given
+        Quantities, or bare numbers, which tell nothing.
+    """
+    units = {n: q.unit for n, q in given.items() if isinstance(q, Quantity)}
+
+    def fitting(domain: Domain) -> int:
+        return sum(same_dimension(unit, named[n].within(domain).unit) for n, unit in units.items())
+
+    return max(domains, key=fitting)

@@ -1,0 +1,42 @@
+"""Torque that repeats over the angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from ...quantity import Quantity
+from ...symbolic import Expression
+from ..core.domain import ROTATION, Domain
+from ..core.element import Scope
+from ..core.parameters import parameter
+from ..core.springs import Elastic
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueRipple(Elastic):
+    """Cogging and torque ripple, T = a·sin(nθ) + b·cos(nθ), locked to the angle.
+
+    The order n is the number of periods per turn. It comes from the poles of the motor times
+    the gear ratio, or from the teeth of a gear. Source: e.g. Hanselman 2003.
+    """
+
+    domain: ClassVar[Domain] = ROTATION
+    picture: ClassVar[str] = "box"
+    phenomena: ClassVar[frozenset[str]] = frozenset({"ripple"})
+
+    sine: Quantity = parameter("N*m", "amplitude of the part in sin(nθ)", minimum=-1e6, maximum=1e6)
+    cosine: Quantity = parameter("N*m", "amplitude of the part in cos(nθ)", minimum=-1e6, maximum=1e6)
+    order: Quantity = parameter("1", "periods per turn", minimum=0.1, maximum=1e5)
+
+    @property
+    def restores(self) -> bool:
+        """False: it has many places of rest."""
+        return False
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the ripple torque."""
+        phase = scope.parameter("order") * motion
+        return scope.parameter("sine") * ca.sin(phase) + scope.parameter("cosine") * ca.cos(phase)
