@@ -16,7 +16,7 @@ from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
 from .readings import ReadingNames
-from .structure import MovingBody, SpringNames
+from .structure import ModelParts, MovingBody, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -42,7 +41,7 @@ from nlsdesign.discrepancy.effects import (
     wrapped,
 )
 from nlsdesign.discrepancy.effects.cable import stretched
-from nlsdesign.discrepancy.selection.comparison import Hypothesis, _renamed
+from nlsdesign.discrepancy.selection.comparison import moved_numbers
 from nlsdesign.model import flatten
 
 CATALOGUE = [
@@ -314,11 +313,11 @@ def _latched_before(rig: Assembly) -> Assembly:
 def test_a_second_effect_keeps_the_numbers_of_the_first(first: Effect, rig: Assembly) -> None:
     """Whatever is added next, an effect's own numbers stay, under a name that the search finds again."""
     for one in first(rig):
-        blank = Hypothesis(one.assembly, (one,))
         for second in ALL:
             for two in second(one.assembly):
                 numbers = {n.partition("[")[0] for n in two.assembly.quantities()}
                 assert {u.name.partition("[")[0] for u in two.unknowns} <= numbers, two.effect
-                moved = _renamed(replace(blank, values={u.name: 1.0 for u in one.unknowns}), two.assembly)
-                names = {moved.get(u.name, u.name).partition("[")[0] for u in one.unknowns}
+                moved = moved_numbers(one.assembly, two.assembly)
+                rows = (u.name.partition("[")[0] for u in one.unknowns)
+                names = {moved.get(row, row) for row in rows}
                 assert names <= numbers, f"{one.effect}, then {two.effect}"
