@@ -5,7 +5,7 @@ from typing import NoReturn
 from .assembly.named_parts import Assembly, assembly
 from .assembly.renamed import renamed
 from .assembly.smooth_form import smoothed
-from .core.contacts import Rounded, Sharp, Regularised
+from .core.contacts import Regularised, Rounded, Sharp
 from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, parallel
@@ -113,6 +113,7 @@ __all__ = [
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "Regularised",
     "RigidStop",
     "Rising",
     "Rounded",
@@ -125,7 +126,6 @@ __all__ = [
     "Sharp",
     "Slack",
     "SlidingFillers",
-    "Regularised",
     "Specimen",
     "Spring",
     "Springpot",

@@ -27,10 +27,10 @@ from nlsdesign.components import (
     LoadFriction,
     Mass,
     QuadraticDrag,
+    Regularised,
     Rounded,
     Slack,
     SlidingFillers,
-    Regularised,
     Spring,
     StretchyCable,
     StribeckFriction,
@@ -206,7 +206,9 @@ def test_ripple_does_no_work_over_a_turn() -> None:
 @given(st.floats(-0.5, 0.5), st.sampled_from([-2.0, 2.0]))
 def test_load_friction_takes_its_share_of_the_load_and_only_takes(angle: float, speed: float) -> None:
     found = torque(
-        LoadFriction(members=(("s", SPRING),), ratio=0.05, contact=Regularised(creep_speed=0.02)), angle, speed
+        LoadFriction(members=(("s", SPRING),), ratio=0.05, contact=Regularised(creep_speed=0.02)),
+        angle,
+        speed,
     )
     assert found == pytest.approx(3.4 * angle + 0.05 * abs(3.4 * angle) * math.copysign(1, speed), rel=1e-9)
     assert (found - 3.4 * angle) * speed >= 0.0

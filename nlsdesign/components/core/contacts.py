@@ -112,7 +112,7 @@ class Sharp(CornerContact, FrictionContact):
 class Rounded(CornerContact):
     """A corner rounded over a width w, C∞: ⟨v⟩ = w·ln(1 + e^(v/w)), at most w·ln 2 beyond the sharp one.
 
-    Source: softplus of Dugas et al. 2001.
+    Source: Dugas et al. 2001 (softplus).
 
     Examples
     --------
@@ -139,7 +139,7 @@ class Rounded(CornerContact):
 class Regularised(FrictionContact):
     """Friction with tanh(v/v_s) for the sign, C∞: at rest it creeps with v_s·atanh(F/level) and never sticks.
 
-    While sliding it differs by at most 2·level·e^(−2|v|/v_s). Source: e.g. Armstrong-Hélouvry 1991.
+    While sliding it differs by at most 2·level·e^(−2|v|/v_s). Source: Armstrong-Hélouvry 1991.
 
     Examples
     --------

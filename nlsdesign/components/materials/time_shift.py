@@ -65,8 +65,8 @@ class WlfShift(TimeShift):
     """log₁₀ a_T = −c₁·(T − T_r)/(c₂ + T − T_r): how time scales of rubber move above its glass transition.
 
     With T_r about 50 K above the glass transition, c₁ and c₂ are nearly the same for all amorphous polymers.
-    Valid from the glass transition to 100 K above it; moduli are taken as they are. Source: Williams,
-    Landel and Ferry 1955.
+    Valid from the glass transition to 100 K above it; moduli are taken as they are. Source: Williams
+    et al. 1955.
 
     Examples
     --------
