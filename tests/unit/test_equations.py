@@ -15,10 +15,10 @@ from nlsdesign.components import (
     Assembly,
     CoulombFriction,
     Dashpot,
-    DelayedForceSensor,
     Driven,
     Encoder,
     Fixed,
+    ForceSensor,
     GearedMotor,
     LinearElastic,
     Pulley,
@@ -27,6 +27,7 @@ from nlsdesign.components import (
     Sharp,
     Spring,
     StrainStiffening,
+    TransportDelay,
     TwoSidedCam,
     ViscousMaterial,
     parallel,
@@ -65,7 +66,8 @@ def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
             "motor",
         ),
         dial=Encoder(of="motor.angle", quantum=1e-3),
-        cell=DelayedForceSensor(of="spring.rope.rubber.force", delay=1e-3, gain=1.1, bias=2.0),
+        bus=TransportDelay(of="spring.rope.rubber.force", delay=1e-3),
+        cell=ForceSensor(of="bus.reading", gain=1.1, bias=2.0),
     )
 
 
