@@ -15,7 +15,8 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
-from .structure import MovingBody, ReadingNames, SpringNames, Structure
+from .readings import ReadingNames
+from .structure import MovingBody, SpringNames, Structure
 from .switching import Switching
 
 if TYPE_CHECKING:

@@ -17,6 +17,7 @@ from ..mechanics.gear import Gear, gear_problems
 from ..sensing.sensors import Sensor
 from .circuit_picture import assembly_svg
 from .circuit_text import draw
+from .sensor_chains import chain_problems, sensors_behind
 
 
 @dataclass(frozen=True)
@@ -80,14 +81,13 @@ class Assembly:
         ----------
         signal
             Full name; a signal that is not the reading of a sensor shows itself.
+
+        Raises
+        ------
+        ArrangementError
+            If the sensors read one another in a circle.
         """
-        sensors = self.sensors()
-        readings = {f"{name}.reading": name for name in sensors}
-        chain: list[str] = []
-        while signal in readings:
-            chain.append(readings[signal])
-            signal = sensors[chain[-1]].of
-        return signal, tuple(chain)
+        return sensors_behind(self.sensors(), signal)
 
     def quantities(self) -> dict[str, Quantity]:
         """Return every number by full name."""
@@ -257,6 +257,7 @@ def arrangement_problems(
                 ),
             )
     yield from gear_problems(parts, unreadable)
+    yield from chain_problems(parts)
     yield from _twofold(parts)
 
 

@@ -197,7 +197,6 @@ class Combination(Element):
             raise ArrangementError(
                 kind, "needs at least one element", next_step="name elements, for instance spring=..."
             )
-        check_names(kind, [name for name, _ in self.members], taken=RESERVED | set(self.parameter_infos()))
         for name, member in self.members:
             if not isinstance(member, Element):
                 raise ArrangementError(
@@ -218,6 +217,7 @@ class Combination(Element):
                 next_step=self.placing,
             )
         super().__post_init__()
+        check_names(kind, [name for name, _ in self.members], taken=RESERVED | set(self.parameters()))
 
     @property
     def _inner(self) -> Domain:

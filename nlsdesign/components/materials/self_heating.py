@@ -13,7 +13,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from ..core.element import UNBOUNDED, Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 
 _ROOM = 293.15
 

@@ -13,7 +13,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, positive_part
 from ..core.domain import MATERIAL, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 from .hyperelastic import Hyperelastic
 from .memory import following, rising
 
@@ -133,7 +133,7 @@ class StressSoftening(Combination):
     Raises
     ------
     ArrangementError
-        If the curve needs the strain energy and a member does not say it.
+        If a law that the curve needs the energy of does not say it.
 
     Examples
     --------

@@ -14,8 +14,8 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import parameter
 from ..core.part import walk
+from ..core.part_numbers import parameter
 from ..core.reduced_time import ReducedTime
 from .self_heating import SelfHeating
 

@@ -14,7 +14,7 @@ from ...symbolic import Expression
 from ..core.contacts import Rounded, Sharp, WithCorners
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from ...symbolic import Expression
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
-from ..core.parameters import one_of, parameter
+from ..core.part_numbers import one_of, parameter
 from .friction import stribeck
 
 

@@ -11,7 +11,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import ROTATION, Domain
 from ..core.element import Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 from ..core.springs import Elastic
 
 

@@ -11,8 +11,8 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Scope, observed_effort
-from ..core.parameters import parameter
 from ..core.part import RESERVED, Part, check_names
+from ..core.part_numbers import parameter
 from .cam import Cam
 
 

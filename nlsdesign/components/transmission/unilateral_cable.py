@@ -12,7 +12,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, positive_part, symbol
 from ..core.domain import TRANSLATION, Domain
 from ..core.element import Combination, Element, Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 from .stretchy_cable import newton_root
 
 

@@ -18,7 +18,7 @@ from ...identification.estimation.least_squares import fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
-from ...model import Assembly, Variable
+from ...model import Assembly, Variable, flatten
 from ...parallel_map import parallel_map
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
@@ -198,7 +198,8 @@ class Comparison:
         """
         if hypothesis not in self._judged:
             signals, records = self.bench.records.signals, self.bench.records.records
-            driven = [self.bench.driven(block, ()) for block in blocks_of(hypothesis.fitted, signals)]
+            blocks = blocks_of(flatten(hypothesis.fitted), signals)
+            driven = [self.bench.driven(block, ()) for block in blocks]
             evidence = [e for each in driven for e in self.bench.evidence(each, records, {})]
             pairs = parallel_map(lambda k: _prediction(evidence[k]), len(evidence))
             self._judged[hypothesis] = tuple(
@@ -210,7 +211,7 @@ class Comparison:
     def _groups(self, hypothesis: Hypothesis) -> list[list[FreeBlock]]:
         """Return the blocks of a hypothesis in groups that share no free number."""
         blocks = []
-        for block in blocks_of(hypothesis.assembly, self.bench.records.signals):
+        for block in blocks_of(flatten(hypothesis.assembly), self.bench.records.signals):
             spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
             blocks.append(FreeBlock(block, free_in(block, list(dict.fromkeys([*spread, *own])))))

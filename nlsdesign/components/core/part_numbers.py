@@ -202,7 +202,7 @@ class Reading:
         Raises
         ------
         ArrangementError
-            If the quantities are none of those that the reading takes.
+            If the reading cannot be in the domain.
         """
         if self.takes and domain not in self.takes:
             pairs = " or ".join(f"{each.motion} and {each.effort}" for each in self.takes)
