@@ -35,8 +35,8 @@ class CoulombFriction(WithFriction, Viscous):
 
     At rest T is what keeps both sides together: valid between two bodies, one of which has inertia. With
     ``contact=Regularised(creep_speed=...)`` it is T_c·tanh(ω/ω_s), C∞, and creeps at rest. Viscous friction
-    goes beside it as a :class:`Dashpot`. Source: Coulomb 1785; as a set-valued law Pfeiffer and Glocker 1996;
-    the smooth form e.g. in Armstrong-Hélouvry 1991.
+    goes beside it as a :class:`Dashpot`. Source: Coulomb 1785; Pfeiffer
+    and Glocker 1996 (as a set-valued law); Armstrong-Hélouvry 1991 (the smooth form).
 
     Examples
     --------
@@ -88,7 +88,7 @@ class LoadFriction(WithFriction, Combination):
     backward. While ω = 0 the friction is at most µ·|T_in|, so a loaded gear stays where it is, and none of
     the elements inside may be sharp dry friction itself. With ``contact=Regularised(creep_speed=...)``
     tanh(ω/ω_s) stands for the sign: C∞ but for the corner of |T_in|. Source: Coulomb 1785 with the load as
-    normal force; the usual model of gear losses.
+    normal force; Niemann and Winter 2003 (losses of gears).
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (ROTATION, TRANSLATION)
