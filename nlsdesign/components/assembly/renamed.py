@@ -19,8 +19,8 @@ COMPONENTS: dict[str, str] = {
     "SmoothStrainStiffening": "StrainStiffening with contact=Rounded(width=...); in a deck with width",
     "Softening": "StressSoftening with curve=OgdenRoxburgh(...); in a deck with strength and scale",
     "TensionSet": "PermanentSet with memory=Following(...); in a deck with following",
-    "TorsionDashpot": "Dashpot, with its damping in N*m*s/rad",
-    "TorsionSpring": "Spring, with its stiffness in N*m/rad",
+    "TorsionDashpot": "Dashpot, with its damping in N·m·s/rad",
+    "TorsionSpring": "Spring, with its stiffness in N·m/rad",
     "ViscousHeating": "SelfHeating with heat=ViscousHeat(...); in a deck with halving_speed",
     "WorkHeating": "SelfHeating with heat=WorkHeat(...); in a deck with halving_work",
 }
