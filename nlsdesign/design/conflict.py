@@ -80,7 +80,7 @@ def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable
     ConvergenceError
         If the solver finds no answer.
     """
-    program, count = _softened(problem, bounds), len(problem.unknowns)
+    program, count = _softened(problem, bounds), len(problem.variables)
     starts = [np.append(start, np.ones(len(bounds))) for start in problem.starts[:2]]
     found = [outcome for outcome in program.solve(*starts, progress=progress) if outcome.solved]
     if not found:
@@ -113,8 +113,8 @@ def _softened(problem: Problem, bounds: Sequence[Bound]) -> Program:
     rows = [row_of(bound, slacks[i]) for i, bound in enumerate(bounds)]
     program = Program(
         problem.vector,
-        np.array([u.lower for u in problem.unknowns]),
-        np.array([u.upper for u in problem.unknowns]),
+        np.array([u.lower for u in problem.variables]),
+        np.array([u.upper for u in problem.variables]),
         ca.sum1(slacks),
         (*problem.structure, *rows),
     )

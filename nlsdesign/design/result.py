@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Assembly
+from ..components.assembly.named_parts import Assembly
 from ..quantity import Quantity, parse_unit
 from .cam_drawing import fingerprint
 from .geometry import Contour
@@ -190,14 +190,14 @@ class CamDesign:
             ("radius of curvature", f"{millis * rho.min():.3g} to {millis * rho.max():.3g} mm"),
             ("cam radius", f"{millis * self.contour.radii.max():.4g} mm"),
             ("lever arm", f"up to {millis * self.contour.lever_arms.max():.4g} mm"),
-            ("solver", f"{self.iterations} iterations{self._held}"),
+            ("solver", f"{self.iterations} iterations{self._contour_error}"),
             ("fingerprint", self.fingerprint),
         ]
         share = self.within_tolerance
         return rows if share is None else [*rows, ("within tolerance", f"{100 * share:.3g} % of the angles")]
 
     @property
-    def _held(self) -> str:
+    def _contour_error(self) -> str:
         return f", contour held to {1e6 * self.fit_error:.2g} um" if self.fit_error > 0.0 else ""
 
     @property

@@ -124,7 +124,7 @@ class SwitchScope:
         return hold.effort
 
 
-class OwnNames(SwitchScope):
+class NamingScope(SwitchScope):
     """What one part has named in the builder: numbers, inputs, states, signals."""
 
     def parameter(self, name: str) -> Expression:
@@ -175,7 +175,7 @@ class OwnNames(SwitchScope):
         self._builder.signals[full] = (variable, ca.SX(value))
 
 
-class PartScope(OwnNames):
+class PartScope(NamingScope):
     """The view of one part in the builder: its own names, and what it says of them."""
 
     def child(self, name: str) -> PartScope:

@@ -15,7 +15,8 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
-from .structure import MovingBody, ReadingNames, SpringNames, Structure
+from .readings import ReadingNames
+from .structure import ModelParts, MovingBody, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -186,11 +187,11 @@ class FlatModel:
         return np.array([v.start for v in of], dtype=float)
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> ModelParts:
         """Bodies, springs and readings together."""
-        return Structure(self.bodies, self.springs, self.readings)
+        return ModelParts(self.bodies, self.springs, self.readings)
 
-    def with_structure(self, structure: Structure) -> FlatModel:
+    def with_structure(self, structure: ModelParts) -> FlatModel:
         """Return a copy made of other bodies, springs and readings; what has no variables here is left out.
 
         Parameters

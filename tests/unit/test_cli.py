@@ -155,7 +155,8 @@ def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_
     assert [file.name for file in (tmp_path / "fmu").iterdir()] == ["plant.fmu"]
     status, _, err = run("export", "c", "--deck", deck, "--out", "c")
     assert status == 2
-    assert "no parts 'motor' and 'spring'" in err
+    assert "needs the series spring" in err or "needs the driven body" in err
+    assert "export fmu --plant-only writes the plant alone" in err
     assert not (tmp_path / "c").exists()
 
 

@@ -20,6 +20,7 @@ from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from .deck_reader import Builder
 from .named_parts import Assembly, arrangement_problems
+from .sensor_chains import source_problems
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:
@@ -66,8 +67,8 @@ def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
         parts[name] = builder.tied(name, part, table) if is_tied else part
     complete = tuple((name, part) for name, part in parts.items() if part is not None)
     unreadable = [name for name, part in parts.items() if part is None]
-    for name, error in arrangement_problems(complete, unreadable):
-        field = f"{name}.between" if f"{name}.between" in deck.places else name
+    for name, error in (*arrangement_problems(complete, unreadable), *source_problems(complete, unreadable)):
+        field = next((f for f in (f"{name}.between", f"{name}.of") if f in deck.places), name)
         builder.problems.append(error.at(deck.place(field)))
     if builder.problems:
         return None, builder.problems

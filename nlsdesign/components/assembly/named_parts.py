@@ -17,6 +17,7 @@ from ..mechanics.gear import Gear, gear_problems
 from ..sensing.sensors import Sensor
 from .circuit_picture import assembly_svg
 from .circuit_text import draw
+from .sensor_chains import chain_problems, sensors_behind
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Assembly:
     Raises
     ------
     ArrangementError
-        If parts do not fit together, or there is no body.
+        If the parts have no body, or are connected in a way that has no solution.
     """
 
     name: str
@@ -80,14 +81,13 @@ class Assembly:
         ----------
         signal
             Full name; a signal that is not the reading of a sensor is returned itself.
+
+        Raises
+        ------
+        ArrangementError
+            If the sensors read one another in a circle.
         """
-        sensors = self.sensors()
-        readings = {f"{name}.reading": name for name in sensors}
-        chain: list[str] = []
-        while signal in readings:
-            chain.append(readings[signal])
-            signal = sensors[chain[-1]].of
-        return signal, tuple(chain)
+        return sensors_behind(self.sensors(), signal)
 
     def quantities(self) -> dict[str, Quantity]:
         """Return every number by full name."""
@@ -130,7 +130,7 @@ class Assembly:
         Raises
         ------
         UnknownNameError
-            If there is no part to add it to.
+            If the path leads through a part that does not exist.
         """
         head, _, tail = path.partition(".")
         parts = dict(self.parts)
@@ -158,7 +158,7 @@ class Assembly:
         Raises
         ------
         ArrangementError
-            If the part is not an element.
+            If the part is no element.
         """
         part = self[path]
         element = part.element if isinstance(part, Tie) else part
@@ -257,6 +257,7 @@ def arrangement_problems(
                 ),
             )
     yield from gear_problems(parts, unreadable)
+    yield from chain_problems(parts)
     yield from _twofold(parts)
 
 

@@ -12,7 +12,7 @@ from ...symbolic import Expression
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
-from ..core.parameters import one_of, parameter
+from ..core.part_numbers import one_of, parameter
 from .friction import stribeck
 
 
@@ -23,7 +23,7 @@ class LuGreFriction(Viscous):
     g = T_c + ΔT·e^(−(ω/ω_St)²) is the torque at steady speed. α is 0 below the break-away deflection z_b =
     r·|z_s| and while the bristles unload, 1 beyond |z_s|, with half a sine between: so below break-away the
     bristles are a spring that returns, and a body that sticks does not creep. Continuous, with corners.
-    Sources: Canudas de Wit, Olsson, Åström, Lischinsky 1995; Dupont, Hayward, Armstrong, Altpeter 2002.
+    Sources: Canudas de Wit et al. 1995; Dupont et al. 2002.
     """
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"dry friction", "viscous friction"})

@@ -5,11 +5,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench, measured_inputs
 from ...identification.records.measurement import Record, RecordSet
-from ...model import Assembly
+from ...model import flatten
 from ...simulation import RangeWarning, Trace, range_warnings, simulate
 from ...symbolic import depends
 from .tearing import blocks_of
@@ -44,7 +45,7 @@ def predict(actuator: Assembly, records: RecordSet, name: str) -> Trace:
     chosen = [r for r in records.records if r.name == name]
     if not chosen:
         raise unknown_name("record", name, (r.name for r in records.records))
-    blocks = blocks_of(actuator, records.signals)
+    blocks = blocks_of(flatten(actuator), records.signals)
     bench = Bench(records, blocks)
     signals, units = {}, {}
     for block in blocks:
