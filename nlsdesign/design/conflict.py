@@ -82,13 +82,13 @@ def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable
     """
     program, count = _softened(problem, bounds), len(problem.variables)
     starts = [np.append(start, np.ones(len(bounds))) for start in problem.starts[:2]]
-    found = [outcome for outcome in program.solve(*starts, progress=progress) if outcome.solved]
-    if not found:
+    solved = [outcome for outcome in program.solve(*starts, progress=progress) if outcome.solved]
+    if not solved:
         raise ConvergenceError(
             "design: search for a cam within the limits", "IPOPT found neither a cam nor a proof against it",
             next_step="leave out limits one by one, or start from a deck that is closer to the target",
         )  # fmt: skip
-    best = min(found, key=lambda outcome: outcome.cost)
+    best = min(solved, key=lambda outcome: outcome.cost)
     if best.cost <= _FEASIBLE * len(bounds):
         return best.point[:count]
     prices = best.prices[len(problem.structure) :]

@@ -48,7 +48,7 @@ class Solution:
     solved
         Whether it says that this is a solution.
     status
-        IPOPT's own word.
+        Status in the words of IPOPT.
     point
         Unknowns, shape (unknowns,).
     cost

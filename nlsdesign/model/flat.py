@@ -143,9 +143,10 @@ class FlatModel:
     tables
         Looked-up numbers w; empty for a continuous model.
     switching
-        Where the equations are not smooth; ``None`` if they are everywhere, or if nobody said.
+        Where the equations are not smooth; ``None`` if they are everywhere, or where it is not declared.
     bodies, springs, readings
-        What the model is made of: which variables belong together, in written order. Empty where nobody said.
+        What the model is made of: which variables belong together, in written order. Empty where that is
+        not declared.
     """
 
     name: str
@@ -330,8 +331,8 @@ class FlatModel:
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """Return text, equations and picture; a notebook takes the richest that it can show."""
         latex = self._latex()
-        told = {"text/latex": f"$${latex}$$"} if latex else {}
-        return {"text/plain": str(self), **told, "text/html": self._repr_html_()}
+        equations = {"text/latex": f"$${latex}$$"} if latex else {}
+        return {"text/plain": str(self), **equations, "text/html": self._repr_html_()}
 
     def _latex(self) -> str:
         try:

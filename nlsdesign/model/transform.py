@@ -171,18 +171,18 @@ def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatMo
     """
     s = model.symbols()
     known = {v.name: s.signal[i] for i, v in enumerate(model.signals)}
-    found: dict[int, Expression] = {}
+    opened_at: dict[int, Expression] = {}
     for name in names:
         if name not in known:
             raise unknown_name("signal", name, known)
         if known[name].is_leaf():
             raise ArrangementError(f"signal '{name}'", "is only another name of a state, input or constant")
-        found[known[name].element_hash()] = ca.SX.sym(name)
-    fresh = [found[known[name].element_hash()] for name in names]
+        opened_at[known[name].element_hash()] = ca.SX.sym(name)
+    fresh = [opened_at[known[name].element_hash()] for name in names]
     kept = [i for i, v in enumerate(model.signals) if keep or v.name not in names]
     rest = _column([s.signal[i] for i in kept])
     followed = ca.SX(0, 1) if keep else rest
-    columns = _regrown([s.derivative, s.output, followed, s.residual], found)
+    columns = _regrown([s.derivative, s.output, followed, s.residual], opened_at)
     changed = s._replace(
         input=_column([s.input, *fresh]),
         derivative=columns[0], output=columns[1], signal=rest if keep else columns[2], residual=columns[3],
@@ -307,9 +307,9 @@ def _check_replacement(model: FlatModel, s: Symbols, value: Expression, names: t
         )  # fmt: skip
 
 
-def _regrown(columns: Sequence[Expression], found: Mapping[int, Expression]) -> list[Expression]:
+def _regrown(columns: Sequence[Expression], replaced: Mapping[int, Expression]) -> list[Expression]:
     """Return the expressions with whole nodes of their graph replaced, by hash of the node."""
-    grown: dict[int, Expression] = dict(found)
+    grown: dict[int, Expression] = dict(replaced)
     for column in columns:
         for i in range(column.shape[0]):
             _grow(column[i], grown)

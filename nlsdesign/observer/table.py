@@ -162,16 +162,16 @@ class GridByTolerance(Grid):
         cells, fine = 32, entries(np.linspace(self.lower, self.upper, 32 * CHECKS + 1))
         while True:
             angles = np.linspace(self.lower, self.upper, cells * CHECKS + 1)
-            found = compacted(
+            table = compacted(
                 angles, fine, every=CHECKS, tolerance=self.tolerance, angle_error=self.angle_tolerance
             )
-            worst = max(found.error, key=lambda row: found.error[row])
-            if found.error[worst] <= self.tolerance:
-                return found
+            worst = max(table.error, key=lambda row: table.error[row])
+            if table.error[worst] <= self.tolerance:
+                return table
             if 2 * cells + 1 > self.most_points:
                 raise ConvergenceError(
                     f"table of the observer with {cells + 1} points",
-                    f"'{worst}' is off by {found.error[worst]:.2g} of its size, more than {self.tolerance:g}",
+                    f"'{worst}' is off by {table.error[worst]:.2g} of its size, more than {self.tolerance:g}",
                     next_step="allow a larger error or more points, or take FixedGrid and read its error",
                 )
             middle = (angles[1:] + angles[:-1]) / 2
