@@ -23,6 +23,7 @@ from nlsdesign.identification import RecordSet
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.identification.records.measurement import Record
 from nlsdesign.identification.statistics.filters import derivative
+from nlsdesign.model import flatten
 
 Array = NDArray[np.float64]
 
@@ -56,10 +57,10 @@ def table_of(declared: Assembly, records: RecordSet) -> Table:
     declared, records
         As for a diagnosis.
     """
-    bench = Bench(records, blocks_of(declared, records.signals))
+    bench = Bench(records, blocks_of(flatten(declared), records.signals))
     base = Comparison(bench, typical_sizes(declared, records)).base(declared)
     residuals, columns = {}, {}
-    for block in blocks_of(base.fitted, records.signals):
+    for block in blocks_of(flatten(base.fitted), records.signals):
         pieces = bench.evidence(bench.driven(block, []), records.of("fit"), {})
         residuals[block.name] = np.concatenate([e.residual({})[0] for e in pieces])
         given = [_regressors(e.record, torque=block.target is None) for e in pieces]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from nlsdesign.components import TRANSLATION, CoulombFriction, Dashpot, Mass, Smooth, Spring, tie
+from nlsdesign.components import TRANSLATION, CoulombFriction, Dashpot, Mass, Regularised, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.identification import Record, Shots, Weights, fit_by_simulation, free_parameter
 from nlsdesign.model import FlatModel, flatten
@@ -55,7 +55,7 @@ def chain() -> FlatModel:
             dry=tie(
                 CoulombFriction(
                     sliding_effort=value["dry.sliding_effort"],
-                    contact=Smooth(creep_speed=CREEP),
+                    contact=Regularised(creep_speed=CREEP),
                     domain=TRANSLATION,
                 ),
                 "a",

@@ -8,6 +8,7 @@ from nlsdesign.components import (
     CurrentDrivenMotor,
     CurrentSensor,
     Dashpot,
+    Encoder,
     Fixed,
     ForceSensor,
     Inertia,
@@ -15,7 +16,7 @@ from nlsdesign.components import (
     LinearElastic,
     LossyGear,
     OneSidedCam,
-    SampledEncoder,
+    SampleAndHold,
     Specimen,
     StrainStiffening,
     Through,
@@ -60,7 +61,8 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
     )
     cam = OneSidedCam(**numbers_of(deck, "spring.cam", OneSidedCam))
     gear = LossyGear(between=("motor", "drum"), **numbers_of(deck, "gear", LossyGear))
-    encoder = SampledEncoder(of="motor.angle", **numbers_of(deck, "motor_encoder", SampledEncoder))
+    sampling = SampleAndHold(of="motor.angle", **numbers_of(deck, "motor_encoder_sampling", SampleAndHold))
+    encoder = Encoder(of="motor_encoder_sampling.reading", **numbers_of(deck, "motor_encoder", Encoder))
     ammeter = CurrentSensor(of="motor.winding_current", **numbers_of(deck, "current_sensor", CurrentSensor))
     cell = numbers_of(deck, "load_cell", ForceSensor)
     found = assembly(
@@ -72,6 +74,7 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
         load=Fixed(),
         spring=tie(through(cam, cable=cable, **numbers_of(deck, "spring", Through)), "drum", "load"),
         bearing=tie(Dashpot(**numbers_of(deck, "bearing", Dashpot)), "drum"),
+        motor_encoder_sampling=sampling,
         motor_encoder=encoder,
         current_sensor=ammeter,
         load_cell=ForceSensor(of="spring.cable.rope.force", **cell),

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,10 @@ class Reference:
 @functools.cache
 def references() -> Mapping[str, Reference]:
     """Return all publications by key."""
-    entries = _tables()["sources"].items()
-    return {key: Reference(key, **{**entry, "authors": tuple(entry["authors"])}) for key, entry in entries}
+    entries: Mapping[str, Any] = _tables()["sources"]
+    return {
+        key: Reference(key, **{**entry, "authors": tuple(entry["authors"])}) for key, entry in entries.items()
+    }
 
 
 @functools.cache
@@ -73,6 +76,6 @@ def cited(text: str) -> list[Reference]:
 
 
 @functools.cache
-def _tables() -> Mapping[str, Mapping[str, Mapping[str, object]]]:
+def _tables() -> Mapping[str, Mapping[str, Any]]:
     path = Path(__file__).with_name("bibliography.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.components import Fixed, GearedMotor, NeoHooke, TwoSidedCam, standard_linear_solid
+from nlsdesign.components import Fixed, GearedMotor, NeoHooke, TwoSidedCam
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ def main(out: Path, fast: bool = False) -> Results:
     """Design a stiffening spring for 2 N·m at 40° and an observer of its torque."""
     # Declare: a motor turns a cam whose cable stretches rubber on both sides; the rubber relaxes in 50 ms.
     q, neo_hooke = nls.quantity, NeoHooke(shear_modulus=nls.quantity(0.5, "MPa"))
-    law = standard_linear_solid(neo_hooke, modulus=q(0.4, "MPa"), viscosity=q(20.0, "kPa*s"))
+    law = nls.standard_linear_solid(neo_hooke, modulus=q(0.4, "MPa"), viscosity=q(20.0, "kPa*s"))
     rubber = nls.specimen(area=q(1.0, "cm^2"), rest_length=q(20.0, "mm"), law=law)
     cam = TwoSidedCam(lever_arm=q((12.0,) * 20, "mm"), last_angle=q(50.0, "deg"))
     spring = nls.tie(nls.through(cam, rubber=rubber, pretension=q(1.0, "mm")), "motor", "load")

@@ -19,7 +19,7 @@ from nlsdesign.components import (
     Fixed,
     GearedMotor,
     LinearElastic,
-    Smooth,
+    Regularised,
     StrainStiffening,
     TwoSidedCam,
     ViscousMaterial,
@@ -80,7 +80,7 @@ def actuator(
     }
     if friction:
         parts["dry_friction"] = tie(
-            CoulombFriction(sliding_effort=friction, contact=Smooth(creep_speed=0.02)), "motor"
+            CoulombFriction(sliding_effort=friction, contact=Regularised(creep_speed=0.02)), "motor"
         )
     return assembly("published", **parts)
 

@@ -321,3 +321,14 @@ def test_a_path_of_a_machine_is_caught() -> None:
     assert list(machine_paths("docs/a.md", "\n".join(good))) == []
     assert len(list(machine_paths("docs/a.md", "\n".join(bad)))) == 4
     assert len(list(machine_paths("tests/unit/test_a.py", "\n".join(bad)))) == 3
+
+
+def test_the_glossary_is_one_alphabetical_table(root: Path) -> None:
+    glossary = (root / "docs" / "conventions.md").read_text("utf-8").partition("## Glossary\n")[2]
+    rows = [line for line in glossary.splitlines() if line.startswith("| ")]
+    assert rows[0] == "| term | meaning |"
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows[2:]]
+    assert all(len(row) == 2 and all(row) for row in cells)
+    terms = [term for term, _ in cells]
+    assert len(terms) > 50
+    assert terms == sorted(set(terms), key=str.lower)

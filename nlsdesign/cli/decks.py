@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..deck import deck_names, load_deck
+from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
 from .output import json_option, show_json, show_table
+
+if TYPE_CHECKING:
+    from ..components.assembly.named_parts import Assembly
 
 _file = click.Path(path_type=Path, dir_okay=False, exists=True)
 
@@ -34,7 +39,7 @@ def check(deck_name: str, as_json: bool) -> None:
     from ..components.assembly.deck_writer import deck_problems, declare
 
     read = load_deck(deck_name)
-    problems = deck_problems(read)
+    problems = deck_problems(read) or _model_problems(declare(read))
     if problems:
         for problem in problems:
             click.echo(f"error: {problem}", err=True)
@@ -45,6 +50,17 @@ def check(deck_name: str, as_json: bool) -> None:
         return
     click.echo(f"{read.path.name}: no problem in {len(declare(read).quantities())} numbers, "
                f"{100 * shares['assumed']:.0f} % of them only assumed")  # fmt: skip
+
+
+def _model_problems(assembly: Assembly) -> list[NlsError]:
+    """Return what shows only when the equations are written, such as a sensor of a missing signal."""
+    from ..model import flatten
+
+    try:
+        flatten(assembly)
+    except NlsError as error:
+        return [error]
+    return []
 
 
 @deck.command()

@@ -5,7 +5,7 @@ from typing import NoReturn
 from .assembly.named_parts import Assembly, assembly
 from .assembly.renamed import renamed
 from .assembly.smooth_form import smoothed
-from .core.contacts import Rounded, Sharp, Smooth
+from .core.contacts import Regularised, Rounded, Sharp
 from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, parallel
@@ -34,16 +34,15 @@ from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
 from .mechanics.carriage import ConstantForce, LinearDrive
+from .mechanics.drive_chain import DriveDelay, DrivePart, DriveSaturation
 from .mechanics.friction import CoulombFriction, LoadFriction, QuadraticDrag, StribeckFriction
 from .mechanics.gear import Gear, LossyGear
-from .mechanics.imperfect_motor import DelayedMotor, SaturatingMotor
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
-from .sensing.delayed_sensors import DelayedForceSensor, DriftingForceSensor, TransportDelay
-from .sensing.eccentric_encoder import EccentricEncoder
-from .sensing.sampled_sensors import SampleAndHold, SampledEncoder, Tachometer
+from .sensing.sampled_sensors import SampleAndHold, Tachometer
+from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -70,12 +69,13 @@ __all__ = [
     "CurrentDrivenMotor",
     "CurrentSensor",
     "Dashpot",
-    "DelayedForceSensor",
-    "DelayedMotor",
     "Domain",
-    "DriftingForceSensor",
+    "Drift",
+    "DriveDelay",
+    "DrivePart",
+    "DriveSaturation",
     "Driven",
-    "EccentricEncoder",
+    "Eccentricity",
     "ElectricMotor",
     "Element",
     "Encoder",
@@ -113,19 +113,17 @@ __all__ = [
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "Regularised",
     "RigidStop",
     "Rising",
     "Rounded",
     "SampleAndHold",
-    "SampledEncoder",
-    "SaturatingMotor",
     "SelfHeating",
     "Sensor",
     "Series",
     "Sharp",
     "Slack",
     "SlidingFillers",
-    "Smooth",
     "Specimen",
     "Spring",
     "Springpot",

@@ -21,6 +21,7 @@ from ..components.assembly.deck_writer import write_deck
 from ..identification.equation_error.evidence import Bench
 from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
+from ..model import flatten
 from ..writing import write_text
 from .blocks.tearing import blocks_of
 from .effects import ALL, EffectFunction
@@ -88,7 +89,7 @@ def diagnose(
         If the declared model cannot be refitted.
     """
     progress("refitting the declared model")
-    bench = Bench(records, blocks_of(actuator, records.signals))
+    bench = Bench(records, blocks_of(flatten(actuator), records.signals))
     records = bench.records
     comparison = Comparison(bench, typical_sizes(actuator, records))
     base = comparison.base(actuator)

@@ -15,7 +15,8 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
-from .structure import ModelParts, MovingBody, ReadingNames, SpringNames
+from .readings import ReadingNames
+from .structure import ModelParts, MovingBody, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:

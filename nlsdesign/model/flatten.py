@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..components.assembly.named_parts import Assembly
+from ..components.assembly.sensor_chains import source_problems
 from ..components.core.element import observed_effort
 from ..components.core.tie import Tie
 from ..components.mechanics.bodies import Body, Motion
@@ -22,8 +23,9 @@ from ..symbolic import Expression, depends
 from .equation_builder import EquationBuilder, PartScope
 from .flat import FlatModel, Variable
 from .gear_train import balance_train, train_motions, trains
+from .readings import readings_of
 from .stiction import Laws, natural_modes, switch_laws, switching
-from .structure import Owners, moving_bodies, readings_of, springs_of
+from .structure import Owners, moving_bodies, springs_of
 
 
 def flatten(
@@ -87,6 +89,8 @@ def _write_mechanics(assembly: Assembly, builder: EquationBuilder) -> None:
 
 
 def _write_sensors(assembly: Assembly, builder: EquationBuilder) -> None:
+    for _, error in source_problems(assembly.parts):
+        raise error
     for name, part in assembly.sensors().items():
         known = builder.named()
         if part.of not in known:

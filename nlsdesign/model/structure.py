@@ -5,11 +5,11 @@ Consumers ask here which variable is the speed of a body or the lever arm of a c
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
-from ..components.core.element import Domain
+from ..components.core.element import MATERIAL, Domain, Element
 from ..components.core.part import Part, walk
 from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen
@@ -17,6 +17,7 @@ from ..components.mechanics.bodies import Body, Free, GearedMotor
 from ..components.mechanics.motor import ElectricMotor
 from ..components.transmission.cam_drive import Through
 from .gear_train import trains
+from .readings import ReadingNames
 
 
 @dataclass(frozen=True)
@@ -180,23 +181,44 @@ class SpringNames:
     states: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class ReadingNames:
-    """The reading of a sensor.
+def body_moved_by(bodies: Sequence[MovingBody], motion: str) -> MovingBody | None:
+    """Return the body that has this motion, ``None`` if there is none.
 
     Parameters
     ----------
-    signal
-        Name of the reading.
-    measured
-        Name of the state, input or signal that it shows.
-    sensors
-        Names of the sensors between, the one that gives the reading first.
+    bodies
+        Of a flat model.
+    motion
+        Full name of an angle or a position.
     """
+    return next((body for body in bodies if body.motion == motion), None)
 
-    signal: str
-    measured: str
-    sensors: tuple[str, ...]
+
+def motions_of_efforts(assembly: Assembly) -> dict[str, str]:
+    """Return the motion that does work with each force and torque, by name of the effort.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    pieces = ((path, part.element if isinstance(part, Tie) else part) for path, part in assembly.walk())
+    return {
+        f"{path}.{piece.domain.effort}": f"{path}.{piece.domain.motion}"
+        for path, piece in pieces
+        if isinstance(piece, Element) and piece.domain != MATERIAL
+    }
+
+
+def top_part(name: str) -> str:
+    """Return the part of the assembly to which a hierarchical name belongs: names begin with it.
+
+    Parameters
+    ----------
+    name
+        Full name of a variable or of a part.
+    """
+    return name.partition(".")[0]
 
 
 @dataclass(frozen=True)
@@ -361,19 +383,6 @@ def number_names(path: str, part: Part, field: str) -> list[str]:
     if not isinstance(given.value, tuple):
         return [name]
     return [f"{name}[{number}]" for number in range(1, len(given.values) + 1)]
-
-
-def readings_of(assembly: Assembly) -> tuple[ReadingNames, ...]:
-    """Return what each sensor of an assembly shows, through which chain of sensors.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    """
-    return tuple(
-        ReadingNames(f"{name}.reading", *assembly.measured(f"{name}.reading")) for name in assembly.sensors()
-    )
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,8 @@ def measure(run: Trace, assembly: Assembly, *, seed: int) -> Trace:
         raise ValueRangeError(
             f"assembly '{assembly.name}'", "has no sensor", next_step="add for instance an Encoder"
         )
-    truth = {n: v for n, v in run.signals.items() if n.rpartition(".")[0] not in sensors}
+    continuous = {f"{name}.reading" for name in sensors}
+    truth = {n: v for n, v in run.signals.items() if n not in continuous}
     readings: dict[str, NDArray[np.float64]] = {}
     units = dict(run.units)
     for name, sensor in sensors.items():

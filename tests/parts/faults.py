@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import DelayedMotor, EccentricEncoder, MisshapenCam, Part, SaturatingMotor
+from nlsdesign.components import DriveDelay, DriveSaturation, Eccentricity, MisshapenCam, Part
 
 _PARTS: tuple[Part, ...] = (
-    DelayedMotor(inertia=0.009, gear_ratio=25.0, torque_constant=0.03, delay=4e-3),
-    SaturatingMotor(inertia=0.009, gear_ratio=25.0, torque_constant=0.03, saturation_current=6.0),
-    EccentricEncoder(of="motor.angle", quantum=7.7e-4, sine=0.01, cosine=-0.006),
+    DriveDelay(delay=4e-3),
+    DriveSaturation(saturation_current=6.0),
+    Eccentricity(of="motor.angle", sine=0.01, cosine=-0.006),
     MisshapenCam(
         lever_arm=(0.016, 0.014, 0.013, 0.013, 0.014, 0.015),
         last_angle=0.98,

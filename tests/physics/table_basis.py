@@ -220,7 +220,7 @@ ROWS: tuple[Row, ...] = (
         _SENSOR + "load_cell_and_ammeter_are_lines_and_their_inverse_is_exact",
     ),
     Row(
-        c.DelayedForceSensor,
+        c.TransportDelay,
         "small-signal limit",
         ("linearised reading", "e^(−sτ)"),
         _SENSOR + "delay_against_the_exact_phase",

@@ -7,15 +7,13 @@ from nlsdesign.components import (
     CapstanFriction,
     CurrentDrivenMotor,
     CurrentSensor,
-    DelayedForceSensor,
-    DriftingForceSensor,
+    Drift,
     Encoder,
     ForceSensor,
     Gear,
     LossyGear,
     OneSidedCam,
     SampleAndHold,
-    SampledEncoder,
     Tachometer,
     TorqueSensor,
     TransportDelay,
@@ -30,10 +28,6 @@ ROWS: tuple[Row, ...] = (
         "test_sensors.py::test_rounding_of_an_encoder_scatters_by_a_count_over_the_root_of_twelve",
     ),
     Row(
-        SampledEncoder, "counts of a ramp", ("record", "integer arithmetic"),
-        "test_sensors.py::test_counts_of_a_sampled_encoder_by_integer_arithmetic",
-    ),
-    Row(
         Tachometer, "jω·ω_c/(jω + ω_c)", ("flat model and record of a wave", "transfer function"),
         "test_sensors.py::test_a_tachometer_is_a_differentiator_with_a_first_order_roll_off",
     ),
@@ -46,12 +40,7 @@ ROWS: tuple[Row, ...] = (
         "test_sensors.py::test_a_delay_in_the_flat_model_is_the_exact_delay_of_the_record",
     ),
     Row(
-        DelayedForceSensor, "reading(t) = gain·F(t − τ) + bias",
-        ("Padé states of the flat model", "exact shift in time"),
-        "test_sensors.py::test_a_delay_in_the_flat_model_is_the_exact_delay_of_the_record",
-    ),
-    Row(
-        DriftingForceSensor, "gain·F + bias + d·t", ("state of the flat model", "line of the record"),
+        Drift, "F + d·t", ("state of the flat model", "line of the record"),
         "test_sensors.py::test_a_drift_is_the_same_line_in_the_flat_model_and_in_the_record",
     ),
     Row(

@@ -9,19 +9,19 @@ _HERE = "test_faults.py::test_"
 
 ROWS: tuple[Row, ...] = (
     Row(
-        c.DelayedMotor,
+        c.DriveDelay,
         "delay",
         ("linearised motor", "e^(−iωτ)"),
         _HERE + "a_delayed_motor_has_the_phase_of_its_delay",
     ),
     Row(
-        c.SaturatingMotor,
+        c.DriveSaturation,
         "Newton",
         ("flat model", "n·k_T·sin(arctan(I/I_s))·I_s by hand"),
         _HERE + "a_saturating_motor_follows_its_curve",
     ),
     Row(
-        c.EccentricEncoder,
+        c.Eccentricity,
         "geometry",
         ("reading", "line of sight to a disc off its shaft"),
         _HERE + "an_eccentric_disc_reads_what_geometry_says",

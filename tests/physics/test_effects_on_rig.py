@@ -44,7 +44,7 @@ def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> 
     write_set(tmp_path, actuator, make_records(actuator, {effect: 1.0}, 21, only=RECORDS))
     declared = with_true_contact(declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv"))
     records = load_records(tmp_path, flatten(declared))
-    bench = Bench(records, blocks_of(declared, records.signals))
+    bench = Bench(records, blocks_of(flatten(declared), records.signals))
     comparison = Comparison(bench, typical_sizes(declared, records))
     base = comparison.coarsely(comparison.base(declared))
     before = excesses(base, bench)
@@ -64,7 +64,7 @@ def test_a_deck_that_declares_play_is_looked_at_coarsely(tmp_path: Path) -> None
     left = []
     for declared in (plain, candidate.assembly.with_values({"spring.gap": 0.05})):
         records = load_records(tmp_path, flatten(declared))
-        bench = Bench(records, blocks_of(declared, records.signals))
+        bench = Bench(records, blocks_of(flatten(declared), records.signals))
         comparison = Comparison(bench, typical_sizes(declared, records))
         left.append(total_excess(excesses(comparison.coarsely(comparison.base(declared)), bench)))
     assert left[1] < 0.5 * left[0]

@@ -12,27 +12,35 @@ from scipy.integrate import quad
 from scipy.interpolate import BSpline
 
 from nlsdesign.components import (
-    DelayedMotor,
-    EccentricEncoder,
+    DriveDelay,
+    DrivePart,
+    DriveSaturation,
+    Eccentricity,
+    GearedMotor,
     Inertia,
     MisshapenCam,
-    SaturatingMotor,
     Spring,
     through,
     tie,
 )
-from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.components.sensing.sensors import Sensor
+from nlsdesign.errors import ArrangementError
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.model.transform import with_outputs
+from nlsdesign.simulation import simulate
 
 MOTOR = {"inertia": 0.01, "gear_ratio": 25.0, "torque_constant": 0.03}
 TORQUE_PER_AMPERE = 0.75
 
 
+def driven(**chain: DrivePart) -> Assembly:
+    return assembly("a", motor=GearedMotor(**MOTOR, chain=tuple(chain.items())))
+
+
 def test_a_delayed_motor_has_the_phase_of_its_delay() -> None:
-    model = flatten(assembly("a", motor=DelayedMotor(**MOTOR, delay=5e-3)))
+    model = flatten(driven(delay=DriveDelay(delay=5e-3)))
     opened = with_outputs(model, ["motor.drive_torque"])
     system = linearise(opened, model.start(model.states), [0.0]).to_control()
     for omega in (1.0, 20.0, 100.0):
@@ -42,7 +50,7 @@ def test_a_delayed_motor_has_the_phase_of_its_delay() -> None:
 
 
 def test_a_saturating_motor_follows_its_curve() -> None:
-    model = flatten(assembly("a", motor=SaturatingMotor(**MOTOR, saturation_current=4.0)))
+    model = flatten(driven(iron=DriveSaturation(saturation_current=4.0)))
     for current in (-9.0, -0.01, 0.0, 4.0, 15.0):
         found = model.evaluate([0.0, 0.0], [current])
         torque = TORQUE_PER_AMPERE * 4.0 * math.sin(math.atan(current / 4.0))
@@ -51,6 +59,34 @@ def test_a_saturating_motor_follows_its_curve() -> None:
     # The current is held within its limit before the iron saturates.
     beyond = model.evaluate([0.0, 0.0], [1e3])["motor.drive_torque"]
     assert beyond == model.evaluate([0.0, 0.0], [20.0])["motor.drive_torque"]
+
+
+@pytest.mark.parametrize("order", [("delay", "iron"), ("iron", "delay")])
+def test_a_late_motor_that_saturates_is_both_in_any_order(order: tuple[str, str]) -> None:
+    """Under a slow sine of 1.5 times the saturation current: n·k_T·I_s·sin(arctan(I(t − τ)/I_s))."""
+    delay, saturation, speed = 4e-3, 4.0, 2 * math.pi * 5.0
+    parts = {"delay": DriveDelay(delay=delay), "iron": DriveSaturation(saturation_current=saturation)}
+    model = flatten(driven(**{name: parts[name] for name in order}))
+    times = np.linspace(0.0, 0.6, 1201)
+    run = simulate(model, times, inputs={"motor.current": lambda t: 6.0 * math.sin(speed * t)})
+    earlier = 6.0 * np.sin(speed * (times - delay))
+    expected = TORQUE_PER_AMPERE * saturation * np.sin(np.arctan(earlier / saturation))
+    settled = times > 0.1
+    error = np.abs(run["motor.drive_torque"] - expected)[settled]
+    # Behind the iron the wave has harmonics k, each with a phase error below (kωτ)⁵/720.
+    amplitudes = 2.0 * np.abs(np.fft.rfft(expected[-401:-1])) / 400
+    harmonics = np.arange(1, 20)
+    bound = amplitudes[harmonics] @ np.minimum((harmonics * speed * delay) ** 5 / 720, 2.0)
+    assert np.max(error) < 1.2 * bound + 1e-6
+    at_once = TORQUE_PER_AMPERE * saturation * np.sin(np.arctan(6.0 * np.sin(speed * times) / saturation))
+    assert np.max(np.abs(run["motor.drive_torque"] - at_once)[settled]) > 0.1
+
+
+def test_a_motor_takes_only_parts_of_a_drive() -> None:
+    with pytest.raises(ArrangementError, match=r"'spring' of a motor.*is a Spring"):
+        driven(spring=Spring(stiffness=1.0))  # type: ignore[arg-type]
+    with pytest.raises(ArrangementError, match=r"name 'inertia'.*is taken"):
+        driven(inertia=DriveDelay(delay=1e-3))
 
 
 class _Plain:
@@ -71,9 +107,8 @@ def test_an_eccentric_disc_reads_what_geometry_says() -> None:
     radius, offset, place = 20.0, 0.15, 0.7  # mm, mm, rad
     share = offset / radius
     # error = share·sin(θ + place) − share·sin(place), to first order in the share
-    disc = EccentricEncoder(
+    disc = Eccentricity(
         of="wheel.angle",
-        quantum=1e-9,
         sine=share * math.cos(place),
         cosine=share * math.sin(place),
     )
@@ -91,7 +126,7 @@ def test_an_eccentric_disc_reads_what_geometry_says() -> None:
 
 
 def test_a_disc_on_the_motor_turns_with_the_gear() -> None:
-    disc = EccentricEncoder(of="wheel.angle", quantum=1e-9, sine=2e-3, cosine=0.0, order=25.0)
+    disc = Eccentricity(of="wheel.angle", sine=2e-3, cosine=0.0, order=25.0)
     model = flatten(assembly("a", wheel=Inertia(inertia=1.0), dial=disc))
     reading = model.evaluate([0.3, 0.0])["dial.reading"]
     assert reading - 0.3 == pytest.approx(2e-3 * math.sin(7.5), abs=2e-9)

@@ -27,10 +27,10 @@ from nlsdesign.components import (
     LoadFriction,
     Mass,
     QuadraticDrag,
+    Regularised,
     Rounded,
     Slack,
     SlidingFillers,
-    Smooth,
     Spring,
     StretchyCable,
     StribeckFriction,
@@ -179,7 +179,7 @@ def test_a_slack_cable_meets_the_rubber_where_it_has_recovered_to() -> None:
 @given(st.floats(-20.0, 20.0))
 def test_stribeck_lies_between_breakaway_and_sliding(speed: float) -> None:
     rub = StribeckFriction(
-        sliding_effort=0.4, contact=Smooth(creep_speed=1e-3), breakaway=0.2, stribeck_speed=0.5
+        sliding_effort=0.4, contact=Regularised(creep_speed=1e-3), breakaway=0.2, stribeck_speed=0.5
     )
     found = torque(rub, 0.0, speed)
     assert found * speed >= 0.0
@@ -206,7 +206,9 @@ def test_ripple_does_no_work_over_a_turn() -> None:
 @given(st.floats(-0.5, 0.5), st.sampled_from([-2.0, 2.0]))
 def test_load_friction_takes_its_share_of_the_load_and_only_takes(angle: float, speed: float) -> None:
     found = torque(
-        LoadFriction(members=(("s", SPRING),), ratio=0.05, contact=Smooth(creep_speed=0.02)), angle, speed
+        LoadFriction(members=(("s", SPRING),), ratio=0.05, contact=Regularised(creep_speed=0.02)),
+        angle,
+        speed,
     )
     assert found == pytest.approx(3.4 * angle + 0.05 * abs(3.4 * angle) * math.copysign(1, speed), rel=1e-9)
     assert (found - 3.4 * angle) * speed >= 0.0

@@ -25,8 +25,8 @@ from nlsdesign.components import (
     Fixed,
     GearedMotor,
     LinearElastic,
+    Regularised,
     Rounded,
-    Smooth,
     Spring,
     StrainStiffening,
     ViscousMaterial,
@@ -274,7 +274,7 @@ def test_dry_friction_saturates_and_always_takes_power(speed: float) -> None:
     made = assembly(
         "a",
         shaft=Driven(),
-        rub=tie(CoulombFriction(sliding_effort=0.4, contact=Smooth(creep_speed=0.02)), "shaft"),
+        rub=tie(CoulombFriction(sliding_effort=0.4, contact=Regularised(creep_speed=0.02)), "shaft"),
     )
     torque = flatten(made).evaluate([], [0.0, speed])["rub.torque"]
     assert torque == pytest.approx(0.4 * math.tanh(speed / 0.02), rel=1e-12, abs=1e-15)

@@ -18,13 +18,11 @@ from nlsdesign.components import (
     TRANSLATION,
     Assembly,
     CurrentSensor,
-    DelayedForceSensor,
-    DriftingForceSensor,
+    Drift,
     Driven,
     Encoder,
     ForceSensor,
     SampleAndHold,
-    SampledEncoder,
     Sensor,
     Spring,
     Tachometer,
@@ -51,10 +49,19 @@ def test_counts_of_a_sampled_encoder_by_integer_arithmetic() -> None:
     """A ramp of 13/10 counts per ms, read at 250 Hz and logged at 1 kHz."""
     times, quantum = np.arange(400) / 1000.0, 1e-3
     angle = 1.3 * quantum * np.arange(400)
-    sensor = SampledEncoder(of="hand.signal", quantum=quantum, sample_rate=250.0)
-    found = seen(times, angle, "rad", dial=sensor)["dial.reading"]
     counts = [math.floor(Fraction(13, 10) * (4 * (k // 4)) + Fraction(1, 2)) for k in range(400)]
-    assert found == pytest.approx(quantum * np.array(counts), abs=1e-12)
+    before = {
+        "samples": SampleAndHold(of="hand.signal", sample_rate=250.0),
+        "dial": Encoder(of="samples.reading", quantum=quantum),
+    }
+    behind = {
+        "dial": Encoder(of="hand.signal", quantum=quantum),
+        "samples": SampleAndHold(of="dial.reading", sample_rate=250.0),
+    }
+    for chain in (before, behind):
+        last = f"{list(chain)[-1]}.reading"
+        reading = seen(times, angle, "rad", **chain)[last]
+        assert reading == pytest.approx(quantum * np.array(counts), abs=1e-12)
 
 
 def test_rounding_of_an_encoder_scatters_by_a_count_over_the_root_of_twelve() -> None:
@@ -103,7 +110,10 @@ def waved(made: Assembly, frequency: float) -> tuple[Trace, Trace]:
     "sensors",
     [
         {"late": TransportDelay(of="spring.force", delay=4e-3)},
-        {"late": DelayedForceSensor(of="spring.force", delay=4e-3, gain=1.1, bias=-2.0)},
+        {
+            "bus": TransportDelay(of="spring.force", delay=4e-3),
+            "late": ForceSensor(of="bus.reading", gain=1.1, bias=-2.0),
+        },
         {
             "cell": ForceSensor(of="spring.force", gain=0.9, bias=3.0),
             "late": TransportDelay(of="cell.reading", delay=4e-3),
@@ -121,11 +131,36 @@ def test_a_delay_in_the_flat_model_is_the_exact_delay_of_the_record(sensors: dic
 
 
 def test_a_drift_is_the_same_line_in_the_flat_model_and_in_the_record() -> None:
-    made = pulled(cell=DriftingForceSensor(of="spring.force", gain=1.2, bias=0.5, drift=-0.8))
-    run, record = waved(made, 2.0)
-    expected = 1.2 * run["spring.force"] + 0.5 - 0.8 * run.time
+    chain = {
+        "warming": Drift(of="spring.force", drift=-0.8),
+        "cell": ForceSensor(of="warming.reading", gain=1.2, bias=0.5),
+    }
+    run, record = waved(pulled(**chain), 2.0)
+    expected = 1.2 * (run["spring.force"] - 0.8 * run.time) + 0.5
     assert run["cell.reading"] == pytest.approx(expected, abs=1e-7)
     assert record["cell.reading"] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("order", [("late", "warming"), ("warming", "late")])
+def test_delay_drift_and_gain_in_one_chain_against_arithmetic(order: tuple[str, str]) -> None:
+    """A 10 N sine behind a delay τ, a drift d and a gain: the drift is as late as what it rides on."""
+    delay, drift, gain, bias, frequency = 3e-3, 0.7, 1.3, -2.0, 6.0
+    faults = {"late": (TransportDelay, {"delay": delay}), "warming": (Drift, {"drift": drift})}
+    chain: dict[str, Sensor] = {}
+    source = "spring.force"
+    for name in order:
+        kind, numbers = faults[name]
+        chain[name] = kind(of=source, **numbers)
+        source = f"{name}.reading"
+    chain["cell"] = ForceSensor(of=source, gain=gain, bias=bias)
+    run, record = waved(pulled(**chain), frequency)
+    speed, time = 2 * math.pi * frequency, run.time
+    since = time - delay if order == ("warming", "late") else time
+    expected = gain * (10.0 * np.sin(speed * (time - delay)) + drift * since) + bias
+    late = time > 0.05
+    bound = 1.1 * gain * 10.0 * (speed * delay) ** 5 / 720 + 1e-5
+    assert np.max(np.abs(run["cell.reading"] - expected)[late]) < bound
+    assert np.max(np.abs(record["cell.reading"] - expected)[late]) < 1e-5
 
 
 def test_noise_is_white_of_the_stated_size_and_led_by_the_seed() -> None:
@@ -192,8 +227,9 @@ def test_one_count_of_an_encoder_shows_as_a_step_of_the_tachometer() -> None:
         times,
         angle,
         "rad",
-        dial=SampledEncoder(of="hand.signal", quantum=quantum, sample_rate=rate),
-        tacho=Tachometer(of="dial.reading", bandwidth=corner, sample_rate=rate),
+        dial=Encoder(of="hand.signal", quantum=quantum),
+        samples=SampleAndHold(of="dial.reading", sample_rate=rate),
+        tacho=Tachometer(of="samples.reading", bandwidth=corner, sample_rate=rate),
     )
     keep = math.exp(-2 * math.pi * corner / rate)
     expected = np.where(times < 0.1, 0.0, (1 - keep) * quantum * rate * keep ** (np.arange(200.0) - 100))

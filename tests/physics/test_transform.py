@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.components import DelayedForceSensor, Driven
+from nlsdesign.components import Driven, TransportDelay
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, UnknownNameError
 from nlsdesign.model import FlatModel, Variable, flatten
@@ -122,7 +122,7 @@ def test_a_cut_removes_what_lies_before_it(model: FlatModel) -> None:
 
 def test_idle_states_leave_without_a_trace(original: Trace, model: FlatModel) -> None:
     parts = dict(ob.actuator(ob.SLOW).parts)
-    sensor = DelayedForceSensor(of=ob.FORCE, delay=2e-3)
+    sensor = TransportDelay(of=ob.FORCE, delay=2e-3)
     heard = flatten(assembly("heard", **parts, cell=sensor), outputs=["motor.angle", "cell.reading"])
     assert len(heard.states) == 5
     bare = without_idle_states(heard, ["spring.torque"])

@@ -22,6 +22,7 @@ from nlsdesign.components import (
     Assembly,
     Body,
     Cam,
+    DrivePart,
     Element,
     Gear,
     GearedMotor,
@@ -41,8 +42,8 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.components.core.parameters import readings
 from nlsdesign.components.core.part import walk
+from nlsdesign.components.core.part_numbers import readings
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ExportError
 from nlsdesign.export.compilation.cross_compiler import compiler, run_compiler
@@ -73,6 +74,9 @@ def around(part: Part) -> Assembly:
         )
         other = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
         return assembly("bench", part=part, other=other, spring=tie(spring, "part", "other"))
+    if isinstance(part, DrivePart):
+        motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055, chain=(("part", part),))
+        return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))
     if isinstance(part, Gear):
         bodies = {name: Inertia(inertia=6e-4) for name in part.between}
         return assembly("bench", **bodies, part=part)

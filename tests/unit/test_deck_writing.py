@@ -19,15 +19,16 @@ from hypothesis import strategies as st
 from nlsdesign.components import (
     TRANSLATION,
     Assembly,
-    DelayedForceSensor,
     Driven,
     Encoder,
     Fixed,
+    ForceSensor,
     GearedMotor,
     LinearElastic,
     Pulley,
     Spring,
     StrainStiffening,
+    TransportDelay,
     TwoSidedCam,
     ViscousMaterial,
     parallel,
@@ -72,7 +73,8 @@ def large() -> Assembly:
             through(Pulley(radius=0.01), both=parallel(a=Spring(stiffness=1), b=Spring(stiffness=2))), "motor"
         ),
         encoder=Encoder(of="motor.angle", quantum=quantity(0.767, "mrad")),
-        cell=DelayedForceSensor(of="spring.chain.rubber.force", delay=quantity(2, "ms")),
+        cell_delay=TransportDelay(of="spring.chain.rubber.force", delay=quantity(2, "ms")),
+        cell=ForceSensor(of="cell_delay.reading"),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,8 +15,10 @@ from nlsdesign.components import (
     ForceSensor,
     GearedMotor,
     Inertia,
+    SampleAndHold,
     Spring,
     TorqueSensor,
+    TransportDelay,
     parallel,
     tie,
 )
@@ -40,7 +41,7 @@ from nlsdesign.discrepancy.effects import (
     wrapped,
 )
 from nlsdesign.discrepancy.effects.cable import stretched
-from nlsdesign.discrepancy.selection.comparison import Hypothesis, _renamed
+from nlsdesign.discrepancy.selection.comparison import moved_numbers
 from nlsdesign.model import flatten
 
 CATALOGUE = [
@@ -213,7 +214,9 @@ def test_a_motor_without_a_spring_has_the_effects_of_a_drive() -> None:
         "coulomb_friction": 1, "stribeck_friction": 1, "quadratic_drag": 1, "torque_ripple": 1,
         "drive_delay": 1, "torque_constant_saturation": 1, "angle_sensor_eccentricity": 2,
     }  # fmt: skip
-    once, on_motor = (c.assembly.sensors()["encoder"].order.number for c in angle_sensor_eccentricity(drive))
+    once, on_motor = (
+        c.assembly.quantities()["encoder_eccentricity.order"].number for c in angle_sensor_eccentricity(drive)
+    )
     assert (once, on_motor) == (1.0, 10.0)
 
 
@@ -226,10 +229,12 @@ def test_a_guide_stands_on_either_side_of_the_load_cell(rig: Assembly) -> None:
 def test_a_drifting_cell_is_read_without_its_drift(rig: Assembly) -> None:
     """The balance of the motor sees the force behind the reading: reading less drift so far, at 2 N/s."""
     (found,) = force_sensor_drift(rig)
-    drifting = found.assembly.with_values({"force_sensor.drift": 2.0})
+    drifting = found.assembly.with_values({"force_sensor_drift.drift": 2.0})
     signals = ["motor_encoder.reading", "current_sensor.reading", "force_sensor.reading"]
-    plain, edited = ({b.name: b.model for b in blocks_of(a, signals)}["motor"] for a in (rig, drifting))
-    assert [v.name for v in edited.states] == ["force_sensor.drifted"]
+    plain, edited = (
+        {b.name: b.model for b in blocks_of(flatten(a), signals)}["motor"] for a in (rig, drifting)
+    )
+    assert [v.name for v in edited.states] == ["force_sensor_drift.drifted"]
     assert edited.evaluate([0.0], [0.0] * len(edited.inputs)).keys() >= {"motor.unbalanced"}
     place = [v.name for v in plain.inputs].index("force_sensor.reading")
     given = [0.3 if v.name == "motor_encoder.reading" else 0.0 for v in plain.inputs]
@@ -241,15 +246,78 @@ def test_a_drifting_cell_is_read_without_its_drift(rig: Assembly) -> None:
     )
 
 
+def offered(declared: Assembly, location: str) -> set[str]:
+    return {c.effect for effect in ALL for c in effect(declared) if c.location == location}
+
+
+def test_behind_one_fault_of_a_load_cell_every_other_one_is_offered(rig: Assembly) -> None:
+    faults = {
+        "force_sensor_delay": {"force_sensor_delay.delay": 4e-3},
+        "force_sensor_drift": {"force_sensor_drift.drift": 0.2},
+        "force_sensor_bias": {"force_sensor.bias": 3.0},
+        "force_sensor_gain": {"force_sensor.gain": 1.1},
+    }
+    assert offered(rig, "force_sensor") == set(faults)
+    for effect, numbers in faults.items():
+        (candidate,) = (c for e in ALL for c in e(rig) if c.effect == effect)
+        faulty = candidate.assembly.with_values(numbers)
+        assert offered(faulty, "force_sensor") == set(faults) - {effect}
+        # Whatever is added next, the records go on measuring the same signal.
+        assert {r.signal for r in flatten(faulty).readings} >= {"force_sensor.reading"}
+
+
+def test_a_delay_declared_anywhere_on_the_line_is_not_offered_again(rig: Assembly) -> None:
+    late = rig.with_part("bus", TransportDelay(of="force_sensor.reading", delay=2e-3))
+    assert "force_sensor_delay" not in offered(late, "force_sensor")
+    assert "force_sensor_drift" in offered(late, "force_sensor")
+
+
+def test_a_late_motor_may_saturate_and_one_that_saturates_may_be_late(rig: Assembly) -> None:
+    faults = {"drive_delay", "torque_constant_saturation"}
+    assert offered(rig, "motor") >= faults
+    for first, second in (
+        ("drive_delay", "torque_constant_saturation"),
+        ("torque_constant_saturation", "drive_delay"),
+    ):
+        (one,) = (c for e in ALL for c in e(rig) if c.effect == first)
+        assert offered(one.assembly, "motor") & faults == {second}
+        (two,) = (c for e in ALL for c in e(one.assembly) if c.effect == second)
+        assert {u.name for c in (one, two) for u in c.unknowns} <= set(flatten(two.assembly).values)
+        assert list(two.assembly["motor"].children()) == [
+            u.name.split(".")[1] for u in (*one.unknowns, *two.unknowns)
+        ]
+
+
+def test_a_disc_behind_a_gear_is_offered_for_an_encoder_that_is_sampled(rig: Assembly) -> None:
+    sampled = _latched_before(rig)
+    orders = [
+        c.assembly.quantities()["motor_encoder_eccentricity.order"].number
+        for c in angle_sensor_eccentricity(sampled)
+    ]
+    assert orders == [1.0, 25.0]
+    latched = rig.with_part("latch", SampleAndHold(of="motor_encoder.reading", sample_rate=1e3))
+    assert {c.location for c in angle_sensor_eccentricity(latched)} == {"motor_encoder"}
+
+
+def _latched_before(rig: Assembly) -> Assembly:
+    others = {n: p for n, p in rig.parts if n != "motor_encoder"}
+    return assembly(
+        "sampled",
+        **others,
+        samples=SampleAndHold(of="motor.angle", sample_rate=1e3),
+        motor_encoder=Encoder(of="samples.reading", quantum=1e-3),
+    )
+
+
 @pytest.mark.parametrize("first", ALL, ids=lambda e: e.__name__)
 def test_a_second_effect_keeps_the_numbers_of_the_first(first: Effect, rig: Assembly) -> None:
     """Whatever is added next, an effect's own numbers stay, under a name that the search finds again."""
     for one in first(rig):
-        blank = Hypothesis(one.assembly, (one,))
         for second in ALL:
             for two in second(one.assembly):
                 numbers = {n.partition("[")[0] for n in two.assembly.quantities()}
                 assert {u.name.partition("[")[0] for u in two.unknowns} <= numbers, two.effect
-                moved = _renamed(replace(blank, values={u.name: 1.0 for u in one.unknowns}), two.assembly)
-                names = {moved.get(u.name, u.name).partition("[")[0] for u in one.unknowns}
+                moved = moved_numbers(one.assembly, two.assembly)
+                rows = (u.name.partition("[")[0] for u in one.unknowns)
+                names = {moved.get(row, row) for row in rows}
                 assert names <= numbers, f"{one.effect}, then {two.effect}"

@@ -15,18 +15,19 @@ from nlsdesign.components import (
     Assembly,
     CoulombFriction,
     Dashpot,
-    DelayedForceSensor,
     Driven,
     Encoder,
     Fixed,
+    ForceSensor,
     GearedMotor,
     LinearElastic,
     Pulley,
+    Regularised,
     Rounded,
     Sharp,
-    Smooth,
     Spring,
     StrainStiffening,
+    TransportDelay,
     TwoSidedCam,
     ViscousMaterial,
     parallel,
@@ -60,12 +61,13 @@ def drive(cam: Pulley | TwoSidedCam, *, smooth: bool) -> Assembly:
         bearing=tie(
             parallel(
                 oil=Dashpot(damping=1e-3, domain=ROTATION),
-                rub=CoulombFriction(sliding_effort=0.02, contact=Smooth(creep_speed=0.02)),
+                rub=CoulombFriction(sliding_effort=0.02, contact=Regularised(creep_speed=0.02)),
             ),
             "motor",
         ),
         dial=Encoder(of="motor.angle", quantum=1e-3),
-        cell=DelayedForceSensor(of="spring.rope.rubber.force", delay=1e-3, gain=1.1, bias=2.0),
+        bus=TransportDelay(of="spring.rope.rubber.force", delay=1e-3),
+        cell=ForceSensor(of="bus.reading", gain=1.1, bias=2.0),
     )
 
 

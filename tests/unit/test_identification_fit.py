@@ -40,6 +40,7 @@ from nlsdesign.identification.estimation.least_squares import (
 )
 from nlsdesign.identification.estimation.levenberg_marquardt import minimise
 from nlsdesign.identification.records.measurement import Column, Record, RecordSet
+from nlsdesign.model import flatten
 from nlsdesign.quantity import quantity
 from nlsdesign.simulation import Trace
 
@@ -74,7 +75,7 @@ def puller(**inside: object) -> Assembly:
 
 
 def block_of(declared: Assembly) -> Block:
-    (found,) = blocks_of(declared, ["encoder.reading", "cell.reading"])
+    (found,) = blocks_of(flatten(declared), ["encoder.reading", "cell.reading"])
     return found
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import nlsdesign.components as room
+from nlsdesign.cli import main
 from nlsdesign.components import (
     ROTATION,
     Assembly,
@@ -15,17 +19,18 @@ from nlsdesign.components import (
     ForceSensor,
     GearedMotor,
     SampleAndHold,
-    SampledEncoder,
     Sensor,
     Spring,
     Tachometer,
     TorqueSensor,
+    TransportDelay,
     tie,
 )
-from nlsdesign.components.assembly.deck_writer import deck_text, declare
+from nlsdesign.components.assembly.deck_reader import component_classes
+from nlsdesign.components.assembly.deck_writer import deck_problems, deck_text, declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import read_deck
-from nlsdesign.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError
+from nlsdesign.errors import ArrangementError, NlsError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, measure
 
@@ -67,21 +72,86 @@ def test_a_sensor_reads_only_what_stands_before_it() -> None:
         "held": SampleAndHold(of="dial.reading", sample_rate=10.0),
         "dial": Encoder(of="motor.angle", quantum=1e-3),
     }
-    with pytest.raises(UnknownNameError, match=r"sensor 'held' reads 'dial.reading'"):
-        flatten(bench(**late))
-    run = Trace(np.array([0.0, 1.0]), {"motor.angle": np.zeros(2)}, {"motor.angle": "rad"})
-    with pytest.raises(UnknownNameError, match=r"sensor 'held' reads 'dial.reading'"):
-        measure(run, bench(**late), seed=1)
+    with pytest.raises(ArrangementError, match=r"'held' reads 'dial.reading'.*write 'dial' before 'held'"):
+        bench(**late)
+
+
+def test_sensors_that_read_one_another_in_a_circle_are_named() -> None:
+    circle = {
+        "bus": TransportDelay(of="log.reading", delay=1e-3),
+        "log": TransportDelay(of="dial.reading", delay=1e-3),
+        "dial": Encoder(of="bus.reading", quantum=1e-3),
+    }
+    with pytest.raises(
+        ArrangementError, match=r"'bus' reads 'log.reading': .*circle: bus ◁ log ◁ dial ◁ bus"
+    ):
+        bench(**circle)
+    with pytest.raises(ArrangementError, match=r"'dial' reads 'dial.reading': .*circle: dial ◁ dial"):
+        bench(dial=Encoder(of="dial.reading", quantum=1e-3))
+
+
+@pytest.mark.parametrize(
+    "old",
+    [
+        "DelayedForceSensor", "DelayedMotor", "DriftingForceSensor", "EccentricEncoder", "SampledEncoder",
+        "SaturatingMotor",
+    ],
+)  # fmt: skip
+def test_a_combination_of_part_and_fault_is_written_as_a_chain_now(old: str) -> None:
+    text = deck_text(bench(dial=Encoder(of="motor.angle", quantum=1e-3)))
+    text = text.replace('component = "Encoder"', f'component = "{old}"')
+    problem, *_ = deck_problems(read_deck(text, Path("bench.toml")))
+    parts = re.findall(r"\b[A-Z]\w+", str(problem).partition("-> write ")[2])
+    assert parts
+    assert set(parts) & set(component_classes()), str(problem)
+    with pytest.raises(UnknownNameError, match=f"'{old}': has another name now -> write "):
+        getattr(room, old)
+
+
+DANGLING = {
+    "no such part": ("motr.angle", r"'a' reads 'motr.angle': no such name; did you mean 'motor.angle'"),
+    "no such part inside": ("spring.cabel.force", r"'a' reads 'spring.cabel.force': no such name"),
+    "a body": ("motor", r"'a' reads 'motor': .*a part, not a signal; did you mean 'motor.angle'"),
+    "a tie": ("spring", r"'a' reads 'spring': .*a part, not a signal; did you mean 'spring.torque'"),
+    "a sensor": ("dial", r"'a' reads 'dial': .*a part, not a signal; did you mean 'dial.reading'"),
+}
+
+
+@pytest.mark.parametrize(("of", "message"), DANGLING.values(), ids=list(DANGLING))
+def test_a_chain_that_ends_nowhere_is_named_in_deck_and_model(of: str, message: str) -> None:
+    made = bench(dial=Encoder(of="motor.angle", quantum=1e-3), a=TransportDelay(of=of, delay=1e-3))
+    with pytest.raises(NlsError, match=message):
+        flatten(made)
+    (problem,) = deck_problems(read_deck(deck_text(made), Path("bench.toml")))
+    assert re.search(r"bench.toml:\d+:\d+: a.of: sensor " + message, str(problem))
+
+
+def test_a_circle_in_a_deck_has_its_place() -> None:
+    text = deck_text(bench(dial=Encoder(of="motor.angle", quantum=1e-3)))
+    text = text.replace('of = "motor.angle"', 'of = "dial.reading"')
+    (problem,) = deck_problems(read_deck(text, Path("bench.toml")))
+    assert re.search(r"bench.toml:\d+:\d+: dial.of: sensor 'dial' reads.*circle: dial ◁ dial", str(problem))
+
+
+def test_a_misspelt_signal_of_a_part_is_named_by_the_check_of_a_deck(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deck = tmp_path / "bench.toml"
+    deck.write_text(deck_text(bench(dial=Encoder(of="motor.anlge", quantum=1e-3))), encoding="utf8")
+    monkeypatch.setattr(sys, "argv", ["nlsdesign", "deck", "check", str(deck)])
+    with pytest.raises(SystemExit) as leaving:
+        main()
+    assert leaving.value.code == 2
+    shown = capsys.readouterr().err
+    assert "sensor 'dial' reads 'motor.anlge'" in shown
+    assert "did you mean 'motor.angle'" in shown
 
 
 def test_a_run_coarser_than_the_samples_is_named() -> None:
     run = Trace(np.linspace(0.0, 1.0, 11), {"motor.angle": np.zeros(11)}, {"motor.angle": "rad"})
-    fast = SampledEncoder(of="motor.angle", quantum=1e-3, sample_rate=1000.0)
     with pytest.raises(ValueRangeError, match=r"1000 Hz.*0\.1 s apart.*at most 0\.001 s"):
-        measure(run, bench(dial=fast), seed=1)
-    assert len(
-        measure(run, bench(dial=fast.__class__(of="motor.angle", quantum=1e-3, sample_rate=10.0)), seed=1)
-    )
+        measure(run, bench(held=SampleAndHold(of="motor.angle", sample_rate=1000.0)), seed=1)
+    assert len(measure(run, bench(held=SampleAndHold(of="motor.angle", sample_rate=10.0)), seed=1))
 
 
 def test_nothing_to_measure_with_is_named() -> None:
@@ -97,10 +167,11 @@ def test_a_tachometer_does_not_tell_the_angle() -> None:
 
 def test_a_chain_of_sensors_travels_through_a_deck() -> None:
     made = bench(
-        dial=SampledEncoder(of="motor.angle", quantum=1e-3, sample_rate=1000.0),
-        tacho=Tachometer(of="dial.reading", bandwidth=30.0, sample_rate=1000.0),
+        dial=Encoder(of="motor.angle", quantum=1e-3),
+        latch=SampleAndHold(of="dial.reading", sample_rate=1000.0),
+        tacho=Tachometer(of="latch.reading", bandwidth=30.0, sample_rate=1000.0),
     )
     text = deck_text(made)
     again = declare(read_deck(text, Path("bench.toml")))
     assert again.parts == made.parts
-    assert [v.unit for v in flatten(again).outputs] == ["rad", "rad/s"]
+    assert [v.unit for v in flatten(again).outputs] == ["rad", "rad", "rad/s"]

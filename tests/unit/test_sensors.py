@@ -19,13 +19,13 @@ from nlsdesign.components import (
     TRANSLATION,
     Assembly,
     CurrentSensor,
-    DelayedForceSensor,
     Driven,
     Encoder,
     ForceSensor,
     GearedMotor,
     Inertia,
     Spring,
+    TransportDelay,
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
@@ -71,7 +71,7 @@ def test_load_cell_and_ammeter_are_lines_and_their_inverse_is_exact() -> None:
 
 
 def response(frequency: float) -> complex:
-    model = flatten(pulled(cell=DelayedForceSensor(of="spring.force", delay=DELAY)), inputs=["grip.position"])
+    model = flatten(pulled(cell=TransportDelay(of="spring.force", delay=DELAY)), inputs=["grip.position"])
     linear = linearise(model, model.start(model.states))
     return complex(linear.to_control()(2j * math.pi * frequency)) / 1000.0
 
@@ -97,7 +97,8 @@ def test_delay_is_the_pade_approximant_of_the_exponential() -> None:
 
 def test_delayed_reading_of_a_wave_is_the_wave_before() -> None:
     """In time: after the transient the reading of a 5 Hz wave is the force τ earlier."""
-    model = flatten(pulled(cell=DelayedForceSensor(of="spring.force", delay=DELAY, gain=2.0, bias=1.0)))
+    bus = TransportDelay(of="spring.force", delay=DELAY)
+    model = flatten(pulled(bus=bus, cell=ForceSensor(of="bus.reading", gain=2.0, bias=1.0)))
     times = np.linspace(0.0, 0.4, 401)
     speed = 2 * math.pi * 5.0
     run = simulate(
@@ -114,7 +115,7 @@ def test_delayed_reading_of_a_wave_is_the_wave_before() -> None:
 
 def test_states_of_the_delay_are_of_the_size_of_the_force() -> None:
     """So that the absolute tolerance of the integrator means something for them; units say the same."""
-    model = flatten(pulled(cell=DelayedForceSensor(of="spring.force", delay=1e-5)))
+    model = flatten(pulled(cell=TransportDelay(of="spring.force", delay=1e-5)))
     assert {v.unit for v in model.states} == {"N"}
     linear = control.ss(linearise(model, [0.0, 0.0]).to_control())
     rest = -np.linalg.solve(linear.A, linear.B[:, :1])

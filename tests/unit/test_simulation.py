@@ -26,7 +26,7 @@ from nlsdesign.components import (
     Driven,
     Inertia,
     Mass,
-    Smooth,
+    Regularised,
     Spring,
     parallel,
     series,
@@ -130,7 +130,7 @@ def test_dry_friction_against_another_integrator() -> None:
         "rub",
         wheel=Inertia(inertia=1e-3),
         spring=tie(Spring(stiffness=2.0, domain=ROTATION), "wheel"),
-        rub=tie(CoulombFriction(sliding_effort=0.05, contact=Smooth(creep_speed=0.01)), "wheel"),
+        rub=tie(CoulombFriction(sliding_effort=0.05, contact=Regularised(creep_speed=0.01)), "wheel"),
     )
     times = np.linspace(0.0, 0.5, 51)
     run = simulate(flatten(made), times, start={"wheel.angle": 0.3}, tolerance=1e-11)
@@ -399,7 +399,7 @@ def test_an_equation_that_was_not_solved_is_an_error() -> None:
         s=tie(
             series(
                 k=Spring(stiffness=1.0, domain=ROTATION),
-                brake=CoulombFriction(sliding_effort=0.1, contact=Smooth(creep_speed=0.02)),
+                brake=CoulombFriction(sliding_effort=0.1, contact=Regularised(creep_speed=0.02)),
             ),
             "shaft",
         ),

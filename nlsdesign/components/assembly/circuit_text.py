@@ -36,6 +36,7 @@ def draw(title: str, parts: Sequence[tuple[str, Part]]) -> str:
             lines.append(f"  {name} ◁ {part.of}   {part.title()}")
         else:
             lines.append(f"  ({name})   {part.title()}")
+            lines += _branches(part, "    ")
     return "\n".join(lines)
 
 

@@ -16,10 +16,10 @@ from ...errors import DeckError, NlsError, nearest, unknown_name
 from ...quantity import Quantity
 from ..core.domain import Domain
 from ..core.element import Combination, Element
-from ..core.parameters import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.part import Part
+from ..core.part_numbers import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.tie import Tie
-from ..mechanics.bodies import Body
+from ..mechanics.bodies import Body, GearedMotor
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
@@ -78,7 +78,7 @@ class Builder:
             return None
         made = {key: child for key, child in children.items() if child is not None}
         fields = self.fields(path, table, kind, next(iter(made.values()), None))
-        if inner and not issubclass(kind, Combination | Through):
+        if inner and not issubclass(kind, Combination | Through | GearedMotor):
             self._problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
         if len(self.problems) > before or len(made) < len(children):
             return None
@@ -107,7 +107,7 @@ class Builder:
         intended: set[str | None] = set()
         for key, raw in table.items():
             full = f"{path}.{key}"
-            if key in names:
+            if key in names and not (isinstance(raw, dict) and "component" in raw):
                 try:
                     given[key] = self.deck.number(full, raw)
                 except NlsError as error:
@@ -194,10 +194,12 @@ class Builder:
 
         Parameters
         ----------
-        name, table
-            As for :meth:`part`.
+        name
+            Of the table.
         element
             The element; its ends are checked even where it could not be made.
+        table
+            As read.
         """
         ends = table.get("between")
         if not isinstance(ends, list) or not all(isinstance(end, str) for end in ends):
@@ -317,6 +319,8 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
         if "cam" not in children or len(behind) != 1:
             raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
         return {"cam": children["cam"], "behind": behind[0]}
+    if issubclass(kind, GearedMotor):
+        return {"chain": tuple(children.items())}
     if issubclass(kind, Gear):
         return {"between": tuple(table["between"])}
     return {"of": table["of"]} if issubclass(kind, Sensor) else {}

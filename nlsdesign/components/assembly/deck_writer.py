@@ -20,10 +20,11 @@ from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from .deck_reader import Builder
 from .named_parts import Assembly, arrangement_problems
+from .sensor_chains import source_problems
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:
-    """Return everything that is wrong with a deck, each with file, line and column.
+    """Return all problems of a deck, each with file, line and column.
 
     Parameters
     ----------
@@ -66,8 +67,8 @@ def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
         parts[name] = builder.tied(name, part, table) if is_tied else part
     complete = tuple((name, part) for name, part in parts.items() if part is not None)
     unreadable = [name for name, part in parts.items() if part is None]
-    for name, error in arrangement_problems(complete, unreadable):
-        field = f"{name}.between" if f"{name}.between" in deck.places else name
+    for name, error in (*arrangement_problems(complete, unreadable), *source_problems(complete, unreadable)):
+        field = next((f for f in (f"{name}.between", f"{name}.of") if f in deck.places), name)
         builder.problems.append(error.at(deck.place(field)))
     if builder.problems:
         return None, builder.problems
@@ -156,8 +157,10 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
 
     Raises
     ------
+    DeckError
+        If the table is missing or is another component.
     NlsError
-        If the table is missing or is another component, or a number is missing, unknown or not valid.
+        If a number is missing, unknown or not valid.
     """
     table: Any = deck.tables
     for step in path.split("."):

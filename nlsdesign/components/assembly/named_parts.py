@@ -17,6 +17,7 @@ from ..mechanics.gear import Gear, gear_problems
 from ..sensing.sensors import Sensor
 from .circuit_picture import assembly_svg
 from .circuit_text import draw
+from .sensor_chains import chain_problems, sensors_behind
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,11 @@ class Assembly:
         Pairs of name and body, gear, tie or sensor, in written order.
     description
         One sentence.
+
+    Raises
+    ------
+    ArrangementError
+        If the parts have no body, or are connected in a way that has no solution.
     """
 
     name: str
@@ -69,20 +75,19 @@ class Assembly:
         return {name: part for name, part in self.parts if isinstance(part, Sensor)}
 
     def measured(self, signal: str) -> tuple[str, tuple[str, ...]]:
-        """Return what a signal shows, and the sensors between, the one that gives the reading first.
+        """Return the variable that a signal measures, and the chain of sensors, the last one first.
 
         Parameters
         ----------
         signal
-            Full name; a signal that is not the reading of a sensor shows itself.
+            Full name; a signal that is not the reading of a sensor is returned itself.
+
+        Raises
+        ------
+        ArrangementError
+            If the sensors read one another in a circle.
         """
-        sensors = self.sensors()
-        readings = {f"{name}.reading": name for name in sensors}
-        chain: list[str] = []
-        while signal in readings:
-            chain.append(readings[signal])
-            signal = sensors[chain[-1]].of
-        return signal, tuple(chain)
+        return sensors_behind(self.sensors(), signal)
 
     def quantities(self) -> dict[str, Quantity]:
         """Return every number by full name."""
@@ -121,6 +126,11 @@ class Assembly:
             Existing path, or a new name at the top or inside a combination.
         new
             The part; a bare element in place of a tie keeps the bodies.
+
+        Raises
+        ------
+        UnknownNameError
+            If the path leads through a part that does not exist.
         """
         head, _, tail = path.partition(".")
         parts = dict(self.parts)
@@ -144,6 +154,11 @@ class Assembly:
         ----------
         path
             For instance ``"spring"`` or ``"spring.rubber"``.
+
+        Raises
+        ------
+        ArrangementError
+            If the part is no element.
         """
         part = self[path]
         element = part.element if isinstance(part, Tie) else part
@@ -158,6 +173,11 @@ class Assembly:
         ----------
         name
             Name of the part.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such part.
         """
         if name not in dict(self.parts):
             raise unknown_name("part", name, dict(self.parts))
@@ -237,6 +257,7 @@ def arrangement_problems(
                 ),
             )
     yield from gear_problems(parts, unreadable)
+    yield from chain_problems(parts)
     yield from _twofold(parts)
 
 

@@ -16,14 +16,14 @@ from ...quantity import Quantity
 from ...symbolic import Expression, positive_part, smooth_sign
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import Element, Scope
-from .parameters import Reading, parameter, read_as
+from .part_numbers import Reading, parameter, read_as
 from .switches import dry
 
 Pair = tuple[Expression, Expression]
 
 
 @dataclass(frozen=True)
-class Corner(Reading):
+class CornerContact(Reading):
     """Base of contacts of laws that begin to act at a place."""
 
     @abstractmethod
@@ -48,7 +48,7 @@ class Corner(Reading):
 
 
 @dataclass(frozen=True)
-class Rubbing(Reading):
+class FrictionContact(Reading):
     """Base of contacts of laws that act against the motion."""
 
     @abstractmethod
@@ -75,11 +75,11 @@ class Rubbing(Reading):
 
     @abstractmethod
     def size(self, scope: Scope, value: Expression, words: tuple[str, str], name: str) -> Expression:
-        """Return |v|, as :meth:`Corner.positive_part` returns ⟨v⟩."""
+        """Return |v|, as :meth:`CornerContact.positive_part` returns ⟨v⟩."""
 
 
 @dataclass(frozen=True)
-class Sharp(Corner, Rubbing):
+class Sharp(CornerContact, FrictionContact):
     """Corners as they are, and friction that truly sticks; simulation locates where it changes."""
 
     def positive_part(
@@ -109,10 +109,10 @@ class Sharp(Corner, Rubbing):
 
 
 @dataclass(frozen=True)
-class Rounded(Corner):
+class Rounded(CornerContact):
     """A corner rounded over a width w, C∞: ⟨v⟩ = w·ln(1 + e^(v/w)), at most w·ln 2 beyond the sharp one.
 
-    Source: softplus of Dugas et al. 2001.
+    Source: Dugas et al. 2001 (softplus).
 
     Examples
     --------
@@ -136,14 +136,14 @@ class Rounded(Corner):
 
 
 @dataclass(frozen=True)
-class Smooth(Rubbing):
+class Regularised(FrictionContact):
     """Friction with tanh(v/v_s) for the sign, C∞: at rest it creeps with v_s·atanh(F/level) and never sticks.
 
-    While sliding it differs by at most 2·level·e^(−2|v|/v_s). Source: e.g. Armstrong-Hélouvry 1991.
+    While sliding it differs by at most 2·level·e^(−2|v|/v_s). Source: Armstrong-Hélouvry 1991.
 
     Examples
     --------
-    >>> Smooth(creep_speed=0.02).creep_speed
+    >>> Regularised(creep_speed=0.02).creep_speed
     0.02
     """
 
@@ -179,9 +179,9 @@ class WithCorners(Element):
     contact: Reading = read_as(Sharp, Rounded, default=Sharp())
 
     @property
-    def corner(self) -> Corner:
+    def corner(self) -> CornerContact:
         """The contact, as what reads corners."""
-        assert isinstance(self.contact, Corner)
+        assert isinstance(self.contact, CornerContact)
         return self.contact
 
     @property
@@ -208,7 +208,7 @@ class WithFriction(Element):
     rounding: ClassVar[Mapping[Domain, float]] = {ROTATION: 0.02, TRANSLATION: 1e-3}
     """Creep speed of the smooth form unless another one is asked for, in SI, by domain."""
 
-    contact: Reading = read_as(Sharp, Smooth, default=Sharp())
+    contact: Reading = read_as(Sharp, Regularised, default=Sharp())
 
     @property
     def needs_rate(self) -> bool:
@@ -216,9 +216,9 @@ class WithFriction(Element):
         return True
 
     @property
-    def rubbing(self) -> Rubbing:
+    def rubbing(self) -> FrictionContact:
         """The contact, as what reads the direction."""
-        assert isinstance(self.contact, Rubbing)
+        assert isinstance(self.contact, FrictionContact)
         return self.contact
 
     @property
@@ -235,7 +235,7 @@ class WithFriction(Element):
             Speed at which 76 % of the friction acts, in SI; below it the sides creep instead of sticking.
         """
         chosen = self.rounding[self.domain] if width is None else width
-        return replace(self, contact=Smooth(_assumed(chosen, self.domain.rate_unit)))
+        return replace(self, contact=Regularised(_assumed(chosen, self.domain.rate_unit)))
 
 
 def _assumed(width: float, unit: str) -> Quantity:

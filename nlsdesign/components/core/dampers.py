@@ -9,7 +9,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import Element, Scope
-from .parameters import one_of, parameter
+from .part_numbers import one_of, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class Dashpot(Newton):
     Examples
     --------
     >>> Dashpot(damping=1e-3, domain=ROTATION).title()
-    'Dashpot(damping = 0.001 N*m*s/rad)'
+    'Dashpot(damping = 0.001 N·m·s/rad)'
     """
 
     domain: Domain = one_of(TRANSLATION, ROTATION)

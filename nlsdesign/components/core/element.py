@@ -175,6 +175,11 @@ class Combination(Element):
     ----------
     members
         Pairs of name and element.
+
+    Raises
+    ------
+    ArrangementError
+        If there is no member, one is no element, or they relate other quantities than this one takes.
     """
 
     picture: ClassVar[str] = "around"
@@ -192,7 +197,6 @@ class Combination(Element):
             raise ArrangementError(
                 kind, "needs at least one element", next_step="name elements, for instance spring=..."
             )
-        check_names(kind, [name for name, _ in self.members], taken=RESERVED | set(self.parameter_infos()))
         for name, member in self.members:
             if not isinstance(member, Element):
                 raise ArrangementError(
@@ -213,6 +217,7 @@ class Combination(Element):
                 next_step=self.placing,
             )
         super().__post_init__()
+        check_names(kind, [name for name, _ in self.members], taken=RESERVED | set(self.parameters()))
 
     @property
     def _inner(self) -> Domain:

@@ -12,9 +12,9 @@ from typing import Any, ClassVar, Self
 from ...errors import ArrangementError, UnitError, unknown_name
 from ...quantity import Quantity, same_dimension
 from .domain import Domain
-from .parameters import ParameterInfo as ParameterInfo
-from .parameters import Reading, Template, domain_by_units, readings, templates
-from .parameters import parameter as parameter
+from .part_numbers import ParameterInfo as ParameterInfo
+from .part_numbers import Reading, Template, domain_by_units, readings, templates
+from .part_numbers import parameter as parameter
 
 RESERVED = frozenset({"component", "between", "of", "domain"})
 """Keys of a deck that say what a part is and where it sits."""
@@ -30,41 +30,12 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             if "domains" in field.metadata:
-                object.__setattr__(self, "domain", self._decided(field.metadata["domains"]))
+                object.__setattr__(self, "domain", _decided(self, field.metadata["domains"]))
         for name, template in templates(type(self)).items():
-            info = template.within(self._domain)
+            info = template.within(_domain(self))
             object.__setattr__(self, name, info.checked(name, getattr(self, name)))
         for name, kinds in readings(type(self)).items():
-            object.__setattr__(self, name, self._reading(name, kinds).within(self._domain))
-
-    @property
-    def _domain(self) -> Domain | None:
-        return getattr(self, "domain", None)
-
-    def _decided(self, domains: tuple[Domain, ...]) -> Domain:
-        if self._domain is None:
-            return domain_by_units(domains, self._templates(), self.parameters())
-        if self._domain not in domains:
-            raise ArrangementError(
-                f"{type(self).__name__}: domain = {self._domain!r}",
-                f"must be one of {', '.join(domain.name for domain in domains)}",
-                next_step=f"for instance domain={domains[0].name.upper()}",
-            )
-        return self._domain
-
-    def _reading(self, name: str, kinds: tuple[type[Reading], ...]) -> Reading:
-        reading = getattr(self, name)
-        if not isinstance(reading, kinds):
-            raise ArrangementError(
-                f"{type(self).__name__}: {name} = {reading!r}",
-                f"must be one of {', '.join(f'{kind.__name__}(...)' for kind in kinds)}",
-            )
-        assert isinstance(reading, Reading)
-        return reading
-
-    def _templates(self) -> dict[str, Template]:
-        kinds = [type(self), *(type(getattr(self, name)) for name in readings(type(self)))]
-        return {name: template for kind in kinds for name, template in templates(kind).items()}
+            object.__setattr__(self, name, _reading(self, name, kinds).within(_domain(self)))
 
     @classmethod
     def domains(cls) -> tuple[Domain, ...]:
@@ -90,7 +61,7 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
 
     def infos(self) -> dict[str, ParameterInfo]:
         """Return unit, description and range of each number that this part has, in its own domain."""
-        return {name: template.within(self._domain) for name, template in self._templates().items()}
+        return {name: template.within(_domain(self)) for name, template in _templates(self).items()}
 
     def parameters(self) -> dict[str, Quantity]:
         """Return the numbers of this part alone by field name, those of its readings among them."""
@@ -118,9 +89,9 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
         choices = next(
             (f.metadata["domains"] for f in dataclasses.fields(self) if "domains" in f.metadata), ()
         )
-        if not choices or self._domain == domain_by_units(choices, self._templates(), self.parameters()):
+        if not choices or _domain(self) == domain_by_units(choices, _templates(self), self.parameters()):
             return None
-        return self._domain
+        return _domain(self)
 
     def children(self) -> Mapping[str, Part]:
         """Return the parts inside this one by name."""
@@ -133,6 +104,11 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
         ----------
         children
             All parts inside, by name.
+
+        Raises
+        ------
+        UnknownNameError
+            If there are children; a part without any takes none.
         """
         if children:
             raise unknown_name("part", next(iter(children)), ())
@@ -144,6 +120,39 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
         domain = self.stated_domain()
         stated = [f"domain = {domain.name}"] if domain else []
         return f"{type(self).__name__}({', '.join(numbers + stated)})"
+
+
+def _domain(part: Part) -> Domain | None:
+    return getattr(part, "domain", None)
+
+
+def _templates(part: Part) -> dict[str, Template]:
+    kinds = [type(part), *(type(getattr(part, name)) for name in readings(type(part)))]
+    return {name: template for kind in kinds for name, template in templates(kind).items()}
+
+
+def _decided(part: Part, domains: tuple[Domain, ...]) -> Domain:
+    domain = _domain(part)
+    if domain is None:
+        return domain_by_units(domains, _templates(part), part.parameters())
+    if domain not in domains:
+        raise ArrangementError(
+            f"{type(part).__name__}: domain = {domain!r}",
+            f"must be one of {', '.join(each.name for each in domains)}",
+            next_step=f"for instance domain={domains[0].name.upper()}",
+        )
+    return domain
+
+
+def _reading(part: Part, name: str, kinds: tuple[type[Reading], ...]) -> Reading:
+    reading = getattr(part, name)
+    if not isinstance(reading, kinds):
+        raise ArrangementError(
+            f"{type(part).__name__}: {name} = {reading!r}",
+            f"must be one of {', '.join(f'{kind.__name__}(...)' for kind in kinds)}",
+        )
+    assert isinstance(reading, Reading)
+    return reading
 
 
 def _short(given: Quantity) -> str:

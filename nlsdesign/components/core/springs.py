@@ -15,7 +15,7 @@ from ...symbolic import Expression, positive_part
 from .contacts import WithCorners
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import UNBOUNDED, Element, Range, Scope
-from .parameters import one_of, parameter
+from .part_numbers import one_of, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,11 @@ class Tie(Part):
         What relates motion and effort.
     between
         Names of the two bodies; one name means: against the resting frame.
+
+    Raises
+    ------
+    ArrangementError
+        If what is tied is no element, or there are not one or two ends.
     """
 
     element: Element

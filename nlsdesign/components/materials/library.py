@@ -141,6 +141,8 @@ def materials(path: Path | None = None) -> dict[str, Material]:
     ------
     NlsError
         If an entry is not sound; file, line, column and field are named.
+    DeckError
+        If the file cannot be read.
 
     Examples
     --------

@@ -13,7 +13,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from ..core.element import UNBOUNDED, Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 
 _ROOM = 293.15
 
@@ -104,8 +104,8 @@ class WorkHeat(RelativeHeat):
     """Heat of all work: F = F_in/(1 + ϑ), dϑ/dt = |F_in·ẋ|/E − ϑ/τ.
 
     A fixed share of all work becomes heat; E is the work after which, uncooled, half of the stiffness is
-    left. Valid for ϑ below about 0.5. Source: first law with a constant loss factor; Medalia 1991 (heat
-    build-up).
+    left. Valid for ϑ below about 0.5. Source: first law of thermodynamics with a constant loss factor;
+    Medalia 1991 (heat build-up).
 
     Examples
     --------
@@ -131,7 +131,8 @@ class ViscousHeat(RelativeHeat):
 
     The loss is that of a dashpot, so a slow motion makes no heat; v is the steady speed at which half of the
     stiffness would be left. Valid for ϑ below about 0.5 and motions slower than the relaxation of the branch
-    that makes the loss. Source: first law with the loss c·ẋ² of a dashpot; Medalia 1991 (heat build-up).
+    that makes the loss. Source: first law of thermodynamics with the loss c·ẋ² of a dashpot; Medalia 1991
+    (heat build-up).
 
     Examples
     --------
@@ -154,7 +155,7 @@ class SelfHeating(Combination):
 
     What heats, and how g falls, is the reading ``heat``: :class:`HeatBalance` in a material,
     :class:`WorkHeat` or :class:`ViscousHeat` around a piece whose section and length are not known apart.
-    Sources: with the readings.
+    Source: first law of thermodynamics.
 
     Examples
     --------

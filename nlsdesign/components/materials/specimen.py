@@ -9,7 +9,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, TRANSLATION, Domain
 from ..core.element import Combination, Element, Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,6 +33,11 @@ class Springpot(Element):
     below it the stress relaxes to nothing, above it the modulus is constant. Sources: Scott Blair 1947;
     Koeller 1984.
 
+    Raises
+    ------
+    ValueRangeError
+        If the band does not rise from its lower to its upper end.
+
     Examples
     --------
     >>> law = Springpot(modulus=1e6, reference=1.0, order=0.1, lower=0.01, upper=100.0)

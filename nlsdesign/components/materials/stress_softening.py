@@ -13,7 +13,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, positive_part
 from ..core.domain import MATERIAL, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 from .hyperelastic import Hyperelastic
 from .memory import following, rising
 
@@ -129,6 +129,11 @@ class StressSoftening(Combination):
     :class:`OgdenRoxburgh` where the laws say their strain energy, :class:`LargestMotion` around any element,
     a specimen or a piece whose section and length are not known apart. Valid for what the first pull does;
     there is no recovery, no set and no loss on reloading. Sources: Mullins 1969; Ogden and Roxburgh 1999.
+
+    Raises
+    ------
+    ArrangementError
+        If the curve needs the strain energy and a member does not say it.
 
     Examples
     --------

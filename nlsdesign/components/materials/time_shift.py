@@ -14,15 +14,21 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import parameter
 from ..core.part import walk
+from ..core.part_numbers import parameter
 from ..core.reduced_time import ReducedTime
 from .self_heating import SelfHeating
 
 
 @dataclass(frozen=True, kw_only=True)
 class TimeShift(Combination):
-    """Base of laws by which a temperature multiplies every relaxation time inside with one factor a_T."""
+    """Base of laws by which a temperature multiplies every relaxation time inside with one factor a_T.
+
+    Raises
+    ------
+    ArrangementError
+        If something inside heats up, which takes place in real time.
+    """
 
     takes: ClassVar[tuple[Domain, ...]] = (MATERIAL,)
     placing: ClassVar[str | None] = "put it inside a specimen"
@@ -65,8 +71,13 @@ class WlfShift(TimeShift):
     """log₁₀ a_T = −c₁·(T − T_r)/(c₂ + T − T_r): how time scales of rubber move above its glass transition.
 
     With T_r about 50 K above the glass transition, c₁ and c₂ are nearly the same for all amorphous polymers.
-    Valid from the glass transition to 100 K above it; moduli are taken as they are. Source: Williams,
-    Landel and Ferry 1955.
+    Valid from the glass transition to 100 K above it; moduli are taken as they are. Source:
+    Williams et al. 1955.
+
+    Raises
+    ------
+    ValueRangeError
+        If the temperature is not above the pole of the law.
 
     Examples
     --------

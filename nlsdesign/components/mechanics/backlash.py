@@ -14,7 +14,7 @@ from ...symbolic import Expression
 from ..core.contacts import Rounded, Sharp, WithCorners
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +89,7 @@ class Backlash(WithCorners, Shifting):
     φ = ⟨θ − g/2⟩ − ⟨−θ − g/2⟩. With a sharp contact, ⟨v⟩ = max(v, 0), for what acts between two inertias:
     inside the gap the two sides are free and contact is located in simulation; with a damper inside, the
     torque jumps on contact, and pulls for a moment before contact ends. With a rounded contact C∞, a dead
-    angle. With ``contact=Inertial(inertia=...)`` the driven side coasts through the gap. Source: e.g. Nordin
+    angle. With ``contact=Inertial(inertia=...)`` the driven side coasts through the gap. Source: Nordin
     and Gutman 2002.
 
     Examples

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple, Self
 
 import casadi as ca
 
+from ...errors import ArrangementError
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
-from ..core.parameters import one_of, parameter
-from ..core.part import Part
+from ..core.part import RESERVED, Part, check_names
+from ..core.part_numbers import one_of, parameter
+from .drive_chain import DrivePart
 
 
 class Motion(NamedTuple):
@@ -119,7 +122,26 @@ class GearedMotor(Free):
     """Electric motor behind a rigid gear, seen from the output: J·ω̇ = n·k_T·I + ΣT.
 
     The inertia is that of everything that turns, reflected to the output; the gear has no loss here, so
-    friction is an element of its own. Source: any text on electric drives.
+    friction is an element of its own. I is the current within its limit, as it comes out of the parts of the
+    drive, in written order. Source: Leonhard 2001.
+
+    Parameters
+    ----------
+    chain
+        Pairs of name and part of the drive between current and torque; none for an ideal drive.
+
+    Raises
+    ------
+    ArrangementError
+        If a part does not lie between current and torque, or a name is taken.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import DriveDelay, DriveSaturation
+    >>> chain = ("delay", DriveDelay(delay=4e-3)), ("saturation", DriveSaturation(saturation_current=6.0))
+    >>> motor = GearedMotor(inertia=0.01, gear_ratio=25.0, torque_constant=0.03, chain=chain)
+    >>> list(motor.children())
+    ['delay', 'saturation']
     """
 
     domain: ClassVar[Domain] = ROTATION
@@ -130,11 +152,34 @@ class GearedMotor(Free):
     gear_ratio: Quantity = parameter("1", "motor turns per output turn", minimum=1e-3, maximum=1e4)
     torque_constant: Quantity = parameter("N*m/A", "motor torque per current", minimum=1e-6, maximum=1e3)
     current_limit: Quantity = parameter("A", "largest current", minimum=1e-6, maximum=1e4, default=20.0)
+    chain: tuple[tuple[str, DrivePart], ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_names("GearedMotor", [n for n, _ in self.chain], taken=RESERVED | set(self.parameter_infos()))
+        for name, part in self.chain:
+            if not isinstance(part, DrivePart):
+                raise ArrangementError(
+                    f"part '{name}' of a motor",
+                    f"is a {type(part).__name__}, which does not lie between current and torque",
+                    next_step="put a DriveDelay or a DriveSaturation there",
+                )
+
+    def children(self) -> Mapping[str, Part]:
+        """Return the parts of the drive by name."""
+        return dict(self.chain)
+
+    def with_children(self, children: Mapping[str, Part]) -> Self:
+        """Return a copy with other parts of the drive."""
+        # The kind is checked where the copy is made.
+        return replace(self, chain=tuple(children.items()))  # type: ignore[arg-type]
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
-        """Return n·k_T·I with the current held within its limit."""
+        """Return n·k_T·I: the current within its limit, then through the parts of the drive."""
         limit = scope.parameter("current_limit")
         current = ca.fmin(ca.fmax(scope.input("current", "A", f"current of {scope.path}"), -limit), limit)
+        for name, part in self.chain:
+            current = part.act(scope.child(name), current)
         torque = scope.parameter("gear_ratio") * scope.parameter("torque_constant") * current
         scope.signal("drive_torque", torque, "N*m", f"torque of {scope.path} at the gear's output")
         return torque

@@ -21,7 +21,7 @@ class LinearDrive(Free):
 
     V is the voltage given to a current amplifier whose loop is far faster than the motion, so the force
     follows it; ``mass`` is that of everything that moves, rotor and screw reflected to the line.
-    Source: Janot, Gautier, Brunot 2019, the model of the EMPS benchmark.
+    Source: Janot et al. 2019, the model of the EMPS benchmark.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class ConstantForce(Elastic):
     """A force that never changes, F = F₀, positive against positive motion: a weight, an amplifier's offset.
 
     It stores F₀·e, so it is elastic. With dry friction it reads as friction that differs between the two
-    directions; the two cannot be told apart. Source: Janot, Gautier, Brunot 2019, the offset of the model.
+    directions; the two cannot be told apart. Source: Janot et al. 2019, the offset of the model.
 
     Examples
     --------

@@ -13,7 +13,7 @@ from ..core.contacts import WithFriction
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import one_of, parameter
+from ..core.part_numbers import one_of, parameter
 
 
 def stribeck(rate: Expression, speed: Expression) -> Expression:
@@ -34,14 +34,14 @@ class CoulombFriction(WithFriction, Viscous):
     """Dry friction T = T_c·sgn(ω) while ω ≠ 0, |T| ≤ T_c while ω = 0; or F and v along a line.
 
     At rest T is what keeps both sides together: valid between two bodies, one of which has inertia. With
-    ``contact=Smooth(creep_speed=...)`` it is T_c·tanh(ω/ω_s), C∞, and creeps at rest. Viscous friction goes
-    beside it as a :class:`Dashpot`. Source: Coulomb 1785; as a set-valued law Pfeiffer and Glocker 1996; the
-    smooth form e.g. in Armstrong-Hélouvry 1991.
+    ``contact=Regularised(creep_speed=...)`` it is T_c·tanh(ω/ω_s), C∞, and creeps at rest. Viscous friction
+    goes beside it as a :class:`Dashpot`. Sources: Coulomb 1785; Pfeiffer and Glocker 1996 (as a set-valued
+    law); Armstrong-Hélouvry 1991 (the smooth form).
 
     Examples
     --------
     >>> CoulombFriction(sliding_effort=0.05).smooth(0.01).title()
-    'CoulombFriction(sliding_effort = 0.05 N*m, creep_speed = 0.01 rad/s)'
+    'CoulombFriction(sliding_effort = 0.05 N·m, creep_speed = 0.01 rad/s)'
     """
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"dry friction"})
@@ -60,8 +60,8 @@ class StribeckFriction(CoulombFriction):
     """Dry friction that falls with speed: T = (T_c + ΔT·e^(−(ω/ω_St)²))·sgn(ω) while ω ≠ 0.
 
     |T| ≤ T_c + ΔT while ω = 0; ΔT is what the friction near standstill has beyond sliding. With
-    ``contact=Smooth(creep_speed=...)`` tanh(ω/ω_s) stands for the sign. Valid as :class:`CoulombFriction`.
-    Source: Stribeck 1902; this form in Armstrong-Hélouvry 1991.
+    ``contact=Regularised(creep_speed=...)`` tanh(ω/ω_s) stands for the sign. Valid as
+    :class:`CoulombFriction`. Sources: Stribeck 1902; Armstrong-Hélouvry 1991 (this form).
     """
 
     breakaway: Quantity = parameter(
@@ -86,9 +86,9 @@ class LoadFriction(WithFriction, Combination):
 
     T_in is the effort of the elements inside; the drive's efficiency is about 1 − µ forward and 1/(1 − µ)
     backward. While ω = 0 the friction is at most µ·|T_in|, so a loaded gear stays where it is, and none of
-    the elements inside may be sharp dry friction itself. With ``contact=Smooth(creep_speed=...)`` tanh(ω/ω_s)
-    stands for the sign: C∞ but for the corner of |T_in|. Source: Coulomb 1785 with the load as normal force;
-    the usual model of gear losses.
+    the elements inside may be sharp dry friction itself. With ``contact=Regularised(creep_speed=...)``
+    tanh(ω/ω_s) stands for the sign: C∞ but for the corner of |T_in|. Sources: Coulomb 1785 with the load as
+    normal force; Niemann and Winter 2003 (losses of gears).
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (ROTATION, TRANSLATION)

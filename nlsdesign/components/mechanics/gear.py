@@ -21,12 +21,19 @@ class Gear(Part):
 
     T₁ is what the first body gives, T₂ what the second gets. The two bodies are one state pair, that of the
     body which is written first; a rigid shaft is a gear of n = 1. A negative n turns the sense.
-    Source: any text on mechanisms.
+    Source: Uicker et al. 2017.
 
     Parameters
     ----------
     between
         Names of the two bodies, the motor's side first.
+
+    Raises
+    ------
+    ArrangementError
+        If there are not two ends.
+    ValueRangeError
+        If the ratio is zero.
 
     Examples
     --------
@@ -72,8 +79,8 @@ class LossyGear(Gear):
     The loss |T₁·ω₁|·|1 − s| is never negative: no power is created, whatever the sizes of the inertias.
     T₁ follows from the accelerations of both bodies, so it is solved from them, exactly, as a monotone
     piecewise linear equation. Continuous, with corners at zero load and at rest, elsewhere C∞; at rest the
-    gear does not stick. Source: Coulomb 1785 with the load as normal force; e.g. Niemann and Winter,
-    Maschinenelemente.
+    gear does not stick. Source: Coulomb 1785 with the load as normal force; Niemann and
+    Winter 2003.
 
     Examples
     --------

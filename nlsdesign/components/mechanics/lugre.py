@@ -12,7 +12,7 @@ from ...symbolic import Expression
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
-from ..core.parameters import one_of, parameter
+from ..core.part_numbers import one_of, parameter
 from .friction import stribeck
 
 
@@ -23,7 +23,7 @@ class LuGreFriction(Viscous):
     g = T_c + ΔT·e^(−(ω/ω_St)²) is the torque at steady speed. α is 0 below the break-away deflection z_b =
     r·|z_s| and while the bristles unload, 1 beyond |z_s|, with half a sine between: so below break-away the
     bristles are a spring that returns, and a body that sticks does not creep. Continuous, with corners.
-    Sources: Canudas de Wit, Olsson, Åström, Lischinsky 1995; Dupont, Hayward, Armstrong, Altpeter 2002.
+    Sources: Canudas de Wit et al. 1995; Dupont et al. 2002.
     """
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"dry friction", "viscous friction"})
@@ -60,16 +60,16 @@ class LuGreFriction(Viscous):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T."""
         stiffness, share = scope.parameter("stiffness"), scope.parameter("elastic_share")
-        bent = scope.state(
+        deflection = scope.state(
             "deflection", self.domain.motion_unit, f"deflection of the bristles of {scope.path}"
         )
         fall = stribeck(rate, scope.parameter("stribeck_speed"))
         most = (scope.parameter("sliding_effort") + scope.parameter("breakaway") * fall) / stiffness
         # From 0 at the break-away deflection to 1 at the largest.
-        place = ca.fmin(ca.fmax((ca.fabs(bent) / most - share) / (1 - share), 0), 1)
-        plastic = ca.if_else(bent * rate > 0, (1 - ca.cos(ca.pi * place)) / 2, 0)
-        bending = rate * (1 - plastic * ca.fabs(bent) / most)
-        scope.derive(bent, bending)
+        place = ca.fmin(ca.fmax((ca.fabs(deflection) / most - share) / (1 - share), 0), 1)
+        plastic = ca.if_else(deflection * rate > 0, (1 - ca.cos(ca.pi * place)) / 2, 0)
+        bending = rate * (1 - plastic * ca.fabs(deflection) / most)
+        scope.derive(deflection, bending)
         damping = scope.parameter("bristle_damping") * bending + scope.parameter("damping") * rate
-        scope.loss(stiffness * bent * (rate - bending) + damping * rate)
-        return stiffness * bent + damping
+        scope.loss(stiffness * deflection * (rate - bending) + damping * rate)
+        return stiffness * deflection + damping

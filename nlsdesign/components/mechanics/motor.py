@@ -19,7 +19,7 @@ class ElectricMotor(Free):
     """Base of the motors: T = k·I, and k·ω is the voltage that turning induces.
 
     In SI the torque constant in N·m/A is the voltage constant in V·s/rad, or power would be lost between the
-    two sides. Source: any text on electric drives.
+    two sides. Source: Leonhard 2001.
     """
 
     domain: ClassVar[Domain] = ROTATION

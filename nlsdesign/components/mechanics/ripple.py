@@ -11,7 +11,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import ROTATION, Domain
 from ..core.element import Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 from ..core.springs import Elastic
 
 
@@ -20,7 +20,7 @@ class TorqueRipple(Elastic):
     """Cogging and torque ripple, T = a·sin(nθ) + b·cos(nθ), locked to the angle.
 
     The order n is the number of periods per turn. It comes from the poles of the motor times
-    the gear ratio, or from the teeth of a gear. Source: e.g. Hanselman 2003.
+    the gear ratio, or from the teeth of a gear. Source: Hanselman 2003.
     """
 
     domain: ClassVar[Domain] = ROTATION

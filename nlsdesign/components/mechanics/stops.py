@@ -15,7 +15,7 @@ from ..core.contacts import WithCorners
 from ..core.dampers import Viscous
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Scope
-from ..core.parameters import one_of, parameter
+from ..core.part_numbers import one_of, parameter
 from ..core.springs import Elastic
 from ..core.switches import StictionConstraint
 

@@ -1,4 +1,4 @@
-"""Sensors that sample: encoder with a rate, tachometer, sample and hold.
+"""Sensors that sample: sample and hold, tachometer.
 
 Samples are taken at t₀ + k/f, from the first time of a run on, and held until the next.
 """
@@ -16,7 +16,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import Scope
 from ..core.part import parameter
-from .sensors import Array, Encoder, Numbers, Sensor
+from .sensors import Array, Numbers, Sensor
 
 _SLIP = 1e-6
 """Part of a sample by which times that were computed may miss it."""
@@ -31,43 +31,23 @@ def _instants(kind: str, times: Array, rate: float) -> Array:
             next_step=f"simulate at times at most {1.0 / rate:g} s apart",
         )
     count = math.floor((times[-1] - times[0]) * rate + _SLIP) + 1
-    found: Array = times[0] + np.arange(count) / rate
-    return found
+    instants: Array = times[0] + np.arange(count) / rate
+    return instants
 
 
 def _held(times: Array, rate: float, samples: Array) -> Array:
     since = np.floor((times - times[0]) * rate + _SLIP).astype(int)
-    found: Array = samples[np.clip(since, 0, len(samples) - 1)]
-    return found
-
-
-@dataclass(frozen=True, kw_only=True)
-class SampledEncoder(Encoder):
-    """Encoder that is read f times a second: reading = q·round(θ(t_k)/q) for t_k ≤ t < t_k + 1/f.
-
-    In the flat model it rounds only, piecewise constant; on average a held reading is half a sample late.
-
-    Examples
-    --------
-    >>> SampledEncoder(of="motor.angle", quantum=1e-3, sample_rate=1e3).title()
-    'SampledEncoder(quantum = 0.001 rad, sample_rate = 1000 Hz)'
-    """
-
-    sample_rate: Quantity = parameter("Hz", "readings per second", minimum=1e-3, maximum=1e9)
-
-    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
-        """Return the counts at the samples, held."""
-        rate = self.sample_rate.number
-        at = _instants(type(self).__name__, times, rate)
-        return _held(times, rate, super().recorded(at, np.interp(at, times, values), noise))
+    held: Array = samples[np.clip(since, 0, len(samples) - 1)]
+    return held
 
 
 @dataclass(frozen=True, kw_only=True)
 class SampleAndHold(Sensor):
     """Latches any signal f times a second: reading = value(t_k) for t_k ≤ t < t_k + 1/f.
 
-    What it latches is the last value that stands in the run, so a count stays a count. In the flat model the
-    value passes unchanged; on average a held reading is half a sample late.
+    What it latches is the last value that stands in the run, so a count stays a count. An encoder that is
+    read f times a second is an :class:`Encoder` with this before or behind it. In the flat model the value
+    passes unchanged; on average a held reading is half a sample late.
 
     Examples
     --------
@@ -96,7 +76,7 @@ class Tachometer(Sensor):
     In the flat model y = 2πf_c·(θ − θ_f) with θ̇_f = y: a differentiator with a first-order roll-off at f_c,
     as smooth as what it reads. In records the same filter acts on differences of samples,
     y_k = a·y_(k−1) + (1 − a)·(θ_k − θ_(k−1))·f_s with a = e^(−2πf_c/f_s), from rest. One count of an encoder
-    shows as a step of (1 − a)·q·f_s. Source: any text on digital filters; the filter is exact for held input.
+    shows as a step of (1 − a)·q·f_s. Source: Oppenheim and Schafer 2010 (exact for held input).
 
     Examples
     --------
@@ -105,6 +85,7 @@ class Tachometer(Sensor):
     """
 
     units: ClassVar[tuple[str, ...]] = ("rad", "m")
+    shows_value: ClassVar[bool] = False
 
     bandwidth: Quantity = parameter(
         "Hz", "frequency at which 71 % of the speed is seen", minimum=1e-3, maximum=1e6

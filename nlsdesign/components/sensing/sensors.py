@@ -51,6 +51,8 @@ class Sensor(Part):
 
     units: ClassVar[tuple[str, ...]] = ()
     """Units of the signals that it can read; any if there are none."""
+    shows_value: ClassVar[bool] = True
+    """Whether what is read can be inferred from the reading; not from a rate."""
 
     of: str
 
@@ -127,6 +129,11 @@ class Sensor(Part):
             Gives the sensor's own parameters.
         reading
             What the sensor gave, ``late_by`` later.
+
+        Raises
+        ------
+        ArrangementError
+            If the reading does not show the value, see ``shows_value``.
         """
         return reading
 
@@ -152,21 +159,22 @@ class Encoder(Sensor):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForceSensor(Sensor):
-    """Load cell: reading = gain·F + bias; ``noise`` is the standard deviation of a sample, white."""
+class _Transducer(Sensor):
+    """Law of a transducer: reading = gain·x + bias; ``noise`` is the standard deviation of a sample, white.
 
-    units: ClassVar[tuple[str, ...]] = ("N",)
+    Its kinds say in which unit they read.
+    """
 
     gain: Quantity = parameter("1", "gain", minimum=0.01, maximum=100.0, default=1.0)
-    bias: Quantity = parameter("N", "bias", minimum=-1e6, maximum=1e6, default=0.0)
-    noise: Quantity = parameter("N", "standard deviation of the noise", maximum=1e6, default=0.0)
+    bias: Quantity
+    noise: Quantity
 
     def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
-        """Return gain·F + bias."""
+        """Return gain·x + bias."""
         return scope.parameter("gain") * value + scope.parameter("bias")
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
-        """Return gain·F + bias + noise."""
+        """Return gain·x + bias + noise."""
         scatter = self.noise.number * noise.standard_normal(len(values))
         line: Array = self.gain.number * values + self.bias.number + scatter
         return line
@@ -177,7 +185,17 @@ class ForceSensor(Sensor):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TorqueSensor(Sensor):
+class ForceSensor(_Transducer):
+    """Load cell: reading = gain·F + bias; ``noise`` is the standard deviation of a sample, white."""
+
+    units: ClassVar[tuple[str, ...]] = ("N",)
+
+    bias: Quantity = parameter("N", "bias", minimum=-1e6, maximum=1e6, default=0.0)
+    noise: Quantity = parameter("N", "standard deviation of the noise", maximum=1e6, default=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueSensor(_Transducer):
     """Torque transducer: reading = gain·T + bias; ``noise`` is the standard deviation of a sample, white.
 
     Examples
@@ -188,23 +206,8 @@ class TorqueSensor(Sensor):
 
     units: ClassVar[tuple[str, ...]] = ("N*m",)
 
-    gain: Quantity = parameter("1", "gain", minimum=0.01, maximum=100.0, default=1.0)
     bias: Quantity = parameter("N*m", "bias", minimum=-1e6, maximum=1e6, default=0.0)
     noise: Quantity = parameter("N*m", "standard deviation of the noise", maximum=1e6, default=0.0)
-
-    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
-        """Return gain·T + bias."""
-        return scope.parameter("gain") * value + scope.parameter("bias")
-
-    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
-        """Return gain·T + bias + noise."""
-        scatter = self.noise.number * noise.standard_normal(len(values))
-        line: Array = self.gain.number * values + self.bias.number + scatter
-        return line
-
-    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
-        """Return (reading − bias)/gain."""
-        return (reading - numbers.parameter("bias")) / numbers.parameter("gain")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,7 +45,7 @@ class Cam(Part):
 class Pulley(Cam):
     """Round pulley: δ = r·θ, for both signs of the angle; a rack or a gear is the same law.
 
-    Source: rolling without slip.
+    Source: definition (rolling without slip).
     """
 
     radius: Quantity = parameter("m", "radius", minimum=1e-5, maximum=10.0)
@@ -68,7 +68,12 @@ class TwoSidedCam(Cam):
     cable changes sides. δ is even, h odd, and h ≡ dδ/dθ exactly. ``anchor_distance`` is the distance from
     the centre to the fixed end of the cable; it shapes the contour, not the law. Beyond the contour's end
     the lever arm stays what it was there, as on a round run-out; no stop is modelled.
-    Source: de Boor 1978 (B-splines); the cam is that of Austin et al. 2015, Fig. 2.
+    Source: de Boor 1978 (B-splines); Austin et al. 2015, Fig. 2 (this cam).
+
+    Raises
+    ------
+    ValueRangeError
+        If there are fewer than five control values.
     """
 
     lever_arm: Quantity = parameter(

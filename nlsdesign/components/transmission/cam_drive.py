@@ -11,8 +11,8 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Scope, observed_effort
-from ..core.parameters import parameter
 from ..core.part import RESERVED, Part, check_names
+from ..core.part_numbers import parameter
 from .cam import Cam
 
 
@@ -28,6 +28,11 @@ class Through(Element):
         Turns the angle into an extension.
     behind
         Name and element.
+
+    Raises
+    ------
+    ArrangementError
+        If the first is no cam, or what is behind it is no element of extension and force.
     """
 
     domain: ClassVar[Domain] = ROTATION
@@ -71,7 +76,13 @@ class Through(Element):
         return {"cam": self.cam, self.behind[0]: self.behind[1]}
 
     def with_children(self, children: Mapping[str, Part]) -> Self:
-        """Return a copy with another cam or element."""
+        """Return a copy with another cam or element.
+
+        Raises
+        ------
+        ArrangementError
+            If there is not one cam and one element behind it.
+        """
         rest = [(name, part) for name, part in children.items() if name != "cam"]
         cam = children["cam"]
         if len(rest) != 1 or not isinstance(rest[0][1], Element) or not isinstance(cam, Cam):

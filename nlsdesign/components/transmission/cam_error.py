@@ -22,6 +22,11 @@ class MisshapenCam(TwoSidedCam):
     E is a uniform cubic B-spline with few control values on [0, ``last_angle``], so the error is smooth, the
     same on both sides, and h ≡ dδ/dθ holds with it: lever arm and extension are wrong together. Beyond the
     contour's end E stays what it was there. Valid while H + E > 0. Source: virtual work, as for the cam.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are fewer than four control values.
     """
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"profile error"})

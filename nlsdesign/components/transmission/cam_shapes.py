@@ -81,7 +81,12 @@ class AnchoredCam(Cam):
     steps; the remainder is checked. As D → ∞ the cable stays parallel, φ = q and δ = P(q): then this is
     :class:`TwoSidedCam` with ``lever_arm`` = ``support``. The sides change over the angle w, C∞:
     q = √(θ² + w²) − w, h = p(φ)·θ/√(θ² + w²). δ is C³ along a side, h is C².
-    Source: support function of a convex curve, any text on convex geometry.
+    Source: Schneider 2014 (support function of a convex curve).
+
+    Raises
+    ------
+    ArrangementError
+        If the contour reaches the anchor of its cable.
 
     Examples
     --------

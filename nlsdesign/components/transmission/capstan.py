@@ -12,7 +12,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, smooth_sign
 from ..core.domain import TRANSLATION, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import Reading, parameter, read_as
+from ..core.part_numbers import Reading, parameter, read_as
 
 
 @dataclass(frozen=True)

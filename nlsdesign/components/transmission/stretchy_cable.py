@@ -12,7 +12,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, solve_monotone, symbol
 from ..core.domain import TRANSLATION, Domain
 from ..core.element import Combination, Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 
 _STEPS = 6
 

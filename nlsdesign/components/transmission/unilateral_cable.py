@@ -12,7 +12,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, positive_part, symbol
 from ..core.domain import TRANSLATION, Domain
 from ..core.element import Combination, Element, Scope
-from ..core.parameters import parameter
+from ..core.part_numbers import parameter
 from .stretchy_cable import newton_root
 
 
@@ -24,7 +24,7 @@ class PullOnly(Combination):
     a piece that goes on moving, the other frees the piece, so they differ where the piece remembers.
     While the cable is slack the element inside is still led by the extension, so its memory is that of a
     rod, not of a free piece: good for short slack times, see the known gaps.
-    Source: Signorini 1933 (unilateral contact); this rounding is the softplus of Dugas et al. 2001.
+    Source: Signorini 1933 (unilateral contact); Dugas et al. 2001 (softplus, this rounding).
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION,)
@@ -47,7 +47,12 @@ class InextensibleCable(Combination):
     The elements inside have y = max(e, y₀), where ΣF(y₀) = 0 at their present memory: taut at y = e, or slack
     at the length at which they rest. So a piece that recovers slowly is met again where it has recovered to.
     Memory that is driven by the rate stands still while the cable is slack. Continuous, with a corner.
-    Source: complementarity, e.g. Acary and Brogliato 2008.
+    Source: Acary and Brogliato 2008 (complementarity).
+
+    Raises
+    ------
+    ArrangementError
+        If the force of a member depends directly on the rate, so that its slack length is not defined.
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION,)

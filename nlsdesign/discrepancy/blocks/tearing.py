@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import casadi as ca
 
-from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.block import Block, Drive
-from ...model import FlatModel, Variable, flatten
+from ...model import FlatModel, Variable
 from ...model.flat import Symbols
+from ...model.readings import ReadingNames, reading_of
+from ...model.structure import MovingBody, body_moved_by, top_part
 from ...model.transform import cut, named, without_idle_states
 from ...symbolic import Expression, depends
 
@@ -20,34 +22,25 @@ READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
 
 
 @dataclass(frozen=True)
-class _Known:
-    """A variable of the model whose value follows from a measurement, and the sensors between, last first."""
+class _Measured:
+    """A measured signal: what it shows, and the body whose motion that is, if it is a motion."""
 
-    truth: str
-    signal: str
-    sensors: tuple[str, ...]
+    reading: ReadingNames
+    body: MovingBody | None
 
+    @property
+    def shown(self) -> str:
+        """Name of the state, input or effort that it shows."""
+        return self.reading.measured
 
-class _SensorNumbers:
-    """The parameters and states of one sensor as symbols of a flat model."""
-
-    def __init__(self, model: FlatModel, symbols: tuple[Expression, Expression], owner: str) -> None:
-        parameter, state = symbols
-        self._symbols = {v.name: parameter[i] for i, v in enumerate(model.parameters)}
-        self._symbols |= {v.name: state[i] for i, v in enumerate(model.states)}
-        self._owner = owner
-
-    def parameter(self, name: str) -> Expression:
-        """Return the symbol of one number."""
-        return self._symbols[f"{self._owner}.{name}"]
-
-    def memory(self, name: str) -> Expression:
-        """Return the symbol of one state."""
-        return self._symbols[f"{self._owner}.{name}"]
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Names of the variables that follow from it: an effort or input, or a motion and its rate."""
+        return (self.shown, self.body.rate) if self.body else (self.shown,)
 
 
-def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
-    """Cut the model of an assembly at measured signals.
+def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
+    """Cut a model at measured signals.
 
     Every measured force or torque gives a block that predicts it from the measured motion. Every measured
     motion of a body that moves freely gives a block that balances the efforts on it, with measured efforts in
@@ -55,8 +48,8 @@ def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
 
     Parameters
     ----------
-    assembly
-        What is measured.
+    model
+        Of what is measured.
     signals
         Full names of measured signals; readings of sensors stand for what these read.
 
@@ -65,194 +58,180 @@ def blocks_of(assembly: Assembly, signals: Sequence[str]) -> list[Block]:
     MeasurementError
         If nothing can be compared: no motion is measured, or no effort and no drive.
     """
-    model = flatten(assembly)
-    known = [_known(assembly, s) for s in signals]
+    measured = [_measured(model, signal) for signal in signals]
     states, inputs = {v.name for v in model.states}, {v.name for v in model.inputs}
-    moving = [k for k in known if k.truth in states and _speed_of(k.truth) in states]
-    efforts = [k for k in known if k.truth not in states | inputs]
-    driven = [k for k in known if k.truth in inputs]
-    opened = cut(model, [e.truth for e in efforts], keep=True) if efforts else model
-    found = [
-        _reading_block(assembly, opened, effort, moving + driven + efforts)
-        for effort in efforts
-        if moving + driven
-    ]
-    found += [_balance_block(assembly, opened, body, moving + driven + efforts) for body in moving]
-    if not found:
+    moving = [m for m in measured if m.body and not m.body.prescribed]
+    efforts = [m for m in measured if m.shown not in states | inputs]
+    driven = [m for m in measured if m.shown in inputs]
+    opened = cut(model, [e.shown for e in efforts], keep=True) if efforts else model
+    given = moving + driven + efforts
+    blocks = [_reading_block(opened, effort, given) for effort in efforts if moving + driven]
+    blocks += [_balance_block(opened, each.body, given) for each in moving if each.body]
+    if not blocks:
         raise MeasurementError(
             "records",
             "measure no motion that drives the model, or nothing to compare it with",
             next_step=f"measure for instance an angle and a force; measured are: {', '.join(signals)}",
         )
-    return found
+    return blocks
 
 
-def _known(assembly: Assembly, signal: str) -> _Known:
-    sensors, chain, truth = assembly.sensors(), [], signal
-    while truth.endswith(".reading") and (owner := truth.rpartition(".")[0]) in sensors:
-        chain.append(owner)
-        truth = sensors[owner].of
-    return _Known(truth, signal, tuple(chain))
+def _measured(model: FlatModel, signal: str) -> _Measured:
+    reading = reading_of(model.readings, signal)
+    return _Measured(reading, body_moved_by(model.bodies, reading.measured))
 
 
-def _speed_of(motion: str) -> str:
-    return f"{motion.rpartition('.')[0]}.speed"
+class _Result(NamedTuple):
+    """What a block gives out, and as what."""
+
+    part: str
+    variable: Variable
+    value: Expression
+    target: str | None
+    width: float
+    moving: str | None
 
 
-def _reading_block(assembly: Assembly, model: FlatModel, effort: _Known, given: Sequence[_Known]) -> Block:
-    name = effort.truth.partition(".")[0]
+def _reading_block(model: FlatModel, effort: _Measured, given: Sequence[_Measured]) -> Block:
+    """Return the block that predicts a measured effort."""
     # Where an effort acts back on a body inside, the measured one acts.
     s, inputs = model.symbols(), [v.name for v in model.inputs]
-    led = {n for k in given for n in (k.truth, _speed_of(k.truth))}
+    led = {name for each in given for name in each.given}
     own = ca.vertcat(*[s.derivative[i] for i, v in enumerate(model.states) if v.name not in led])
     cuts = {v.name for v in model.signals} & set(inputs)
-    used = [k for k in given if k.truth not in cuts or depends(own, s.input[inputs.index(k.truth)])]
-    return _driven(assembly, model, used, (name, effort.signal, effort.signal))
+    used = [m for m in given if m.shown not in cuts or depends(own, s.input[inputs.index(m.shown)])]
+    signal = effort.reading.signal
+    place = next(i for i, v in enumerate(model.signals) if v.name == signal)
+    tearing = _Tearing(model, s, used, signal)
+    predicted = _Result(
+        top_part(effort.shown), model.signals[place], s.signal[place], signal, READING_WIDTH, None
+    )
+    return tearing.block(predicted)
 
 
-def _balance_block(assembly: Assembly, model: FlatModel, body: _Known, given: Sequence[_Known]) -> Block:
-    name = body.truth.rpartition(".")[0]
-    return _driven(assembly, model, given, (name, f"{name}.unbalanced", None))
+def _balance_block(model: FlatModel, body: MovingBody, given: Sequence[_Measured]) -> Block:
+    """Return the block that balances the efforts on a body: inertia times acceleration less all of them."""
+    output = f"{body.name}.unbalanced"
+    s = model.symbols()
+    tearing = _Tearing(model, s, given, output)
+    motion = next(m for m in given if m.body == body)
+    inertia = named(model, s)[str(body.inertia)]
+    efforts = inertia * s.derivative[[v.name for v in model.states].index(body.rate)]
+    balance = inertia * tearing.inferred(motion, 2) - efforts
+    variable = Variable(output, body.domain.effort_unit, f"sum of all efforts on {body.name}")
+    moving = f"{motion.reading.signal}.rate"
+    return tearing.block(_Result(body.name, variable, balance, None, BALANCE_WIDTH, moving), body)
 
 
-class _Readings:
-    """What readings of sensors say of the variables of a model, as symbols that they drive."""
+class _Tearing:
+    """A model in which the measured variables are replaced by what their readings say of them."""
 
-    def __init__(
-        self, assembly: Assembly, model: FlatModel, symbols: tuple[Expression, Expression], output: str
-    ) -> None:
-        self._sensors, self._model, self._symbols = assembly.sensors(), model, symbols
-        self._output = output
-        self.drives: dict[str, Drive] = {}
-        self.new: dict[str, tuple[Variable, Expression]] = {}
+    def __init__(self, model: FlatModel, s: Symbols, given: Sequence[_Measured], output: str) -> None:
+        self._model, self._s, self._given, self._output = model, s, given, output
+        self._known = named(model, s)
+        self._drives: dict[str, Drive] = {}
+        self._inputs: dict[str, tuple[Variable, Expression]] = {}
+        self._replaced = dict(self._replacements())
 
-    def reading(self, known: _Known, order: int) -> Expression:
+    def _reading(self, measured: _Measured, order: int) -> Expression:
         """Return the symbol of a reading or of one of its derivatives."""
+        signal = measured.reading.signal
         # The same reading may be predicted and drive a body inside.
-        label = known.signal + ("", ".rate", ".acceleration")[order]
+        label = signal + ("", ".rate", ".acceleration")[order]
         label += ".measured" if label == self._output else ""
-        if label not in self.new:
-            self.drives[label] = Drive(known.signal, order, self._late_by(known))
-            self.new[label] = Variable(label, "", f"measured {known.signal}"), ca.SX.sym(label)
-        return self.new[label][1]
+        if label not in self._inputs:
+            self._drives[label] = Drive(signal, order, measured.reading.delays)
+            self._inputs[label] = Variable(label, "", f"measured {signal}"), ca.SX.sym(label)
+        return self._inputs[label][1]
 
-    def _late_by(self, known: _Known) -> str | None:
-        late = [f"{s}.{self._sensors[s].late_by}" for s in known.sensors if self._sensors[s].late_by]
-        if len(late) > 1:
-            raise MeasurementError(
-                f"signal '{known.signal}'",
-                f"is late by {' and '.join(late)}, which cannot be told apart",
-                next_step="put both delays into one sensor",
-            )
-        return late[0] if late else None
-
-    def inferred(self, known: _Known, order: int) -> Expression:
-        """Return what the sensor must have seen, or its derivative."""
-        value = self.reading(known, 0)
-        for sensor in known.sensors:
-            numbers = _SensorNumbers(self._model, self._symbols, sensor)
-            value = self._sensors[sensor].infer(numbers, value)
+    def inferred(self, measured: _Measured, order: int) -> Expression:
+        """Return what the sensors must have seen, or its derivative."""
+        value = measured.reading.inferred(self._reading(measured, 0), self._known)
         if order == 0:
             return value
         # A reading is a static function of what it reads, so rates follow by its slope.
-        return ca.jacobian(value, self.reading(known, 0)) * self.reading(known, order)
+        return ca.jacobian(value, self._reading(measured, 0)) * self._reading(measured, order)
 
+    def _replacements(self) -> Iterator[tuple[str, Expression]]:
+        """Yield the variables of the model that follow from readings, with what they follow as."""
+        model, measured = self._model, {m.shown for m in self._given}
+        variables = {v.name for v in model.states + model.inputs}
+        for each in self._given:
+            yield each.shown, self.inferred(each, 0)
+            if each.body and each.body.rate in variables - measured:
+                yield each.body.rate, self.inferred(each, 1)
 
-def _driven(
-    assembly: Assembly, model: FlatModel, given: Sequence[_Known], what: tuple[str, str, str | None]
-) -> Block:
-    """Return the block whose prescribed variables follow from readings."""
-    name, output, target = what
-    s = model.symbols()
-    states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
-    readings = _Readings(assembly, model, (s.parameter, s.state), output)
-    inferred = readings.inferred
-    old, instead, prescribed = [], [], list[str]()
-    for known in given:
-        if known.truth in states:
-            pair = [known.truth, _speed_of(known.truth)]
-            old += [s.state[states.index(n)] for n in pair]
-            instead += [inferred(known, 0), inferred(known, 1)]
-            prescribed += pair
-        elif known.truth in inputs:
-            old.append(s.input[inputs.index(known.truth)])
-            instead.append(inferred(known, 0))
-            rate = _speed_of(known.truth)
-            if rate in inputs and rate not in [k.truth for k in given]:
-                old.append(s.input[inputs.index(rate)])
-                instead.append(inferred(known, 1))
-    if target is None:
-        body = next(k for k in given if k.truth.rpartition(".")[0] == name and k.truth in states)
-        result, variable = (
-            _unbalanced(model, s, name),
-            Variable(output, _effort_unit(model, name), f"sum of all efforts on {name}"),
+    def block(self, result: _Result, body: MovingBody | None = None) -> Block:
+        """Return the block of a result.
+
+        Parameters
+        ----------
+        result
+            In the symbols of the model.
+        body
+            Whose balance it is.
+        """
+        model, s = self._model, self._s
+        kept = [i for i, v in enumerate(model.states) if v.name not in self._replaced]
+        resting = [i for i, v in enumerate(model.inputs) if v.name not in self._replaced]
+        # Signals with a stated range stay, so that a prediction can say where it is left.
+        bounded = [i for i, v in enumerate(model.signals) if v.bounded]
+        derivative, value, signal = self._in_readings(
+            [_column(s.derivative, kept), result.value, _column(s.signal, bounded)]
         )
-        result = _inertia(model, s, name) * inferred(body, 2) - result
-        drive = next((k for k in given if k.truth in inputs and k.truth.startswith(f"{name}.")), None)
-    else:
-        place = next(i for i, v in enumerate(model.signals) if v.name == target)
-        result, variable = s.signal[place], model.signals[place]
-    kept = [i for i, n in enumerate(states) if n not in prescribed]
-    derivative = ca.SX(ca.vertcat(ca.SX(0, 1), *[s.derivative[i] for i in kept]))
-    # Signals with a stated range stay, so that a prediction can say where it is left.
-    bounded = [i for i, v in enumerate(model.signals) if v.bounded]
-    ranged = ca.SX(ca.vertcat(ca.SX(0, 1), *[s.signal[i] for i in bounded]))
-    rows = ca.substitute([derivative, result, ranged], [ca.vertcat(*old)], [ca.vertcat(*instead)])
-    resting = [i for i, n in enumerate(inputs) if not any(n in (k.truth, _speed_of(k.truth)) for k in given)]
-    columns = [
-        s.time,
-        ca.vertcat(*[s.state[i] for i in kept]),
-        ca.vertcat(*[e for _, e in readings.new.values()], *[s.input[i] for i in resting]),
-        s.parameter,
-        s.table,
-    ]
-    if target is None and drive is not None:
-        rows[1] = _in_drive_units(rows[1], readings.reading(drive, 0), s.parameter, model)
-    equations = ca.Function(
-        "equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], rows[2], ca.SX(0, 1)]
-    )
-    pruned = replace(
-        model,
-        equations=equations,
-        states=tuple(model.states[i] for i in kept),
-        signals=tuple(model.signals[i] for i in bounded),
-        outputs=(variable,),
-        inputs=(*[v for v, _ in readings.new.values()], *[model.inputs[i] for i in resting]),
-    )
-    return Block(
-        name,
-        without_idle_states(pruned, [output]),
-        readings.drives,
-        output,
-        target,
-        READING_WIDTH if target else BALANCE_WIDTH,
-        None if target else f"{body.signal}.rate",
-    )
+        value = self._in_drive_units(value, body)
+        driven = ca.vertcat(*[symbol for _, symbol in self._inputs.values()])
+        columns = [
+            s.time,
+            _column(s.state, kept),
+            ca.vertcat(driven, _column(s.input, resting)),
+            s.parameter,
+            s.table,
+        ]
+        rows = [ca.densify(derivative), value, signal, ca.SX(0, 1)]
+        torn = replace(
+            model,
+            equations=ca.Function("equations", [ca.SX(c) for c in columns], rows),
+            states=tuple(model.states[i] for i in kept),
+            signals=tuple(model.signals[i] for i in bounded),
+            outputs=(result.variable,),
+            inputs=(*[v for v, _ in self._inputs.values()], *[model.inputs[i] for i in resting]),
+        )
+        return Block(
+            name=result.part,
+            model=without_idle_states(torn, [result.variable.name]),
+            drives=self._drives,
+            output=result.variable.name,
+            target=result.target,
+            width=result.width,
+            moving=result.moving,
+        )
+
+    def _in_readings(self, rows: list[Expression]) -> list[Expression]:
+        """Return expressions with the readings in place of the variables that they show."""
+        model, s = self._model, self._s
+        names = [v.name for v in (*model.states, *model.inputs)]
+        # An effort that was cut is an input and goes on as a signal: the input is what is replaced.
+        symbols = dict(zip(names, ca.vertsplit(ca.vertcat(s.state, s.input)), strict=True))
+        shown = ca.vertcat(*[symbols[name] for name in self._replaced])
+        replaced: list[Expression] = ca.substitute(rows, [shown], [ca.vertcat(*self._replaced.values())])
+        return replaced
+
+    def _in_drive_units(self, balance: Expression, body: MovingBody | None) -> Expression:
+        """Return a balance as the error of the measured drive, times the declared effort per drive.
+
+        A balance can be made small by making all its factors small; an error of a measured signal cannot.
+        """
+        inputs = {v.name for v in self._model.inputs}
+        drives = (m for m in self._given if m.shown in inputs and body and top_part(m.shown) == body.name)
+        drive = next(drives, None)
+        if drive is None:
+            return balance
+        reading, parameter = self._reading(drive, 0), self._s.parameter
+        slope = ca.substitute(ca.jacobian(balance, reading), reading, ca.SX(0))
+        declared = ca.substitute(slope, parameter, ca.DM(self._model.start(self._model.parameters)))
+        return balance * (declared / slope)
 
 
-def _inertia(model: FlatModel, s: Symbols, body: str) -> Expression:
-    """Return what moves with a body: of a train of gears, the inertia seen from its leading body."""
-    known = named(model, s)
-    names = (f"{body}.{n}" for n in ("train_inertia", "inertia", "mass"))
-    return next(known[name] for name in names if name in known)
-
-
-def _effort_unit(model: FlatModel, body: str) -> str:
-    return "N*m" if f"{body}.inertia" in model.values else "N"
-
-
-def _unbalanced(model: FlatModel, s: Symbols, body: str) -> Expression:
-    place = [v.name for v in model.states].index(f"{body}.speed")
-    return _inertia(model, s, body) * s.derivative[place]
-
-
-def _in_drive_units(
-    balance: Expression, drive: Expression, parameter: Expression, model: FlatModel
-) -> Expression:
-    """Return the balance as the error of the measured drive, times the declared torque (or force) per drive.
-
-    A balance can be made small by making all its factors small; an error of a measured signal cannot.
-    """
-    slope = ca.substitute(ca.jacobian(balance, drive), drive, ca.SX(0))
-    declared = ca.substitute(slope, parameter, ca.DM(model.start(model.parameters)))
-    return balance * (declared / slope)
+def _column(rows: Expression, places: Sequence[int]) -> Expression:
+    return ca.SX(ca.vertcat(ca.SX(0, 1), *[rows[i] for i in places]))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...components import Assembly, DelayedMotor, GearedMotor, SaturatingMotor
+from ...components import Assembly, DriveDelay, DrivePart, DriveSaturation, GearedMotor
 from ...quantity import Quantity
-from .candidate import SOURCE, Candidate, Unknown, numbers_of
+from .candidate import SOURCE, Candidate, Unknown
 from .effect import ranked
 
 
-def _ideal_motors(assembly: Assembly) -> list[tuple[str, GearedMotor]]:
-    """Return the motors without a fault of their own."""
-    return [(n, p) for n, p in assembly.parts if isinstance(p, GearedMotor) and type(p) is GearedMotor]
+def _motors_without(assembly: Assembly, kind: type[DrivePart]) -> list[str]:
+    """Return the motors whose drive has no part of a kind yet."""
+    motors = {name: part for name, part in assembly.parts if isinstance(part, GearedMotor)}
+    return [n for n, motor in motors.items() if not any(isinstance(p, kind) for _, p in motor.chain)]
 
 
 @ranked(160)
@@ -22,19 +23,20 @@ def drive_delay(assembly: Assembly) -> Sequence[Candidate]:
     Parameters
     ----------
     assembly
-        As declared; motors with a fault of their own are left out.
+        As declared; motors with a delay are left out.
     """
+    delay = DriveDelay(delay=Quantity(1e-3, "s", SOURCE))
     return [
         Candidate(
             "drive_delay",
             name,
-            assembly.with_part(name, DelayedMotor(**numbers_of(motor), delay=Quantity(1e-3, "s", SOURCE))),
-            (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
+            assembly.with_part(f"{name}.delay", delay),
+            (Unknown(f"{name}.delay.delay", (0.003,), 1e-4, 0.2),),
             "torque that follows the current late, the more the faster the current changes",
             "Golub and Van Loan 2013 (Padé table)",
             explains_lag=True,
         )
-        for name, motor in _ideal_motors(assembly)
+        for name in _motors_without(assembly, DriveDelay)
     ]
 
 
@@ -45,19 +47,17 @@ def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
     Parameters
     ----------
     assembly
-        As declared; motors with a fault of their own are left out.
+        As declared; motors with a saturation are left out.
     """
+    saturation = DriveSaturation(saturation_current=Quantity(100.0, "A", SOURCE))
     return [
         Candidate(
             "torque_constant_saturation",
             name,
-            assembly.with_part(
-                name,
-                SaturatingMotor(**numbers_of(motor), saturation_current=Quantity(100.0, "A", SOURCE)),
-            ),
-            (Unknown(f"{name}.saturation_current", (1.5,), 0.2, 50.0, f"{name}.current"),),
+            assembly.with_part(f"{name}.saturation", saturation),
+            (Unknown(f"{name}.saturation.saturation_current", (1.5,), 0.2, 50.0, f"{name}.current"),),
             "torque that falls short the more, the larger the current, with either sign",
-            "Hanselman 2003 (saturation; Froelich's curve of magnetisation)",
+            "Hanselman 2003 (saturation, Froelich's curve of magnetisation)",
         )
-        for name, motor in _ideal_motors(assembly)
+        for name in _motors_without(assembly, DriveSaturation)
     ]

@@ -1,22 +1,44 @@
-"""Effects of the sensors: delay, bias and gain of the load cell, bias of the ammeter."""
+"""Effects of sensors: delay, drift, bias and gain of load cells, bias of ammeters, eccentric discs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ...components import (
     Assembly,
     CurrentSensor,
-    DelayedForceSensor,
-    DriftingForceSensor,
-    EccentricEncoder,
+    Drift,
+    Eccentricity,
     Encoder,
     ForceSensor,
     GearedMotor,
+    Part,
+    Sensor,
+    TransportDelay,
 )
 from ...quantity import Quantity
-from .candidate import SOURCE, Candidate, Unknown, numbers_of
+from .candidate import SOURCE, Candidate, Unknown, free_name
 from .effect import ranked
+
+
+def _inserted(assembly: Assembly, sensor: str, name: str, fault: Sensor) -> Assembly:
+    """Return the assembly with a fault between a sensor and what it reads; its reading keeps its name."""
+    parts: list[tuple[str, Part]] = []
+    for each, part in assembly.parts:
+        if each == sensor and isinstance(part, Sensor):
+            parts += [(name, fault), (each, replace(part, of=f"{name}.reading"))]
+        else:
+            parts.append((each, part))
+    return replace(assembly, parts=tuple(parts))
+
+
+def _sensors_without(assembly: Assembly, kind: type[Sensor], fault: type[Sensor]) -> dict[str, Sensor]:
+    """Return the sensors of a kind in whose chain, before or behind, the fault does not stand yet."""
+    sensors = assembly.sensors()
+    chains = [assembly.measured(f"{name}.reading")[1] for name in sensors]
+    faulty = {n for chain in chains if any(isinstance(sensors[s], fault) for s in chain) for n in chain}
+    return {name: each for name, each in sensors.items() if isinstance(each, kind) and name not in faulty}
 
 
 @ranked(130)
@@ -26,31 +48,24 @@ def force_sensor_delay(assembly: Assembly) -> Sequence[Candidate]:
     Parameters
     ----------
     assembly
-        As declared.
+        As declared; load cells behind or before a delay are left out.
     """
-    found = []
-    for name, sensor in assembly.sensors().items():
-        if type(sensor) is not ForceSensor:  # another kind has numbers that would be lost
-            continue
-        late = DelayedForceSensor(
-            of=sensor.of,
-            gain=sensor.gain,
-            bias=sensor.bias,
-            noise=sensor.noise,
-            delay=Quantity(1e-3, "s", SOURCE),
-        )
-        found.append(
+    candidates = []
+    for name, sensor in _sensors_without(assembly, ForceSensor, TransportDelay).items():
+        inserted = free_name(assembly, f"{name}_delay")
+        delay = TransportDelay(of=sensor.of, delay=Quantity(1e-3, "s", SOURCE))
+        candidates.append(
             Candidate(
                 "force_sensor_delay",
                 name,
-                assembly.with_part(name, late),
-                (Unknown(f"{name}.delay", (0.003,), 1e-4, 0.2),),
+                _inserted(assembly, name, inserted, delay),
+                (Unknown(f"{inserted}.delay", (0.003,), 1e-4, 0.2),),
                 "force that follows the motion late, the more the faster; as much in the torque balance",
                 "Golub and Van Loan 2013 (Padé table)",
                 explains_lag=True,
             )
         )
-    return found
+    return candidates
 
 
 @ranked(140)
@@ -129,41 +144,38 @@ def angle_sensor_eccentricity(assembly: Assembly) -> Sequence[Candidate]:
     Parameters
     ----------
     assembly
-        As declared.
+        As declared; encoders behind or before an eccentric disc are left out.
     """
-    found = []
-    for name, sensor in assembly.sensors().items():
-        if not isinstance(sensor, Encoder) or isinstance(sensor, EccentricEncoder):
-            continue
-        for order in _disc_orders(assembly, sensor.of):
-            faulty = EccentricEncoder(
-                **numbers_of(sensor),
-                sine=Quantity(0.0, "rad", SOURCE),
-                cosine=Quantity(0.0, "rad", SOURCE),
-                order=order,
+    candidates = []
+    for name, sensor in _sensors_without(assembly, Encoder, Eccentricity).items():
+        inserted = free_name(assembly, f"{name}_eccentricity")
+        for order in _disc_orders(assembly, assembly.measured(sensor.of)[0]):
+            zero, largest = Quantity(0.0, "rad", SOURCE), 0.2 / max(order.number, 1.0)
+            disc = Eccentricity(of=sensor.of, sine=zero, cosine=zero, order=order)
+            unknowns = (
+                Unknown(f"{inserted}.{part}", (0.0,), -largest, largest) for part in ("sine", "cosine")
             )
-            largest = 0.2 / max(order.number, 1.0)
-            unknowns = (Unknown(f"{name}.{part}", (0.0,), -largest, largest) for part in ("sine", "cosine"))
-            found.append(
+            candidates.append(
                 Candidate(
                     "angle_sensor_eccentricity",
                     name,
-                    assembly.with_part(name, faulty),
+                    _inserted(assembly, name, inserted, disc),
                     tuple(unknowns),
                     "force, torque and inertia that are off together, as a sine of the angle",
                     "geometry; data sheets",
                 )
             )
-    return found
+    return candidates
 
 
-def _disc_orders(assembly: Assembly, read: str) -> list[Quantity]:
-    """Return how often the disc may turn per turn of what is read."""
-    once = Quantity(1.0, "1", "once per turn of what is read")
-    body = dict(assembly.parts).get(read.partition(".")[0])
-    if isinstance(body, GearedMotor) and body.gear_ratio.number != 1.0:
-        return [once, Quantity(body.gear_ratio.number, "1", "disc on the shaft of the motor")]
-    return [once]
+def _disc_orders(assembly: Assembly, measured: str) -> list[Quantity]:
+    """Return how often the disc may turn per turn of what is measured."""
+    orders = [Quantity(1.0, "1", "once per turn of what is read")]
+    for name, part in assembly.parts:
+        if isinstance(part, GearedMotor) and measured == f"{name}.{part.motion_names[0]}":
+            ratio = part.gear_ratio.number
+            orders += [Quantity(ratio, "1", "disc on the shaft of the motor")] if ratio != 1.0 else []
+    return orders
 
 
 @ranked(250)
@@ -173,19 +185,20 @@ def force_sensor_drift(assembly: Assembly) -> Sequence[Candidate]:
     Parameters
     ----------
     assembly
-        As declared; load cells with a fault of their own are left out.
+        As declared; load cells behind or before a drift are left out.
     """
-    return [
-        Candidate(
-            "force_sensor_drift",
-            name,
-            assembly.with_part(
-                name, DriftingForceSensor(**numbers_of(sensor), drift=Quantity(0.0, "N/s", SOURCE))
-            ),
-            (Unknown(f"{name}.drift", (0.0,), -0.05, 0.05, f"{name}.reading"),),
-            "force that is off by more and more over time, also at rest",
-            "data sheets of load cells",
+    candidates = []
+    for name, sensor in _sensors_without(assembly, ForceSensor, Drift).items():
+        inserted = free_name(assembly, f"{name}_drift")
+        drift = Drift(of=sensor.of, drift=Quantity(0.0, "N/s", SOURCE))
+        candidates.append(
+            Candidate(
+                "force_sensor_drift",
+                name,
+                _inserted(assembly, name, inserted, drift),
+                (Unknown(f"{inserted}.drift", (0.0,), -0.05, 0.05, f"{name}.reading"),),
+                "force that is off by more and more over time, also at rest",
+                "data sheets of load cells",
+            )
         )
-        for name, sensor in assembly.sensors().items()
-        if type(sensor) is ForceSensor
-    ]
+    return candidates

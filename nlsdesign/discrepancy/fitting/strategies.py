@@ -18,6 +18,7 @@ from ...errors import ConvergenceError
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.estimation.least_squares import Fit, fit, predicted_cost
 from ...identification.estimation.parameters import Parameter
+from ...model import flatten
 from ..blocks.tearing import blocks_of
 from .unpredictable import Key, Tally, quickest, unpredictable
 
@@ -198,7 +199,8 @@ class Continuation(Strategy):
     def beginnings(self, problem: Problem, slow: Sequence[Evidence]) -> list[Start]:
         """Return the starts that the simpler form leaves; nothing where it has no response."""
         bench, first = problem.bench, problem.starts[0]
-        blocks = [b for b in blocks_of(self.through, bench.records.signals) if b.name in problem.blocks]
+        every = blocks_of(flatten(self.through), bench.records.signals)
+        blocks = [b for b in every if b.name in problem.blocks]
         values = {p.name: p.start for p in first}
         driven = [bench.driven(b, [n for n in values if n in b.model.values], values) for b in blocks]
         shared = {name for block in driven for name in block.free}

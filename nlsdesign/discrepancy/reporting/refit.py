@@ -19,6 +19,7 @@ from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
+from ...model import flatten
 from ..blocks.tearing import blocks_of
 from ..screening.other_rig import out_of_reach
 from ..screening.scale_check import scale_findings, typical_sizes
@@ -186,7 +187,7 @@ def refit(
         If the numbers cannot be fitted.
     """
     progress("refitting the declared numbers")
-    bench = Bench(records, blocks_of(actuator, records.signals))
+    bench = Bench(records, blocks_of(flatten(actuator), records.signals))
     records = bench.records
     comparison = Comparison(bench, typical_sizes(actuator, records))
     fitted = comparison.base(actuator)

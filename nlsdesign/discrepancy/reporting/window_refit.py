@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
@@ -13,9 +14,11 @@ from ...identification.output_error.multiple_shooting import coloured_sigma, fit
 from ...identification.output_error.prediction import predict_in_windows
 from ...identification.output_error.simulation_error import Shots, Weights
 from ...identification.output_error.wiring import Wiring
-from ...identification.records.measurement import RecordSet
+from ...identification.records.measurement import Record, RecordSet
 from ...identification.statistics.metrics import rmse
 from ...model import FlatModel, flatten
+from ...model.readings import reading_of
+from ..blocks.shown_values import shown_values
 from .verdict import RecordGap
 
 _PHASES = 4
@@ -45,8 +48,8 @@ def fitted_over_windows(
     """
     model = flatten(actuator)
     free = [declared_parameter(model.variable(name), start) for name, start in starts.items()]
-    wiring, shots = wiring_of(actuator, model, records.signals), Shots(length, False, phases=_PHASES)
-    fitted = records.of("fit")
+    wiring, shots = wiring_of(model, records.signals), Shots(length, False, phases=_PHASES)
+    fitted = [_without_sensors(model, record, wiring) for record in records.of("fit")]
     white = fit_by_simulation(model, fitted, free, shots=shots, wiring=wiring)
     # What a model leaves over is coloured; weighed as white it would drown the prior.
     weights = Weights(coloured_sigma(white))
@@ -71,10 +74,11 @@ def window_gaps(
         Of a window in s.
     """
     models = [flatten(actuator), flatten(actuator.with_values(values))]
-    wiring = wiring_of(actuator, models[0], records.signals)
+    wiring = wiring_of(models[0], records.signals)
     gaps = []
     for record in records.records:
-        runs = [predict_in_windows(m, record, length, wiring=wiring) for m in models]
+        shown = _without_sensors(models[0], record, wiring)
+        runs = [predict_in_windows(m, shown, length, wiring=wiring) for m in models]
         for signal in wiring.outputs:
             before, after = (rmse(run.error[signal]) for run in runs)
             floor, unit = record.resolution_of(signal).noise, record.trace.units[signal]
@@ -84,35 +88,47 @@ def window_gaps(
     return tuple(gaps)
 
 
-def wiring_of(actuator: Assembly, model: FlatModel, signals: Sequence[str]) -> Wiring:
-    """Wire readings to the inputs and states that their sensors read.
+def wiring_of(model: FlatModel, signals: Sequence[str]) -> Wiring:
+    """Wire readings to the inputs and states that they show; other readings to themselves.
 
     Parameters
     ----------
-    actuator, model
-        The same.
+    model
+        Of what is measured.
     signals
         Full names of measured signals.
 
     Raises
     ------
     MeasurementError
-        If nothing measured is left to compare.
+        If no window can begin at a measured state.
     """
-    sensors = actuator.sensors()
     inputs: dict[str, Drive] = {}
     outputs: dict[str, str] = {}
     names, states = {v.name for v in model.inputs}, {v.name for v in model.states}
     for signal in signals:
-        owner = signal.rpartition(".")[0]
-        truth = sensors[owner].of if owner in sensors else signal
-        if truth in names:
-            inputs[truth] = Drive(signal)
+        reading = reading_of(model.readings, signal)
+        if reading.measured in names and reading.shows_value:
+            inputs[reading.measured] = Drive(signal)
         else:
-            outputs[signal] = truth if truth in states else signal
-    if not any(truth in states for truth in outputs.values()):
+            direct = reading.measured in states and reading.shows_value
+            outputs[signal] = reading.measured if direct else signal
+    if not any(output in states for output in outputs.values()):
         raise MeasurementError(
             "fit over windows", "no state of the model is measured, so no window can begin",
             next_step="leave --window out, or measure an angle or a position",
         )  # fmt: skip
     return Wiring(inputs, outputs)
+
+
+def _without_sensors(model: FlatModel, record: Record, wiring: Wiring) -> Record:
+    """Return a record in which readings that stand for a state or an input are what their sensors have seen.
+
+    With the numbers that the model has; readings that are compared with readings stay.
+    """
+    replaced = {drive.signal for drive in wiring.inputs.values()}
+    replaced |= {signal for signal, output in wiring.outputs.items() if output != signal}
+    signals = {
+        n: shown_values(model, record, n) if n in replaced else v for n, v in record.trace.signals.items()
+    }
+    return replace(record, trace=replace(record.trace, signals=signals))

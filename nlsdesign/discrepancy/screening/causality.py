@@ -15,11 +15,13 @@ from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.loop_work import Loop, loop_of
 from ...model import FlatModel, flatten
+from ...model.readings import reading_of
+from ...model.structure import motions_of_efforts
 from ...symbolic import depends
+from ..blocks.shown_values import shown_values
 
 Array = NDArray[np.float64]
 
-_MOTIONS = {"force": "extension", "torque": "angle"}
 _QUICK_OVER_SLOW = 3.0
 """Ratio of paces of records from which a constant delay can be told from another cause."""
 
@@ -50,21 +52,21 @@ def lagging_forces(assembly: Assembly, records: RecordSet) -> LaggingForces:
     records
         Of all roles.
     """
-    model = flatten(assembly)
+    model, motions = flatten(assembly), motions_of_efforts(assembly)
     findings: list[Finding] = []
     pace: list[float] = []
     for signal in records.signals:
-        piece, _, effort = _truth(assembly, signal).rpartition(".")
-        motion = f"{piece}.{_MOTIONS.get(effort, '')}"
-        extension = _extension(assembly, model, motion, records.signals)
-        if extension is None:
+        reading = reading_of(model.readings, signal)
+        motion = motions.get(reading.measured) if reading.shows_value else None
+        extension = _extension(model, motion, records.signals) if motion else None
+        if motion is None or extension is None:
             continue
         noise = float(np.median([r.resolution_of(signal).noise for r in records.records]))
         paths = [(r, extension(r)) for r in records.records]
         loops = [
             (r, loop)
             for r, path in paths
-            if (loop := loop_of(path, r.trace[signal], r.step, noise=noise)) is not None
+            if (loop := loop_of(path, shown_values(model, r, signal), r.step, noise=noise)) is not None
         ]
         if any(loop.gives for _, loop in loops) and not any(loop.takes for _, loop in loops):
             head = records.column(signal).name
@@ -88,16 +90,7 @@ def _finding(record: Record, head: str, motion: str, loop: Loop) -> Finding:
     )
 
 
-def _truth(assembly: Assembly, signal: str) -> str:
-    sensors = assembly.sensors()
-    while signal.endswith(".reading") and (owner := signal.rpartition(".")[0]) in sensors:
-        signal = sensors[owner].of
-    return signal
-
-
-def _extension(
-    assembly: Assembly, model: FlatModel, motion: str, signals: Sequence[str]
-) -> Callable[[Record], Array] | None:
+def _extension(model: FlatModel, motion: str, signals: Sequence[str]) -> Callable[[Record], Array] | None:
     """Return a motion as a function of a record, if it follows from what is measured."""
     names = [v.name for v in model.signals]
     if motion not in names:
@@ -105,17 +98,17 @@ def _extension(
     s = model.symbols()
     row = ca.SX(s.signal[names.index(motion)])
     row = ca.substitute(row, s.parameter, ca.DM(model.start(model.parameters)))
-    given = [(_truth(assembly, signal), signal) for signal in signals]
     movable = {v.name: s.state[i] for i, v in enumerate(model.states)}
     movable |= {v.name: s.input[i] for i, v in enumerate(model.inputs)}
-    known = [(movable[truth], signal) for truth, signal in given if truth in movable]
-    hidden = [symbol for name, symbol in movable.items() if name not in {truth for truth, _ in given}]
+    readings = [r for r in (reading_of(model.readings, signal) for signal in signals) if r.shows_value]
+    known = [(movable[r.measured], r.signal) for r in readings if r.measured in movable]
+    hidden = [symbol for name, symbol in movable.items() if name not in {r.measured for r in readings}]
     if not known or (hidden and depends(row, ca.vertcat(*hidden))):
         return None
     function = ca.Function("extension", [ca.vertcat(*[symbol for symbol, _ in known])], [row])
 
     def at(record: Record) -> Array:
-        rows = np.array([record.trace[signal] for _, signal in known])
+        rows = np.array([shown_values(model, record, signal) for _, signal in known])
         values: Array = function.map(rows.shape[1])(rows).full().ravel()
         return values
 

@@ -15,6 +15,8 @@ from ...components.assembly.named_parts import Assembly
 from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
+from ...model import flatten
+from ...model.readings import reading_of
 from ..selection.comparison import Comparison
 from ..selection.criteria import DECLARED
 from ..selection.excess import excesses
@@ -137,14 +139,13 @@ def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:
     records
         Measured. Where more than one angle is measured nothing is said.
     """
-    ends = {n: q.number for n, q in actuator.quantities().items() if n.endswith(".last_angle")}
-    sensors = actuator.sensors()
-    owners = {s: s.rpartition(".")[0] for s in records.signals}
-    truth = {s: sensors[o].of if o in sensors else s for s, o in owners.items()}
-    angles = [s for s, name in truth.items() if name.endswith(".angle")]
+    model = flatten(actuator)
+    ends = [cam.last_angle for spring in model.springs for cam in spring.cams if cam.last_angle]
+    shown = {s: reading_of(model.readings, s).measured for s in records.signals}
+    angles = [s for s, name in shown.items() if model.variable(name).unit == "rad"]
     if len(angles) != 1 or len(ends) != 1:
         return []
-    ((name, end),) = ends.items()
+    name, end = ends[0], model.values[ends[0]]
     column, findings = records.column(angles[0]), []
     for record in records.records:
         size = np.abs(record.trace[angles[0]])

@@ -9,7 +9,9 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...model import flatten
+from ...model import FlatModel, flatten
+from ...model.readings import reading_of
+from ..blocks.shown_values import shown_values
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
 
@@ -27,16 +29,18 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> dict[str, float]:
     records
         All records.
     """
-    model, sensors = flatten(actuator), actuator.sensors()
+    model = flatten(actuator)
     measured = {s: max(float(np.max(np.abs(r.trace[s]))) for r in records.records) for s in records.signals}
-    truth = {
-        sensors[owner].of if (owner := s.rpartition(".")[0]) in sensors else s: size
-        for s, size in measured.items()
-    }
-    state = [truth.get(v.name, v.start) for v in model.states]
-    inputs = [truth.get(v.name, v.start) for v in model.inputs]
+    readings = (reading_of(model.readings, signal) for signal in records.signals)
+    shown = {r.measured: _largest(model, records, r.signal) for r in readings if r.shows_value}
+    state = [shown.get(v.name, v.start) for v in model.states]
+    inputs = [shown.get(v.name, v.start) for v in model.inputs]
     computed = {name: abs(value) for name, value in model.evaluate(state, inputs).items()}
-    return {name: value for name, value in (computed | truth | measured).items() if value > 0.0}
+    return {name: value for name, value in (computed | shown | measured).items() if value > 0.0}
+
+
+def _largest(model: FlatModel, records: RecordSet, signal: str) -> float:
+    return max(float(np.max(np.abs(shown_values(model, record, signal)))) for record in records.records)
 
 
 def scale_findings(comparison: Comparison, base: Hypothesis) -> list[Finding]:

@@ -19,8 +19,8 @@ from ...identification.estimation.least_squares import fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
-from ...model import Variable
-from ...parallel import parallel_map
+from ...model import Variable, flatten
+from ...processes import parallel_map
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Tally
@@ -199,7 +199,8 @@ class Comparison:
         """
         if hypothesis not in self._judged:
             signals, records = self.bench.records.signals, self.bench.records.records
-            driven = [self.bench.driven(block, ()) for block in blocks_of(hypothesis.fitted, signals)]
+            blocks = blocks_of(flatten(hypothesis.fitted), signals)
+            driven = [self.bench.driven(block, ()) for block in blocks]
             evidence = [e for each in driven for e in self.bench.evidence(each, records, {})]
             pairs = parallel_map(lambda k: _prediction(evidence[k]), len(evidence))
             self._judged[hypothesis] = tuple(
@@ -211,7 +212,7 @@ class Comparison:
     def _groups(self, hypothesis: Hypothesis) -> list[list[FreeBlock]]:
         """Return the blocks of a hypothesis in groups that share no free number."""
         blocks = []
-        for block in blocks_of(hypothesis.assembly, self.bench.records.signals):
+        for block in blocks_of(flatten(hypothesis.assembly), self.bench.records.signals):
             spread = [v.name for v in _refittable(block.model.parameters)]
             own = [u.name for u in hypothesis.unknowns if u.name in block.model.values]
             blocks.append(FreeBlock(block, free_in(block, list(dict.fromkeys([*spread, *own])))))
@@ -253,9 +254,14 @@ def _prediction(evidence: Evidence) -> tuple[Array, Array]:
 
 def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
     """Return a hypothesis with the effect in its assembly, not fitted yet."""
-    renamed = _renamed(hypothesis, candidate.assembly)
-    old = tuple(replace(u, name=renamed.get(u.name, u.name)) for u in hypothesis.unknowns)
-    values = {renamed.get(n, n): v for n, v in hypothesis.values.items()}
+    moved = moved_numbers(hypothesis.assembly, candidate.assembly)
+
+    def renamed(name: str) -> str:
+        row, bracket, index = name.partition("[")
+        return moved.get(row, row) + bracket + index
+
+    old = tuple(replace(u, name=renamed(u.name)) for u in hypothesis.unknowns)
+    values = {renamed(n): v for n, v in hypothesis.values.items()}
     # An edit may share a number out, for instance an inertia: what was fitted is shared out alike.
     then, now = hypothesis.assembly.quantities(), candidate.assembly.quantities()
     for name in values.keys() & then.keys() & now.keys():
@@ -280,25 +286,25 @@ def _groups(blocks: Sequence[FreeBlock]) -> list[list[FreeBlock]]:
     return groups
 
 
-def _renamed(hypothesis: Hypothesis, assembly: Assembly) -> dict[str, str]:
-    """Return the new names of numbers that an edit has moved: same end, other beginning."""
-    new = [n for n in assembly.quantities() if n not in hypothesis.assembly.quantities()]
-    gone = [n for n in hypothesis.assembly.quantities() if n not in assembly.quantities()]
-    found = {}
-    for old in gone:
-        pieces = old.split(".")
-        for k in range(len(pieces), 0, -1):
-            tail = "." + ".".join(pieces[-k:])
-            matches = [n for n in new if n.endswith(tail) and n.split(".")[0] == pieces[0]]
-            if len(matches) == 1:
-                found[old] = matches[0]
-                break
-    rows = {}
-    for name in hypothesis.values:
-        row, bracket, index = name.partition("[")
-        if row in found:
-            rows[name] = found[row] + bracket + index
-    return found | rows
+def moved_numbers(before: Assembly, after: Assembly) -> dict[str, str]:
+    """Return the new name of each number that an edit has moved, by its old one.
+
+    An edit that puts an element inside another keeps its numbers, as the very same objects.
+
+    Parameters
+    ----------
+    before
+        An assembly.
+    after
+        Made from it by an edit.
+    """
+    old, new = before.quantities(), after.quantities()
+    places: dict[int, list[str]] = {}
+    for name, quantity in new.items():
+        if name not in old:
+            places.setdefault(id(quantity), []).append(name)
+    moved = {name: places.get(id(quantity), []) for name, quantity in old.items() if name not in new}
+    return {name: names[0] for name, names in moved.items() if len(names) == 1}
 
 
 def _with_unknowns(added: Sequence[Candidate], unknowns: Sequence[Unknown]) -> tuple[Candidate, ...]:

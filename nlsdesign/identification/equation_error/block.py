@@ -19,12 +19,12 @@ class Drive(NamedTuple):
     order
         0 for its value, 1 for its rate, 2 for the derivative of that.
     late_by
-        Name of the parameter that says by how much the signal comes late, or None.
+        Names of the parameters whose sum says by how much the signal comes late.
     """
 
     signal: str
     order: int = 0
-    late_by: str | None = None
+    late_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, unknown_name
+from ...errors import ConvergenceError, MeasurementError, unknown_name
 from ...symbolic import Expression, depends
 from ..records.measurement import Record
 from ..statistics.filters import derivative, without_rounding
@@ -114,7 +114,7 @@ class DrivenBlock:
         self._fixed = block.model.values
         e = _equations(block, self.free)
         self._digest, self._size = Batch(e.digest), e.state.numel()
-        self._late = [str(d.late_by) for d in _late_drives(block, self.free)]
+        self._late = [_free_delay(d, self.free) for d in _late_drives(block, self.free)]
         self._output = Batch(_output_function(e))
         self._equations = e
         self._walk: _Walk | None = None
@@ -146,7 +146,7 @@ class DrivenBlock:
             if drive is None:
                 continue
             signal = record.trace[drive.signal]
-            late = {**self._fixed, **values}[drive.late_by] if drive.late_by else 0.0
+            late = sum({**self._fixed, **values}[name] for name in drive.late_by)
             if smooth and drive.order == 0 and self._moves(drive.signal):
                 signal = without_rounding(signal)
             inputs[i] = derivative(signal, record.step, order=drive.order)
@@ -287,7 +287,19 @@ def _advanced(time: Array, signal: Array, late: float) -> tuple[Array, Array]:
 
 
 def _late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
-    return [d for d in block.drives.values() if d.late_by in free]
+    return [d for d in block.drives.values() if set(d.late_by) & set(free)]
+
+
+def _free_delay(drive: Drive, free: Sequence[str]) -> str:
+    """Return the one delay of a signal that is free; of several, records show the sum alone."""
+    names = [name for name in drive.late_by if name in free]
+    if len(names) > 1:
+        raise MeasurementError(
+            f"signal '{drive.signal}'",
+            f"is late by {' and by '.join(names)}, both free, which cannot be told apart",
+            next_step="let one of them free, and give the other a number without a spread",
+        )
+    return names[0]
 
 
 def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
@@ -311,7 +323,7 @@ def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
         if name not in names:
             raise unknown_name("parameter", name, names)
     together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
-    late = {d.late_by for d in block.drives.values()}
+    late = {name for d in block.drives.values() for name in d.late_by}
     return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
 
 
@@ -332,7 +344,7 @@ def _equations(block: Block, free: Sequence[str]) -> _Equations:
         if drive in late:
             # The samples were advanced by the present delay; its derivative is that of the signal.
             k = late.index(drive)
-            shift = (p[list(free).index(str(drive.late_by))] - now[k]) * rates[i]
+            shift = (p[list(free).index(_free_delay(drive, free))] - now[k]) * rates[i]
             together = ca.substitute(together, s.input[i], s.input[i] + shift)
     given = ca.vertcat(s.input, rates)
     core, symbols, parts = ca.extract_parametric(ca.cse(together), given)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, unknown_name
 from ...model import FlatModel
+from ...model.structure import body_moved_by
 from ...symbolic import Expression
 from ..records.measurement import Record
 from ..statistics.filters import derivative
@@ -121,15 +122,15 @@ class Windows:
 
 
 def _seen(model: FlatModel, wiring: Wiring, record: Record) -> dict[int, Array]:
-    found = {}
+    seen = {}
     names = [v.name for v in model.states]
     for signal, output in wiring.outputs.items():
         if output in names:
-            found[names.index(output)] = record.trace[signal]
-            speed = f"{output.rpartition('.')[0]}.speed"
-            if speed in names and speed not in wiring.outputs.values():
-                found[names.index(speed)] = _speed(record.trace[signal], record.step)
-    return found
+            seen[names.index(output)] = record.trace[signal]
+            body = body_moved_by(model.bodies, output)
+            if body and body.rate in names and body.rate not in wiring.outputs.values():
+                seen[names.index(body.rate)] = _speed(record.trace[signal], record.step)
+    return seen
 
 
 def _speed(motion: Array, step: float) -> Array:

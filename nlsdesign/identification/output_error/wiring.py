@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from ...errors import MeasurementError, unknown_name
 from ...model import FlatModel
+from ...model.structure import body_moved_by
 from ..equation_error.block import Drive
 
 
@@ -62,9 +63,9 @@ def wired(model: FlatModel, measured: Sequence[str], late_by: Mapping[str, str] 
             outputs[signal] = signal
             continue
         inputs[signal] = Drive(signal)
-        rate = f"{signal.rpartition('.')[0]}.speed"
-        if rate in names and rate not in measured:
-            inputs[rate] = Drive(signal, 1)
+        body = body_moved_by(model.bodies, signal)
+        if body and body.rate in names - set(measured):
+            inputs[body.rate] = Drive(signal, 1)
     if not outputs:
         raise MeasurementError(
             "records",

@@ -1,4 +1,4 @@
-"""Which column of a file measures which signal of a model, and in what unit."""
+"""Mapping of the columns of a file to signals of a model, with units."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 from ...errors import MeasurementError, UnitError, nearest
 from ...model import FlatModel
+from ...model.readings import reading_of
 from ...quantity import parse_unit, same_dimension, typeset_unit
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
@@ -299,8 +300,8 @@ def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str)
         )
     if name in everything:
         return name
-    for group in ([v for v in everything.values() if v.name.endswith(".reading")], list(model.inputs)):
-        fitting = [v.name for v in group if same_dimension(v.unit, unit)]
+    for group in ([everything[r.signal] for r in model.readings], list(model.inputs)):
+        fitting = _last_of_chains(model, [v.name for v in group if same_dimension(v.unit, unit)])
         if len(fitting) == 1:
             return fitting[0]
         if fitting:
@@ -315,10 +316,23 @@ def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str)
     )
 
 
+def _last_of_chains(model: FlatModel, signals: Sequence[str]) -> list[str]:
+    """Leave out readings that another one of these signals passes on: a bench writes down the last."""
+    readings = [r for r in model.readings if r.signal in signals]
+    passed_on = {sensor for r in readings for sensor in r.sensors[1:]}
+    return [s for s in signals if s not in {r.signal for r in readings if r.sensors[0] in passed_on}]
+
+
 def _declared(model: FlatModel, signal: str) -> tuple[float, float]:
-    owner = signal.rpartition(".")[0]
-    values = model.values
-    return values.get(f"{owner}.noise", 0.0), values.get(f"{owner}.quantum", 0.0)
+    """Return noise and count of a signal: the largest of the sensors that pass its value on."""
+    noise = quantum = 0.0
+    reading = reading_of(model.readings, signal)
+    for sensor, law in zip(reading.sensors, reading.laws, strict=True):
+        noise = max(noise, model.values.get(f"{sensor}.noise", 0.0))
+        quantum = max(quantum, model.values.get(f"{sensor}.quantum", 0.0))
+        if not law.shows_value:
+            break
+    return noise, quantum
 
 
 def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:

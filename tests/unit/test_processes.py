@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.parallel import parallel_map
+from nlsdesign.processes import parallel_map
 
 ENDLESS = """
 import time
-from nlsdesign.parallel import parallel_map
+from nlsdesign.processes import parallel_map
 
 def work(number):
     print("at work", flush=True)

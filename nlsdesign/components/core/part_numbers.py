@@ -198,6 +198,11 @@ class Reading:
         ----------
         domain
             Of the part.
+
+        Raises
+        ------
+        ArrangementError
+            If the reading cannot be in the domain.
         """
         if self.takes and domain not in self.takes:
             pairs = " or ".join(f"{each.motion} and {each.effort}" for each in self.takes)

@@ -1,0 +1,106 @@
+"""What measured signals show, and how the value behind a reading follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..components.assembly.named_parts import Assembly
+from ..components.sensing.sensors import Sensor
+from ..symbolic import Expression
+
+
+@dataclass(frozen=True)
+class ReadingNames:
+    """What a measured signal shows, through which chain of sensors.
+
+    Parameters
+    ----------
+    signal
+        Name of the reading; of a signal that is measured without a sensor, its own.
+    measured
+        Name of the state, input or signal that it shows.
+    sensors
+        Names of the sensors between, the one that gives the reading first.
+    laws
+        The sensors themselves, in the same order.
+    """
+
+    signal: str
+    measured: str
+    sensors: tuple[str, ...] = ()
+    laws: tuple[Sensor, ...] = ()
+
+    @property
+    def delays(self) -> tuple[str, ...]:
+        """Names of the parameters whose sum says by how many seconds the reading is late."""
+        pairs = zip(self.sensors, self.laws, strict=True)
+        return tuple(f"{name}.{law.late_by}" for name, law in pairs if law.late_by)
+
+    @property
+    def shows_value(self) -> bool:
+        """Whether what is measured can be inferred from the reading."""
+        return all(law.shows_value for law in self.laws)
+
+    def inferred(self, reading: Expression, known: Mapping[str, Expression]) -> Expression:
+        """Return the value behind a reading: the inverse of each sensor, the last one first.
+
+        Parameters
+        ----------
+        reading
+            What the last sensor gave, later by the sum of the ``delays``.
+        known
+            Parameters and states of the model by full name.
+
+        Raises
+        ------
+        ArrangementError
+            If a sensor does not show the value, see ``shows_value``.
+        """
+        for name, law in zip(self.sensors, self.laws, strict=True):
+            reading = law.infer(_NumbersOf(name, known), reading)
+        return reading
+
+
+class _NumbersOf:
+    """The parameters and states of one sensor among those of a model."""
+
+    def __init__(self, sensor: str, known: Mapping[str, Expression]) -> None:
+        self._sensor, self._known = sensor, known
+
+    def parameter(self, name: str) -> Expression:
+        """Return one of its numbers."""
+        return self._known[f"{self._sensor}.{name}"]
+
+    def memory(self, name: str) -> Expression:
+        """Return one of its states."""
+        return self._known[f"{self._sensor}.{name}"]
+
+
+def reading_of(readings: Sequence[ReadingNames], signal: str) -> ReadingNames:
+    """Return what a signal shows; one that is not the reading of a sensor shows itself.
+
+    Parameters
+    ----------
+    readings
+        Of a flat model.
+    signal
+        Full name.
+    """
+    return next((r for r in readings if r.signal == signal), ReadingNames(signal, signal))
+
+
+def readings_of(assembly: Assembly) -> tuple[ReadingNames, ...]:
+    """Return what each sensor of an assembly shows, through which chain of sensors.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    sensors, readings = assembly.sensors(), []
+    for name in sensors:
+        measured, chain = assembly.measured(f"{name}.reading")
+        laws = tuple(sensors[each] for each in chain)
+        readings.append(ReadingNames(f"{name}.reading", measured, chain, laws))
+    return tuple(readings)

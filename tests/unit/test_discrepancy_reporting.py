@@ -1,0 +1,198 @@
+"""What is reported of residuals made by hand: the remainder, the gap, and refits over windows."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from nlsdesign.components import Assembly, Encoder, Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
+from nlsdesign.discrepancy.reporting.remainder import Remainder, remainder_of
+from nlsdesign.discrepancy.reporting.window_refit import fitted_over_windows, window_gaps, wiring_of
+from nlsdesign.discrepancy.selection.comparison import Comparison, Judged
+from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.errors import MeasurementError
+from nlsdesign.identification import Column, Record, RecordSet
+from nlsdesign.identification.equation_error.evidence import Floor
+from nlsdesign.identification.records.measurement import Role
+from nlsdesign.identification.statistics.filters import smoothing
+from nlsdesign.model import flatten
+from nlsdesign.quantity import Quantity
+from nlsdesign.simulation import Trace, simulate
+
+Array = NDArray[np.float64]
+TIME = np.arange(6000) * 0.002
+SIGMA = 0.1
+ROLES: tuple[Role, ...] = ("fit", "fit", "fit", "held_out", "held_out")
+COLUMNS = (Column("q", "encoder.reading", "rad"), Column("i", "motor.current", "A"))
+
+
+def motion(seed: int) -> Record:
+    """An angle of three sines and a current that has nothing to do with it."""
+    draw = np.random.default_rng(seed)
+    waves = [np.sin(w * TIME + p) for w, p in zip(draw.uniform(1, 9, 3), draw.uniform(0, 6, 3), strict=True)]
+    signals = {"encoder.reading": sum(waves) / 3.0, "motor.current": draw.standard_normal(len(TIME))}
+    units = {"encoder.reading": "rad", "motor.current": "A"}
+    return Record(f"r{seed}", Trace(TIME, signals, units, f"r{seed}"), ROLES[seed])
+
+
+RECORDS = RecordSet(tuple(motion(seed) for seed in range(5)), COLUMNS)
+
+
+def judged(record: Record, error: Array, *, name: str = "motor", target: str | None = None) -> Judged:
+    """One block on one record, its filtered error as given at every sample."""
+    matrix = smoothing(len(TIME), 2.0, 5)
+    floor = Floor(matrix, np.full(matrix.shape[0], SIGMA), np.full(len(TIME), SIGMA))
+    output = SimpleNamespace(unit="N*m", description="torque")
+    block = SimpleNamespace(
+        name=name, target=target, output="motor.unbalanced", model=SimpleNamespace(outputs=(output,))
+    )
+    return Judged(block, record, floor, np.zeros(len(TIME)), matrix @ error / SIGMA)  # type: ignore[arg-type]
+
+
+def noise(record: Record) -> Array:
+    return SIGMA * np.random.default_rng(len(record.name) + int(record.name[1])).standard_normal(len(TIME))
+
+
+def remainder(law: str) -> Remainder:
+    def error(record: Record) -> Array:
+        angle, phase = record.trace["encoder.reading"], 2.0 * int(record.name[1])
+        return {
+            "line": np.sin(2 * np.pi * 7.0 * TIME + phase),
+            "drift": 0.3 * TIME,
+            "bound": 3.0 * angle**3,
+            "nothing": np.zeros_like(TIME),
+        }[law] + noise(record)
+
+    return remainder_of([judged(r, error(r)) for r in RECORDS.records], RECORDS, ["encoder.reading"])
+
+
+def test_a_single_frequency_in_all_records_is_called_periodic() -> None:
+    found = remainder("line")
+    assert found.kind == "periodic in time at 7 Hz, whatever the motion"
+    assert found.size == pytest.approx(np.sqrt(0.5), rel=0.05)
+    assert found.floor == pytest.approx(SIGMA)
+    assert (found.block, found.quantity, found.unit) == ("motor", "motor.unbalanced", "N*m")
+
+
+def test_the_same_course_over_time_in_all_records_is_called_a_drift() -> None:
+    found = remainder("drift")
+    assert found.kind.startswith("a drift")
+    assert found.shapes[0][0] == "time"
+    assert found.shapes[0][1] > 0.9
+
+
+def test_a_curve_over_one_signal_is_said_to_be_bound_to_it() -> None:
+    found = remainder("bound")
+    assert found.kind.startswith("bound to encoder.reading: a curve over it alone explains 9")
+    shares = dict(found.shapes)
+    assert shares["encoder.reading"] > 0.9
+    assert shares["motor.current"] < 0.05
+
+
+def test_noise_has_no_shape() -> None:
+    found = remainder("nothing")
+    assert found.kind == "bound to no single measured signal and to no single frequency"
+    assert found.formula is None
+
+
+# --- gap ------------------------------------------------------------------------------------------
+
+
+class Known:
+    """A comparison that knows beforehand what it would say of two hypotheses; records in another order."""
+
+    def __init__(self, before: list[Judged], after: list[Judged], given: list[str]) -> None:
+        self._said = {"before": before, "after": after}
+        self.bench = SimpleNamespace(given_order={name: k for k, name in enumerate(given)})
+
+    def judged(self, hypothesis: str) -> list[Judged]:
+        return self._said[hypothesis]
+
+
+def compared() -> Comparison:
+    def of(size: float) -> list[Judged]:
+        blocks = (("spring", "encoder.reading"), ("motor", None))
+        return [
+            judged(r, np.full(len(TIME), size * (1 + int(r.name[1]))), name=n, target=t)
+            for n, t in blocks
+            for r in RECORDS.records
+        ]
+
+    return cast(Comparison, Known(of(0.4), of(0.2), ["r4", "r2", "r0", "r1", "r3"]))
+
+
+BEFORE, AFTER = cast(Hypothesis, "before"), cast(Hypothesis, "after")
+
+
+def test_gaps_are_errors_in_the_unit_of_the_block_by_block_and_record_in_the_order_given() -> None:
+    gaps = gaps_of(BEFORE, AFTER, compared())
+    assert [(g.block, g.record) for g in gaps[:3]] == [("spring", "r4"), ("spring", "r2"), ("spring", "r0")]
+    assert [g.block for g in gaps] == 5 * ["spring"] + 5 * ["motor"]
+    first = gaps[0]
+    assert (first.before, first.after) == (pytest.approx(2.0), pytest.approx(1.0))
+    assert (first.noise_floor, first.unit, first.role) == (pytest.approx(SIGMA), "N*m", "held_out")
+
+
+def test_the_course_is_that_of_the_held_out_record_with_the_largest_error() -> None:
+    course = course_of(BEFORE, AFTER, compared(), "spring")
+    assert (course.record, course.quantity) == ("r4", "encoder.reading")
+    np.testing.assert_array_equal(course.measured, RECORDS.records[4].trace["encoder.reading"])
+    balance = course_of(BEFORE, AFTER, compared(), "motor")
+    assert balance.quantity == "torque"
+    assert np.all(balance.measured == 0.0)
+    np.testing.assert_allclose(balance.before, -2.0)
+    np.testing.assert_allclose(balance.after, -1.0)
+
+
+# --- windows --------------------------------------------------------------------------------------
+
+STIFFNESS = 2.0
+
+
+def swing(stiffness: float = STIFFNESS) -> Assembly:
+    number = Quantity(stiffness, "N*m/rad", "by hand", spread=0.3)
+    return assembly(
+        "swing",
+        wheel=Inertia(inertia=1e-2),
+        spring=tie(TorsionSpring(stiffness=number), "wheel"),
+        damper=tie(TorsionDashpot(damping=5e-3), "wheel"),
+        encoder=Encoder(of="wheel.angle", quantum=1e-9),
+    )
+
+
+def swings(*roles: Role) -> RecordSet:
+    """Free swings from rest at half a radian, of a wheel whose spring is a tenth stiffer than declared."""
+    time = np.arange(3000) * 0.001
+    records = []
+    for k, role in enumerate(roles):
+        run = simulate(flatten(swing(1.1 * STIFFNESS)), time, start={"wheel.angle": 0.5 + 0.1 * k})
+        angle = run["encoder.reading"] + 1e-4 * np.random.default_rng(k).standard_normal(len(time))
+        trace = Trace(time, {"encoder.reading": angle}, {"encoder.reading": "rad"}, f"r{k}")
+        records.append(Record(f"r{k}", trace, role))
+    return RecordSet(tuple(records), (Column("q", "encoder.reading", "rad"),))
+
+
+def test_windows_find_the_stiffness_behind_a_free_swing_and_predict_the_held_out_one() -> None:
+    records = swings("fit", "held_out")
+    values, fit = fitted_over_windows(swing(), records, {"spring.stiffness": STIFFNESS}, 0.5)
+    assert values["spring.stiffness"] == pytest.approx(1.1 * STIFFNESS, rel=0.01)
+    assert [p.name for p in fit.parameters] == ["spring.stiffness"]
+    gaps = window_gaps(swing(), values, records, 0.5)
+    assert [(g.record, g.role) for g in gaps] == [("r0", "fit"), ("r1", "held_out")]
+    assert gaps[1].block == "encoder.reading over 0.5 s"
+    # What is left comes from the speed at which windows begin, a derivative of noisy angles.
+    assert gaps[1].before > 5.0 * gaps[1].after
+
+
+def test_readings_are_wired_to_what_their_sensors_read() -> None:
+    wiring = wiring_of(swing(), flatten(swing()), ["encoder.reading", "spring.torque"])
+    assert wiring.inputs == {}
+    assert wiring.outputs == {"encoder.reading": "wheel.angle", "spring.torque": "spring.torque"}
+    with pytest.raises(MeasurementError, match="no state of the model is measured"):
+        wiring_of(swing(), flatten(swing()), ["spring.torque"])

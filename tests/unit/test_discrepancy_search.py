@@ -1,0 +1,197 @@
+"""The order of the search on a comparison made by hand: a table says what each set of effects leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from nlsdesign.components import Assembly, Fixed
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.effects.candidate import Candidate, Effect, Unknown
+from nlsdesign.discrepancy.fitting.strategies import Continuation, Plain
+from nlsdesign.discrepancy.fitting.unpredictable import Tally
+from nlsdesign.discrepancy.selection.comparison import Comparison
+from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.discrepancy.selection.search import Outcome, Skipped, search
+from nlsdesign.errors import ConvergenceError
+
+BLANK = assembly("blank", load=Fixed())
+ROWS = 1000
+LONG = Continuation(through=BLANK)
+
+
+def effect(name: str, numbers: int = 1, *, strategy: Plain | Continuation | None = None) -> Effect:
+    unknowns = tuple(Unknown(f"{name}.{k}", (1.0,), 0.1, 10.0) for k in range(numbers))
+
+    def of(assembly: Assembly) -> Sequence[Candidate]:
+        return [Candidate(name, "motor", assembly, unknowns, "sign", "source", strategy or Plain())]
+
+    return of
+
+
+class Records:
+    """One fitted and one held-out record."""
+
+    def of(self, *roles: str) -> list[SimpleNamespace]:
+        return [SimpleNamespace(name=role) for role in ("fit", "held_out") if role in roles]
+
+
+class Bench:
+    records, units = Records(), {"motor": "N*m", "spring": "N"}
+
+    def typical_floor(self, block: str) -> float:
+        return 1.0
+
+
+class Table:
+    """A comparison that looks up the excess of the motor, and perhaps of the spring, for the effects added.
+
+    A set of effects that is not in the table does not converge.
+    """
+
+    def __init__(self, table: dict[Collection[str], tuple[float, ...]], **flags: bool) -> None:
+        self.table = {frozenset(names): left for names, left in table.items()}
+        self.bench, self.flags, self.asked = Bench(), flags, list[tuple[str, ...]]()
+
+    def hypothesis(self, added: tuple[Candidate, ...]) -> Hypothesis:
+        left = self.table.get(frozenset(c.effect for c in added))
+        if left is None:
+            raise ConvergenceError("fit", "has no response", next_step="give up")
+        tallies = {
+            (block, role): Tally(ROWS + each, ROWS, ROWS)
+            for block, each in zip(("motor", "spring"), left, strict=False)
+            for role in ("fit", "held_out")
+        }
+        return Hypothesis(BLANK, added, tallies=tallies, **cast(Any, self.flags))
+
+    def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
+        return self.hypothesis(hypothesis.added)
+
+    def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
+        return hypothesis
+
+    def polished(self, hypothesis: Hypothesis) -> Hypothesis:
+        return replace(hypothesis, values={"polished": 1.0})
+
+    def with_effect(
+        self, hypothesis: Hypothesis, candidate: Candidate, wanted: Collection[str] = ()
+    ) -> Hypothesis | None:
+        self.asked.append((*hypothesis.names, candidate.effect))
+        return self.hypothesis((*hypothesis.added, candidate))
+
+
+@pytest.fixture(autouse=True)
+def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work done here, so that the table sees what it is asked."""
+    monkeypatch.setattr(
+        "nlsdesign.discrepancy.selection.search.parallel_map", lambda work, count: map(work, range(count))
+    )
+
+
+def outcome(table: Table, *effects: Effect) -> Outcome:
+    base = table.hypothesis(())
+    return search(cast(Comparison, table), base, effects, lambda text: None)
+
+
+def names(found: Outcome) -> list[str]:
+    return [step.effect for step in found.steps]
+
+
+def test_where_nothing_is_open_nothing_is_tried() -> None:
+    table = Table({(): (0.0,)})
+    found = outcome(table, effect("a"))
+    assert (names(found), found.explained, table.asked) == ([], True, [])
+
+
+def test_the_one_effect_that_explains_is_named_and_fitted_to_all_samples() -> None:
+    found = outcome(Table({(): (1e5,), ("a",): (9e4,), ("b",): (10.0,)}), effect("a"), effect("b"))
+    assert names(found) == ["b"]
+    assert found.explained
+    assert found.last.values == {"polished": 1.0}
+    assert [(c.effect, round(share, 2)) for c, share in found.ranking] == [("b", 1.0), ("a", 0.1)]
+    assert found.steps[0].share_fit == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_second_effect_is_sought_while_a_block_is_open() -> None:
+    table = {(): (1e5,), ("a",): (3e4,), ("b",): (9e4,), ("a", "b"): (10.0,)}
+    found = outcome(Table(table), effect("a"), effect("b"))
+    assert names(found) == ["a", "b"]
+    assert found.explained
+
+
+def test_an_effect_that_a_later_one_makes_superfluous_is_dropped() -> None:
+    """Without b more is left, so it stays; but not where c, fitted anew from the start, explains all."""
+    table = Table({(): (1e5,), ("b",): (3e4,), ("c",): (4e4,), ("b", "c"): (100.0,)})
+    assert names(outcome(table, effect("b"), effect("c"))) == ["b", "c"]
+    better = Table({(): (1e5,), ("b",): (3e4,), ("c",): (4e4,), ("b", "c"): (100.0,)})
+
+    def improving(*arguments: Any) -> Hypothesis | None:
+        done = Table.with_effect(better, *arguments)
+        if len(better.asked) > 3:
+            better.table[frozenset("c")] = (150.0,)
+        return done
+
+    better.with_effect = improving  # type: ignore[method-assign]
+    assert names(outcome(better, effect("b"), effect("c"))) == ["c"]
+
+
+def test_two_effects_that_help_only_together_are_found_as_a_pair() -> None:
+    table = {(): (1e5,), ("a",): (8e4,), ("b",): (9e4,), ("a", "b"): (10.0,)}
+    found = outcome(Table(table), effect("a"), effect("b"))
+    assert names(found) == ["a", "b"]
+
+
+def test_nothing_is_named_where_neither_one_nor_two_explain_half() -> None:
+    table = {(): (1e5,), ("a",): (8e4,), ("b",): (9e4,), ("a", "b"): (6e4,)}
+    found = outcome(Table(table), effect("a"), effect("b"))
+    assert names(found) == []
+    assert not found.explained
+
+
+def test_what_remains_open_is_not_explained() -> None:
+    found = outcome(Table({(): (1e5,), ("a",): (4e4,)}), effect("a"))
+    assert names(found) == ["a"]
+    assert not found.explained
+
+
+def test_no_more_than_three_effects_are_named() -> None:
+    letters = "abcde"
+    table = Table({tuple(letters[:k]): (1e6 * 0.45**k,) for k in range(len(letters) + 1)})
+    assert names(outcome(table, *[effect(name) for name in letters])) == ["a", "b", "c"]
+
+
+def test_no_more_than_two_effects_are_named_in_free_flight() -> None:
+    """The second leaves 40 % of its block, which is open and would be searched for more."""
+    table = {(): (1e6, 9e5), ("a",): (10.0, 9e5), ("a", "b"): (10.0, 3.6e5), ("a", "b", "c"): (10.0, 10.0)}
+    effects = [effect(name) for name in "abc"]
+    assert names(outcome(Table(table), *effects)) == ["a", "b", "c"]
+    assert names(outcome(Table(table, has_free_flight=True), *effects)) == ["a", "b"]
+
+
+def test_what_takes_long_is_begun_first_but_the_order_of_the_catalogue_decides() -> None:
+    table = Table({(): (1e5,), ("a",): (10.0,), ("slow",): (10.0,)})
+    found = outcome(table, effect("a"), effect("slow", strategy=LONG))
+    assert table.asked[:2] == [("slow",), ("a",)]
+    assert names(found) == ["a"]
+    assert [h.newest.effect for h in found.steps[0].equals] == ["slow"]
+
+
+def test_what_could_not_be_compared_is_in_the_outcome_with_its_reason() -> None:
+    found = outcome(Table({(): (1e5,), ("a",): (3e4,)}), effect("a"), effect("broken"))
+    assert names(found) == ["a"]
+    assert found.skipped == (
+        Skipped("broken", "motor", (), "has no response"),
+        Skipped("broken", "motor", ("a",), "has no response"),
+    )
+    assert str(found.skipped[1]) == "broken at motor beside a: has no response"
+
+
+def test_the_block_that_lacks_most_is_worked_on_first() -> None:
+    table = {(): (1e5, 1e6), ("a",): (10.0, 1e6), ("b",): (1e5, 10.0), ("a", "b"): (10.0, 10.0)}
+    found = outcome(Table(table), effect("a"), effect("b"))
+    assert names(found) == ["b", "a"]
+    assert found.explained
