@@ -41,7 +41,7 @@ from nlsdesign.discrepancy.effects import (
     stress_softening,
     wrapped,
 )
-from nlsdesign.discrepancy.effects.cable import stretched
+from nlsdesign.discrepancy.effects.places import stretched
 from nlsdesign.discrepancy.selection.comparison import Hypothesis, _renamed
 from nlsdesign.model import flatten
 

@@ -11,8 +11,8 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.delay import delayed
 from ..core.element import Scope
-from ..core.part_numbers import parameter
 from ..core.part import Part
+from ..core.part_numbers import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
