@@ -166,7 +166,8 @@ def test_design(run: Run, tmp_path: Path) -> None:
     write_deck(machine.assembly, tmp_path / "other.toml")
     one = design_cam(published(), target=TARGET, keep=KEEP)
     called = ("design", "--deck", str(tmp_path / "other.toml"), "--maximum", "5 N*m", "--angle", "53 deg")
-    status, out, err = run(*called, "--out", "o", "--json")
+    contour = machine.name("spring.cam.contour")
+    status, out, err = run(*called, "--free", contour, "--out", "o", "--json")
     assert status == 0, err
     other = json.loads(out[out.index("{") :])
     assert [machine.name(name) for name in one.values] == list(other["values"])

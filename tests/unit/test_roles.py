@@ -170,6 +170,21 @@ def test_transforms_keep_what_is_left_of_the_structure() -> None:
     assert series_spring(exchanged).states == (ob.FORCE,)
 
 
+def test_a_body_that_is_dropped_takes_its_readings_along() -> None:
+    model = flatten(
+        machine(
+            finger=Inertia(inertia=1e-3), wheel=Inertia(inertia=1e-3),
+            tendon=tie(Spring(stiffness=1.0, domain=ROTATION), "finger"),
+            dial=Encoder(of="wheel.angle", quantum=1e-4),
+        )
+    )  # fmt: skip
+    assert [reading.measured for reading in model.readings] == ["wheel.angle"]
+    kept = without_idle_states(model, ["tendon.torque"])
+    assert [body.name for body in kept.bodies] == ["finger"]
+    assert kept.readings == ()
+    assert driven_body(kept).drives == ("finger.torque",)
+
+
 # --- every deck through every command: it works, or one sentence says why not --------------------------
 
 
