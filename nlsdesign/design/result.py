@@ -106,7 +106,7 @@ class Sensitivity:
             "all moduli high" if signs == {True} else "all moduli low" if signs == {False} else "moduli mixed"
         )
         largest = max(abs(deviation) for _, deviation in self.corner)
-        return f"{1e3 * self.rms:.4g} mN*m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
+        return f"{1e3 * self.rms:.4g} mN·m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +179,12 @@ class CamDesign:
     def rows(self) -> list[tuple[str, str]]:
         """Return a table of what was found: pairs of text."""
         rho, millis = self.contour.radii_of_curvature, 1e3
-        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N*m at {self._end}")]
+        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N·m at {self._end}")]
         rows += [(name, _brief(value)) for name, value in self.changes]
         rows += [
             (
                 "torque error",
-                f"{millis * self.rms:.3g} mN*m rms, {millis * self.check.largest:.3g} mN*m at most",
+                f"{millis * self.rms:.3g} mN·m rms, {millis * self.check.largest:.3g} mN·m at most",
             ),
             ("over the spread", str(self.sensitivity)),
             ("radius of curvature", f"{millis * rho.min():.3g} to {millis * rho.max():.3g} mm"),
