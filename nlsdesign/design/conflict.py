@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InfeasibleError
 from .limits import Bound
-from .problem import Problem
+from .problem import DesignProblem
 from .program import Program, Rows
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ class Give:
         return f"{self.bound} would have to give by {amount} (to {end})"
 
 
-def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable[[], None]) -> Floats:
+def feasible_point(problem: DesignProblem, bounds: Sequence[Bound], progress: Callable[[], None]) -> Floats:
     """Return unknowns that keep all limits, or say why there are none.
 
     Every limit gets a slack, and the sum of the slacks, each relative to the size of its limit, is made as
@@ -107,7 +107,7 @@ def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable
     raise _conflict([bounds[i] for i in involved], alone, hopeless, together)
 
 
-def _softened(problem: Problem, bounds: Sequence[Bound]) -> Program:
+def _softened(problem: DesignProblem, bounds: Sequence[Bound]) -> Program:
     """Return the program that makes the sum of the slacks of all bounds small, and nothing else."""
     slacks = ca.SX.sym("slack", len(bounds))
     rows = [row_of(bound, slacks[i]) for i, bound in enumerate(bounds)]

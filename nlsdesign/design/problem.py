@@ -81,7 +81,7 @@ class ContourVariables(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class DesignProblem:
     """Variables and what follows from them.
 
     Parameters
@@ -147,7 +147,7 @@ def design_problem(
     free: Sequence[str],
     spring: str | None = None,
     rounding: float = 0.0,
-) -> Problem:
+) -> DesignProblem:
     """Write the design problem of a cam spring.
 
     Parameters
@@ -201,7 +201,7 @@ def design_problem(
             values |= _contour_start(contour, shrunk * share, shrunk)
         starts.append(np.array([values[v.name] for v in variables]))
     design = _design(law, target, shape, parameters)
-    return _lifted(Problem(law, tuple(variables), design, shape.rows, tuple(starts), contour))
+    return _lifted(DesignProblem(law, tuple(variables), design, shape.rows, tuple(starts), contour))
 
 
 # Share of the size that is first slope, and share of the stretch that is pretension.
@@ -265,7 +265,7 @@ def _contour_start(contour: ContourVariables, slope: float, size: float) -> dict
     return starts | {contour.first_slope.name: slope}
 
 
-def _lifted(problem: Problem) -> Problem:
+def _lifted(problem: DesignProblem) -> DesignProblem:
     """Return the problem with the torque errors as variables of their own, held by equations.
 
     The square of an error that nearly vanishes along a curved valley (rubber, pretension and contour can

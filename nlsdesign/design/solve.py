@@ -22,7 +22,7 @@ from .equilibrium import torque_function
 from .geometry import Contour, contour_from_curvature
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Bound, Limit
-from .problem import Problem, contour_names, design_problem
+from .problem import DesignProblem, contour_names, design_problem
 from .program import Program, Solution
 from .result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .rounding import has_corners
@@ -134,7 +134,11 @@ class _DesignProgram:
     """A problem with its limits and goals as a program."""
 
     def __init__(
-        self, problem: Problem, keep: Sequence[Limit], goals: Sequence[Goal], progress: Callable[[], None]
+        self,
+        problem: DesignProblem,
+        keep: Sequence[Limit],
+        goals: Sequence[Goal],
+        progress: Callable[[], None],
     ) -> None:
         self.problem, self.progress = problem, progress
         self.bounds = [bound for limit in keep for bound in limit.bounds(problem.design)]
@@ -161,7 +165,9 @@ def _best(outcomes: Sequence[Solution]) -> Solution:
     return min(solved, key=lambda outcome: outcome.cost)
 
 
-def _finished(actuator: Assembly, problem: Problem, bounds: Sequence[Bound], best: Solution) -> CamDesign:
+def _finished(
+    actuator: Assembly, problem: DesignProblem, bounds: Sequence[Bound], best: Solution
+) -> CamDesign:
     target, cam = problem.design.target, problem.law.cam
     values = problem.named(best.point)
     contour, fit = _contour(actuator, problem, best)
@@ -192,7 +198,7 @@ def _designed(old: Quantity, value: float, source: str) -> Quantity:
     return replace(old.with_value(value, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
 
 
-def _contour(actuator: Assembly, problem: Problem, best: Solution) -> tuple[Contour, CamFit | None]:
+def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
     design, cam = problem.design, actuator[problem.law.cam.name]
     if problem.contour is None:
         return contour_of_cam(cam), None
@@ -206,7 +212,7 @@ def _contour(actuator: Assembly, problem: Problem, best: Solution) -> tuple[Cont
     return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
 
 
-def _state(problem: Problem, bound: Bound, point: Floats) -> LimitState:
+def _state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale

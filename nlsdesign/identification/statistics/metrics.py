@@ -62,10 +62,10 @@ def agreement(measured: Array, predicted: Array, *, noise: float = 0.0) -> Agree
     size = np.abs(measured)
     large = size > 0.1 * size.max()
     spread = float(np.std(measured))
-    found = rmse(error)
+    root_mean_square = rmse(error)
     return Agreement(
-        found,
+        root_mean_square,
         float(100.0 * np.mean(np.abs(error[large]) / size[large])) if np.any(large) else float("nan"),
-        100.0 * found / spread if spread > 0.0 else float("inf"),
-        found / noise if noise > 0.0 else float("inf"),
+        100.0 * root_mean_square / spread if spread > 0.0 else float("inf"),
+        root_mean_square / noise if noise > 0.0 else float("inf"),
     )
