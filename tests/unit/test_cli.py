@@ -139,7 +139,7 @@ def test_every_part_that_a_deck_can_name_is_listed_with_its_law(run: Run) -> Non
     assert listed["TwoSidedCam"]["kind"] == "cam"
     assert all(entry["law"] for entry in listed.values())
     _, out, _ = run("parts", "StribeckFriction")
-    assert "Source:" in out
+    assert "Sources: Stribeck 1902" in out
     assert "stribeck_speed" in out
     assert "Armstrong-Hélouvry, B. (1991): Control of Machines with Friction" in out
     status, _, err = run("parts", "StribekFriction")

@@ -93,19 +93,19 @@ def where_they_differ(one: Sequence[Judged], other: Sequence[Judged]) -> str:
     one, other
         What all records say of both.
     """
-    best, said = -1.0, "their predictions agree on every record"
+    best, sentence = -1.0, "their predictions agree on every record"
     for a, b in zip(one, other, strict=True):
         gap = np.abs(a.residual - b.residual)
         most = float(np.sqrt(np.mean(gap**2)))
         if most > best:
             best, place = most, int(np.argmax(gap))
             at = float(a.record.trace.time[a.floor.places[place]])
-            said = (
+            sentence = (
                 f"here they differ most in record '{a.record.name}' at `{a.block.name}`, "
                 f"by {most:.2g} noise floors, around {at:.3g} s"
             )
     longer = "; repeat that motion with more periods or larger amplitude" if best < _APART else ""
-    return said + longer
+    return sentence + longer
 
 
 def advice(name: str, aliases: Mapping[str, str]) -> tuple[str, ...]:
@@ -118,12 +118,12 @@ def advice(name: str, aliases: Mapping[str, str]) -> tuple[str, ...]:
     aliases
         By identifier, where the predictions differ most.
     """
-    said = []
+    sentences = []
     for other, differ in aliases.items():
         known = experiment(name, other)
         words = f"{name} or {other}: " + (f"{known}; {differ}" if known else differ)
-        said.append(words + ".")
-    return tuple(said)
+        sentences.append(words + ".")
+    return tuple(sentences)
 
 
 _DECIDING: Mapping[str, str] = {
@@ -151,7 +151,7 @@ def more_excitation(fits: Sequence[Fit]) -> tuple[str, ...]:
     fits
         Of the better model.
     """
-    found = []
+    sentences = []
     for fit in fits:
         units = {p.name: p.unit for p in fit.parameters}
         for words in fit.unidentified():
@@ -160,5 +160,5 @@ def more_excitation(fits: Sequence[Fit]) -> tuple[str, ...]:
             wanted = (
                 "; ".join(known) or "another amplitude, speed or holding time in which these act differently"
             )
-            found.append(f"The records do not decide {words}. To decide it, record {wanted}.")
-    return tuple(found)
+            sentences.append(f"The records do not decide {words}. To decide it, record {wanted}.")
+    return tuple(sentences)

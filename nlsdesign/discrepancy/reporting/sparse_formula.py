@@ -67,10 +67,10 @@ def sparse_formula(
     rest, target = np.vstack([table[i] for i in others]), np.concatenate([parts[i][0] for i in others])
     size = np.sqrt(np.mean(a**2, axis=0))
     kept = size > 1e-12 * size.max()
-    found = _one_by_one(a[:, kept] / size[kept], b)
+    candidates = _one_by_one(a[:, kept] / size[kept], b)
     whole = float(target @ target)
     scored = []
-    for weights in found:
+    for weights in candidates:
         left = target - rest[:, kept] @ (weights / size[kept])
         share = 1.0 - float(left @ left) / whole if whole > 0.0 else 0.0
         scored.append((share - _PER_TERM * int(np.count_nonzero(weights)), share, weights))
@@ -85,36 +85,36 @@ def sparse_formula(
 
 
 def _library(signals: Mapping[str, Array]) -> dict[str, Array]:
-    found = {"1": np.ones(len(next(iter(signals.values()))))}
+    terms = {"1": np.ones(len(next(iter(signals.values()))))}
     rates = [n for n in signals if n.startswith("rate of ")]
     for name, value in signals.items():
         short = f"[{name}]"
-        found |= {short: value, f"|{short}|": np.abs(value), f"{short}²": value**2, f"{short}³": value**3}
-        found[f"sign({short})"] = np.sign(value)
+        terms |= {short: value, f"|{short}|": np.abs(value), f"{short}²": value**2, f"{short}³": value**3}
+        terms[f"sign({short})"] = np.sign(value)
     for rate in rates:
         speed = signals[rate]
-        found[f"[{rate}]·|[{rate}]|"] = speed * np.abs(speed)
+        terms[f"[{rate}]·|[{rate}]|"] = speed * np.abs(speed)
         for name, value in signals.items():
             if name not in rates:
-                found[f"sign([{rate}])·|[{name}]|"] = np.sign(speed) * np.abs(value)
-                found[f"[{rate}]·[{name}]"] = speed * value
-    return found
+                terms[f"sign([{rate}])·|[{name}]|"] = np.sign(speed) * np.abs(value)
+                terms[f"[{rate}]·[{name}]"] = speed * value
+    return terms
 
 
 def _one_by_one(a: Array, b: Array) -> list[Array]:
     """Return weights with one term, two, and so on; each is the term that explains most of the rest."""
     active: list[int] = []
-    found, free = [], a / np.linalg.norm(a, axis=0)
+    steps, free = [], a / np.linalg.norm(a, axis=0)
     for _ in range(min(_MOST_TERMS, a.shape[1])):
         gains = np.abs(free.T @ b)
         gains[active] = -1.0
         active.append(int(np.argmax(gains)))
         weights = np.zeros(a.shape[1])
         weights[active] = np.linalg.lstsq(a[:, active], b, rcond=1e-6)[0]
-        found.append(weights)
+        steps.append(weights)
         taken = free[:, active[-1]]
         free = free - np.outer(taken, taken @ free)
         norms = np.linalg.norm(free, axis=0)
         # A term that the others already hold would be noise, blown up.
         free = np.where(norms > 1e-3, free / np.maximum(norms, 1e-300), 0.0)
-    return found
+    return steps

@@ -66,5 +66,5 @@ class Batch:
             self._trigger()
             if self._chained:
                 given[0][:] = chunk[-1]
-        found: Array = result[:count].T
-        return found
+        columns: Array = result[:count].T
+        return columns

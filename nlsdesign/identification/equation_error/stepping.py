@@ -61,12 +61,12 @@ def stages_of(derivative: Expression, state: Expression, moving: Expression) -> 
     order = TopologicalSorter(
         {k: {m for m in acts_on if k in acts_on[m]} for k in range(count)}
     ).static_order()
-    found = []
+    ordered = []
     for k in order:
         inside = ca.vertcat(*[state[i] for i in groups[k]])
         slope = ca.jacobian(ca.vertcat(*[derivative[i] for i in groups[k]]), inside)
-        found.append(Stage(groups[k], not depends(slope, ca.vertcat(state, moving))))
-    return found
+        ordered.append(Stage(groups[k], not depends(slope, ca.vertcat(state, moving))))
+    return ordered
 
 
 def exact_step(matrix: Expression, length: Expression) -> Expression:
@@ -186,7 +186,7 @@ def implicit_steps(
     newton = ca.Function("newton", [at, old, now, short], [better], {"allow_free": True})
     free = newton.free_sx()
     newton = ca.Function("newton", [at, old, now, short, *free], [better])
-    found, x = ImplicitSteps([], [], []), state
+    steps, x = ImplicitSteps([], [], []), state
     for k in range(1, _SHORT_STEPS + 1):
         corner = left + (right - left) * (k / _SHORT_STEPS)
         guess = x
@@ -194,10 +194,10 @@ def implicit_steps(
             guess = newton(guess, x, corner, h, *free)
         symbol = ca.SX.sym(f"guess_{k}", state.shape)
         x = newton(symbol, x, corner, h, *free)
-        found.states.append(x)
-        found.guess.append(symbol)
-        found.guessed.append(guess)
-    return found
+        steps.states.append(x)
+        steps.guess.append(symbol)
+        steps.guessed.append(guess)
+    return steps
 
 
 def _stages(

@@ -101,5 +101,5 @@ def _step(gradient: Array, curvature: Array, damping: float, place: tuple[Array,
     lower = np.linalg.cholesky(matrix)
     target = -np.linalg.solve(lower, gradient)
     walls = np.maximum(low - x, -_LONGEST), np.minimum(high - x, _LONGEST)
-    found: Array = lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=20 * len(x)).x
-    return found
+    step: Array = lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=20 * len(x)).x
+    return step

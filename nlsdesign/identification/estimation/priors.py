@@ -35,7 +35,7 @@ def prior_rows(parameters: Sequence[Parameter], known: Sequence[Fit] = ()) -> tu
         places = [(i, names.index(p.name)) for i, p in enumerate(fit.parameters) if p.name in names]
         if not places:
             continue
-        own, mine = (list(side) for side in zip(*places, strict=True))
+        own, columns = (list(side) for side in zip(*places, strict=True))
         # From the scale of the earlier fit to that of this one, at the value found.
         ratio = np.array(
             [
@@ -47,7 +47,7 @@ def prior_rows(parameters: Sequence[Parameter], known: Sequence[Fit] = ()) -> tu
         strength, axes = np.linalg.eigh(covariance)
         whitened = (axes / np.sqrt(np.maximum(strength, _LEAST * strength.max()))).T
         wide = np.zeros((len(own), len(names)))
-        wide[:, mine] = whitened
+        wide[:, columns] = whitened
         rows.append(wide)
-        centres.append(whitened @ np.array([parameters[j].inward(fit.values[names[j]]) for j in mine]))
+        centres.append(whitened @ np.array([parameters[j].inward(fit.values[names[j]]) for j in columns]))
     return np.vstack(rows), np.concatenate(centres)

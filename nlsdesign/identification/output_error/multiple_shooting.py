@@ -144,9 +144,9 @@ def _descended(problem: SimulationError, loss: Loss) -> tuple[_Place, int, bool]
             return place, count, True
         if defect > 0.0:
             penalty = max(penalty, -2.0 * gain / defect)
-        found = _searched(problem, place, step, gain, (penalty, loss))
-        if found is not None:
-            place, damping = found, max(0.1 * damping, _LEAST_DAMPING)
+        better = _searched(problem, place, step, gain, (penalty, loss))
+        if better is not None:
+            place, damping = better, max(0.1 * damping, _LEAST_DAMPING)
         elif damping < _MOST_DAMPING:
             damping = 100.0 * damping
         elif defect < _JOINED:
@@ -179,12 +179,12 @@ def _searched(
     promised = gain + penalty * place.linear.defect
     for share in _SHARES:
         try:
-            found = _place(problem, problem.moved(place.point, place.linear, step, share), loss)
+            tried = _place(problem, problem.moved(place.point, place.linear, step, share), loss)
         except ConvergenceError:
             continue
-        after = found.cost + penalty * found.linear.defect
+        after = tried.cost + penalty * tried.linear.defect
         if after <= before - 1e-4 * share * promised + 1e-12 * abs(before):
-            return found
+            return tried
     return None
 
 
@@ -198,23 +198,23 @@ def _bounded(residual: Array, slope: Array, damping: float, room: tuple[Array, A
     rows = np.vstack([r, np.sqrt(damping) * np.eye(n)])
     target = np.concatenate([-rotated, np.zeros(n)])
     low, high = room[0] * size - 1e-300, room[1] * size + 1e-300
-    found: Array = lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n).x
-    return found / size
+    solution: Array = lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n).x
+    return solution / size
 
 
-def coloured_sigma(found: SimulatedFit) -> dict[str, float]:
+def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:
     """Return the standard deviation with which each independent number of the residuals counts as one.
 
     What a model leaves over is rarely noise: neighbouring samples say the same. With these as ``sigma`` a
-    fit weighs the records against priors by what the records are worth.
+    fit weighs the records against priors by their effective number of samples.
 
     Parameters
     ----------
-    found
+    simulated
         A fit of the same model and records; with any sigma.
     """
-    problem = found.problem
-    residual = problem.residual(found.point)[problem.priors :]
+    problem = simulated.problem
+    residual = problem.residual(simulated.point)[problem.priors :]
     rows: dict[str, list[Array]] = {name: [] for name in problem.wiring.outputs}
     place = 0
     for each in problem.windows:
@@ -223,12 +223,12 @@ def coloured_sigma(found: SimulatedFit) -> dict[str, float]:
             place += each.measured.shape[1]
     sigma = dict(zip(rows, problem.sigma, strict=True))
     return {
-        name: float(sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / _worth(r)))
+        name: float(sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / _effective_size(r)))
         for name, r in rows.items()
     }
 
 
-def _worth(rows: Sequence[Array]) -> float:
+def _effective_size(rows: Sequence[Array]) -> float:
     return sum(effective_size(row) for row in rows)
 
 

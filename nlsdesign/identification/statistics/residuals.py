@@ -168,12 +168,14 @@ def shapes(
     step
         Time between samples in s.
     """
-    found = {f"over {name}": binned(residual, values) for name, values in signals.items()}
-    found["over frequency"] = spectrum(residual, step)
-    found["over time"] = binned(residual, np.arange(len(residual), dtype=np.float64) * np.float64(step))
+    result = {f"over {name}": binned(residual, values) for name, values in signals.items()}
+    result["over frequency"] = spectrum(residual, step)
+    result["over time"] = binned(residual, np.arange(len(residual), dtype=np.float64) * np.float64(step))
     if speed is not None:
-        found["over speed"] = binned(residual, speed)
-        for word, mask in (("forward", speed > 0.0), ("backward", speed < 0.0)):
+        result["over speed"] = binned(residual, speed)
+        for direction, mask in (("forward", speed > 0.0), ("backward", speed < 0.0)):
             if mask.sum() > 100:
-                found |= {f"over {n}, {word}": binned(residual[mask], v[mask]) for n, v in signals.items()}
-    return found
+                result |= {
+                    f"over {n}, {direction}": binned(residual[mask], v[mask]) for n, v in signals.items()
+                }
+    return result
