@@ -134,7 +134,7 @@ def test_names_are_unique_and_say_what_they_are(name: str) -> None:
 
 def test_a_bare_number_does_not_keep_the_citation_of_the_old_one() -> None:
     declared = declare(load_deck("austin2015_as_printed"))
-    name, told = "spring.rubber.area", "not stated; changed from 1 cm^2: Austin, Schepelmann, Geyer"
+    name, told = "spring.rubber.area", "not stated; changed from 1 cm²: Austin, Schepelmann, Geyer"
     changed = declared.with_values({name: 2e-4})
     assert changed.quantities()[name].source.startswith(told)
     assert flatten(changed).variable(name).source.startswith(told)
