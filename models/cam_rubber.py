@@ -54,7 +54,7 @@ def cam_rubber_actuator(deck: Deck) -> Assembly:
         **numbers_of(deck, "spring.rubber", Specimen),
     )
     cam = TwoSidedCam(**numbers_of(deck, "spring.cam", TwoSidedCam))
-    found = assembly(
+    actuator = assembly(
         deck.name,
         description=deck.description,
         motor=GearedMotor(**numbers_of(deck, "motor", GearedMotor)),
@@ -64,4 +64,4 @@ def cam_rubber_actuator(deck: Deck) -> Assembly:
         dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "motor"),
         motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder", Encoder)),
     )
-    return require_same_numbers(found, deck)
+    return require_same_numbers(actuator, deck)

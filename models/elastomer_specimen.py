@@ -52,7 +52,7 @@ def elastomer_specimen(deck: Deck) -> Assembly:
         slow=_relaxing(deck, f"{_RUBBER}.slow"),
         **numbers_of(deck, _RUBBER, Specimen),
     )
-    found = assembly(
+    tester = assembly(
         deck.name,
         description=deck.description,
         grip=Driven(domain=TRANSLATION),
@@ -60,7 +60,7 @@ def elastomer_specimen(deck: Deck) -> Assembly:
         strip=tie(InextensibleCable(members=(("rubber", rubber),)), "grip", "clamp"),
         load_cell=ForceSensor(of="strip.force", **numbers_of(deck, "load_cell", ForceSensor)),
     )
-    return require_same_numbers(found, deck)
+    return require_same_numbers(tester, deck)
 
 
 def _relaxing(deck: Deck, path: str) -> Series:

@@ -30,7 +30,7 @@ def linear_spring_actuator(deck: Deck) -> Assembly:
     NlsError
         If a number is missing, or the deck declares something that this model does not have.
     """
-    found = assembly(
+    actuator = assembly(
         deck.name,
         description=deck.description,
         motor=GearedMotor(**numbers_of(deck, "motor", GearedMotor)),
@@ -40,4 +40,4 @@ def linear_spring_actuator(deck: Deck) -> Assembly:
         dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "motor"),
         motor_encoder=Encoder(of="motor.angle", **numbers_of(deck, "motor_encoder", Encoder)),
     )
-    return require_same_numbers(found, deck)
+    return require_same_numbers(actuator, deck)

@@ -65,7 +65,7 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
     encoder = Encoder(of="motor_encoder_sampling.reading", **numbers_of(deck, "motor_encoder", Encoder))
     ammeter = CurrentSensor(of="motor.winding_current", **numbers_of(deck, "current_sensor", CurrentSensor))
     cell = numbers_of(deck, "load_cell", ForceSensor)
-    found = assembly(
+    actuator = assembly(
         deck.name,
         description=deck.description,
         motor=CurrentDrivenMotor(**numbers_of(deck, "motor", CurrentDrivenMotor)),
@@ -79,7 +79,7 @@ def one_sided_cable_drive(deck: Deck) -> Assembly:
         current_sensor=ammeter,
         load_cell=ForceSensor(of="spring.cable.rope.force", **cell),
     )
-    return require_same_numbers(found, deck)
+    return require_same_numbers(actuator, deck)
 
 
 def _rubber(deck: Deck) -> Specimen:

@@ -27,7 +27,7 @@ def positioning_drive(deck: Deck) -> Assembly:
     >>> [name for name, _ in positioning_drive(load_deck("janot2019_positioning_drive")).parts]
     ['carriage', 'guide', 'dry_friction', 'offset']
     """
-    found = assembly(
+    drive = assembly(
         deck.name,
         description=deck.description,
         carriage=LinearDrive(**numbers_of(deck, "carriage", LinearDrive)),
@@ -35,4 +35,4 @@ def positioning_drive(deck: Deck) -> Assembly:
         dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "carriage"),
         offset=tie(ConstantForce(**numbers_of(deck, "offset", ConstantForce)), "carriage"),
     )
-    return require_same_numbers(found, deck)
+    return require_same_numbers(drive, deck)

@@ -101,13 +101,13 @@ class _Numbers:
 
     def raw(self, table: str, field: str) -> Any:
         """Return what stands in a field."""
-        found = self._tables.get(table, {})
-        if field not in found:
+        fields = self._tables.get(table, {})
+        if field not in fields:
             raise DeckError(
-                f"{self._file}: {table}.{field}", "is missing", did_you_mean=nearest(field, found),
+                f"{self._file}: {table}.{field}", "is missing", did_you_mean=nearest(field, fields),
                 next_step="give the file of the rig, as its makers wrote it",
             )  # fmt: skip
-        return found[field]
+        return fields[field]
 
     def __call__(self, table: str, field: str, unit: str, spread: float = 0.0) -> Quantity:
         """Return a number or a row of numbers with unit and spread."""

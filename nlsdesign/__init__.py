@@ -23,7 +23,7 @@ __version__ = version()
 
 
 def __getattr__(name: str) -> object:
-    """Return a public name from where it lives.
+    """Return a public name from its module.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def __getattr__(name: str) -> object:
     Raises
     ------
     AttributeError
-        If it is not public here; says where it lives, or the nearest public name.
+        If it is not public here; the message names its module, or the nearest public name.
     """
     if name.startswith("_"):
         raise AttributeError(name)
@@ -66,7 +66,7 @@ def _homes() -> dict[str, str]:
 
 
 def _advice(name: str) -> str:
-    """Return what to write in place of a name that is not public here."""
+    """Return the message for a name that is not public here."""
     homes = _homes()
     text = f"nlsdesign has no name '{name}'"
     for room in dict.fromkeys(home or one for one, home in homes.items() if home != "models"):

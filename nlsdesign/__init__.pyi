@@ -70,11 +70,11 @@ from .model import flatten as flatten
 from .model.equations import equations as equations
 from .model.linear import linearise as linearise
 from .model.transform import with_outputs as with_outputs
-from .observer import AsPublished as AsPublished
 from .observer import Minimal as Minimal
+from .observer import PaperForm as PaperForm
 from .observer import design_observer as design_observer
+from .observer import design_observer_with_details as design_observer_with_details
 from .observer import observe as observe
-from .observer import observer_design as observer_design
 from .quantity import Quantity as Quantity
 from .quantity import degrees as degrees
 from .quantity import quantity as quantity

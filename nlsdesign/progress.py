@@ -28,7 +28,7 @@ class Quiet:
 
 
 class Steps:
-    """Steps of a study: a spinner with the present step, a line with its duration when it is done.
+    """Steps of a study: a spinner with the present step, and a line with its duration at the end.
 
     Parameters
     ----------

@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..errors import UnitError
 from ..quantity import typeset_unit
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import (
+    deck_option,
+    json_option,
+    measured_option,
+    out_option,
+    show_json,
+    show_table,
+    spring_option,
+)
 from .units import Number
 
 if TYPE_CHECKING:
@@ -19,10 +28,19 @@ if TYPE_CHECKING:
 @deck_option
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
 @click.option("--count", type=int, default=26, show_default=True, help="Number of angles.")
-@click.option("--measured", default="motor.angle", show_default=True, help="What is measured.")
+@measured_option
+@spring_option
 @out_option("out/analysis")
 @json_option
-def analyse(deck_name: str, last: float, count: int, measured: str, out: Path, as_json: bool) -> None:
+def analyse(
+    deck_name: str,
+    last: float,
+    count: int,
+    measured: str | None,
+    spring: str | None,
+    out: Path,
+    as_json: bool,
+) -> None:
     """Rank and condition of observability, poles and stiffness, from zero to the last angle."""
     import numpy as np
 
@@ -30,9 +48,19 @@ def analyse(deck_name: str, last: float, count: int, measured: str, out: Path, a
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..model import flatten
+    from ..model.roles import measured_motion, series_spring
+    from ..model.transform import with_outputs
 
-    model = flatten(declare(load_deck(deck_name)), outputs=[measured, "spring.torque"])
-    views = [Observability(measured=(measured,)), Stability()]
+    model = flatten(declare(load_deck(deck_name)))
+    torque, measured = series_spring(model, spring).effort, measured_motion(model, measured)
+    unit = model.variable(measured).unit
+    if unit != "rad":
+        raise UnitError(
+            f"'{measured}'", f"is in {unit}; analyse goes over an angle",
+            next_step="name the angle of a body that turns, with --measured",
+        )  # fmt: skip
+    model = with_outputs(model, list(dict.fromkeys([measured, torque])))
+    views = [Observability(measured=(measured,)), Stability(torque=torque)]
     chart = over_angle(model, views, angles=np.linspace(0.0, last, count), angle=measured)
     out.mkdir(parents=True, exist_ok=True)
     chart.write_csv(out / "over_angle.csv")

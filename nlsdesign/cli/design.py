@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
 from .units import Number
 
 
@@ -21,10 +21,9 @@ from .units import Number
 @click.option(
     "--free",
     multiple=True,
-    default=("spring.cam.contour",),
-    show_default=True,
-    help="Quantity that may change; repeatable.",
+    help="Quantity that may change, e.g. spring.cam.contour; by default the contour alone; repeatable.",
 )
+@spring_option
 @click.option(
     "--minimum-radius",
     type=Number("mm"),
@@ -63,7 +62,11 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     target = ExponentialTorque(maximum=given["maximum"], angle=given["angle"], shape=given["shape"])
     with Steps().step("design"):
         designed = design_cam(
-            declare(load_deck(deck_name)), target=target, free=list(given["free"]), keep=keep
+            declare(load_deck(deck_name)),
+            target=target,
+            free=list(given["free"]) or None,
+            spring=given["spring"],
+            keep=keep,
         )
     out.mkdir(parents=True, exist_ok=True)
     write_deck(designed.actuator, out / "model.toml")

@@ -69,6 +69,15 @@ def out_option(default: str = "out") -> Callable[[F], F]:
     return click.option("--out", type=kind, default=default, show_default=True, help=text)
 
 
+spring_option = click.option(
+    "--spring", default=None, metavar="PART", help="The series spring, where the deck leaves it open."
+)
+measured_option = click.option(
+    "--measured",
+    default=None,
+    metavar="STATE",
+    help="What is measured; by default the motion of the driven body.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK",
                            help="Deck file, or the name of one that comes with the project.")  # fmt: skip

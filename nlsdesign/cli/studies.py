@@ -143,7 +143,7 @@ def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
 
 
 def not_as_claimed(results: Mapping[str, float], expected: Mapping[str, Claim]) -> dict[str, str]:
-    """Return, by name, what is wrong with a claimed number: too far off, or not computed.
+    """Return the claimed numbers that are outside their tolerance or not computed, each with a message.
 
     Parameters
     ----------

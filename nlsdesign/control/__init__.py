@@ -2,13 +2,15 @@
 
 from .evaluation import SineResponse, Tracking, sine_response, tracking, zero_torque
 from .loop import ClosedLoop
-from .torque_loop import TorqueGains, torque_controller
+from .torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
 
 __all__ = [
     "ClosedLoop",
+    "LoopNames",
     "SineResponse",
     "TorqueGains",
     "Tracking",
+    "loop_names",
     "sine_response",
     "torque_controller",
     "tracking",

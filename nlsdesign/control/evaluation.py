@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ValueRangeError
+from ..model.roles import moved_load
 from ..simulation import Trace
-from .loop import ClosedLoop
+from .loop import PLANT, ClosedLoop
 
 Array = NDArray[np.float64]
-
-DESIRED, ACTUAL = "controller.spring.torque.desired", "plant.spring.torque"
 
 
 @dataclass(frozen=True)
@@ -62,23 +61,25 @@ class SineResponse:
     @property
     def decibel(self) -> Array:
         """Magnitude in dB."""
-        found: Array = 20.0 * np.log10(np.abs(self.response))
-        return found
+        magnitude: Array = 20.0 * np.log10(np.abs(self.response))
+        return magnitude
 
     @property
     def phase_degrees(self) -> Array:
         """Phase in degrees, unwrapped over the frequencies."""
-        found: Array = np.degrees(np.unwrap(np.angle(self.response)))
-        return found
+        phase: Array = np.degrees(np.unwrap(np.angle(self.response)))
+        return phase
 
 
-def tracking(trace: Trace, *, settled: float = 0.0) -> Tracking:
-    """Return how well the torque followed in a run of :class:`~nlsdesign.control.loop.ClosedLoop`.
+def tracking(loop: ClosedLoop, trace: Trace, *, settled: float = 0.0) -> Tracking:
+    """Return how well the torque followed in a run of a closed loop.
 
     Parameters
     ----------
+    loop
+        Closed loop.
     trace
-        What the run gave.
+        What its run gave.
     settled
         Time in s before which nothing counts.
 
@@ -87,12 +88,12 @@ def tracking(trace: Trace, *, settled: float = 0.0) -> Tracking:
     ValueRangeError
         If nothing is left.
     """
-    late = trace.time >= settled
-    if not np.any(late):
+    counted = trace.time >= settled
+    if not np.any(counted):
         raise ValueRangeError(f"settled {settled:g} s", f"the run ends at {trace.time[-1]:g} s")
-    error = (trace[ACTUAL] - trace[DESIRED])[late]
-    estimate = (trace["observer.spring.torque"] - trace[ACTUAL])[late]
-    size = _rms(trace[DESIRED][late])
+    error = (trace[loop.torque] - trace[loop.desired])[counted]
+    estimate = (trace[loop.estimate] - trace[loop.torque])[counted]
+    size = _rms(trace[loop.desired][counted])
     return Tracking(
         _rms(error),
         float(np.max(np.abs(error))),
@@ -134,34 +135,39 @@ def sine_response(
         omega = 2.0 * math.pi * frequency
         trace = loop.run(
             (samples + skip) * loop.sample_time,
-            inputs={DESIRED: _Sine(amplitude, omega, offset=offset)},
+            inputs={loop.desired: _Sine(amplitude, omega, offset=offset)},
         )
-        late = slice(skip, skip + samples)
-        turn = np.exp(-1j * omega * trace.time[late])
-        fundamental = 2.0 * np.mean(trace[ACTUAL][late] * turn)
+        counted = slice(skip, skip + samples)
+        torque, turn = trace[loop.torque][counted], np.exp(-1j * omega * trace.time[counted])
+        fundamental = 2.0 * np.mean(torque * turn)
         # sin(ωt) = Im e^(iωt): its fundamental is −i times the amplitude.
         response.append(fundamental / (-1j * amplitude))
-        rest = trace[ACTUAL][late] - np.mean(trace[ACTUAL][late]) - np.real(fundamental / turn)
+        rest = torque - np.mean(torque) - np.real(fundamental / turn)
         distortion.append(_rms(rest) / (abs(fundamental) / math.sqrt(2.0)))
         used.append(frequency)
     return SineResponse(amplitude, np.array(used), np.array(response), np.array(distortion))
 
 
 def zero_torque(
-    loop: ClosedLoop, *, amplitude: float, frequencies: Sequence[float], load: str = "load", cycles: int = 4
+    loop: ClosedLoop,
+    *,
+    amplitude: float,
+    frequencies: Sequence[float],
+    load: str | None = None,
+    cycles: int = 4,
 ) -> Array:
     """Return the root mean square torque, in N·m, that a moved load feels while no torque is wanted.
 
     Parameters
     ----------
     loop
-        Its plant has a driven load: inputs ``<load>.angle`` and ``<load>.speed``.
+        Its plant has a load whose motion is prescribed.
     amplitude
         Of the sine of the load's angle in rad.
     frequencies
         In Hz, shape (n,).
     load
-        Name of the load.
+        Name of the load; decided from the structure of the plant if it is left out.
     cycles
         Number of cycles that are evaluated.
 
@@ -169,23 +175,25 @@ def zero_torque(
     ------
     UnknownNameError
         If the plant has no driven load of that name.
+    ArrangementError
+        If the structure does not say which body is the load.
     ConvergenceError
         If the plant runs away.
     """
-    found = []
+    moved, torques = moved_load(loop.plant, load), []
     for wanted in frequencies:
         frequency, samples, skip = _whole(wanted, loop.sample_time, cycles)
         omega = 2.0 * math.pi * frequency
         trace = loop.run(
             (samples + skip) * loop.sample_time,
             inputs={
-                DESIRED: 0.0,
-                f"plant.{load}.angle": _Sine(amplitude, omega),
-                f"plant.{load}.speed": _Sine(amplitude * omega, omega, ahead=math.pi / 2.0),
+                loop.desired: 0.0,
+                f"{PLANT}.{moved.motion}": _Sine(amplitude, omega),
+                f"{PLANT}.{moved.rate}": _Sine(amplitude * omega, omega, ahead=math.pi / 2.0),
             },
         )
-        found.append(_rms(trace[ACTUAL][skip : skip + samples]))
-    return np.array(found)
+        torques.append(_rms(trace[loop.torque][skip : skip + samples]))
+    return np.array(torques)
 
 
 @dataclass(frozen=True)

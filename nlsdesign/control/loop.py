@@ -3,13 +3,14 @@
 Time runs in samples. At t_k the plant is read, the observer and the controller are stepped with what was
 read, and the plant is integrated to t_{k+1} with the current held. The current that the controller computes
 at t_k acts from t_{k+delay} on; with the default of one sample the computer has a whole sample for it. The
-observer is told the current that really acts in the coming sample.
+observer is given the current that really acts in the coming sample.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -19,17 +20,19 @@ from ..errors import ArrangementError, ValueRangeError, unknown_name
 from ..model import FlatModel
 from ..simulation import Trace, range_warnings
 from .sampled import DiscreteStepper, PlantStepper
+from .torque_loop import LoopNames, loop_names
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], float] | float
 
 PLANT, OBSERVER, CONTROLLER = "plant", "observer", "controller"
-CURRENT = "motor.current"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ClosedLoop:
     """Plant, observer and controller wired by name.
+
+    The structure of the plant says what its series spring and its motor are called.
 
     Parameters
     ----------
@@ -40,7 +43,7 @@ class ClosedLoop:
     wires
         Where an input comes from, ``{"observer.motor.angle": "plant.motor_encoder.reading"}``. Inputs that
         are not named get the variable of the same name: the observer from the plant, the controller's
-        ``spring.torque`` from the observer and its ``motor.angle`` from the plant.
+        torque from the observer and its angle from the plant.
     delay
         Samples between a current's computation and its effect.
     substeps
@@ -75,6 +78,26 @@ class ClosedLoop:
                 raise ArrangementError(
                     f"wire '{name}'", f"must begin with {PLANT}., {OBSERVER}. or {CONTROLLER}."
                 )
+
+    @cached_property
+    def names(self) -> LoopNames:
+        """Names by which plant, observer and controller are wired."""
+        return loop_names(self.plant)
+
+    @property
+    def desired(self) -> str:
+        """Full name of the torque that the spring should have: an input of the controller."""
+        return f"{CONTROLLER}.{self.names.desired}"
+
+    @property
+    def torque(self) -> str:
+        """Full name of the torque that the spring has."""
+        return f"{PLANT}.{self.names.torque}"
+
+    @property
+    def estimate(self) -> str:
+        """Full name of the estimate of that torque."""
+        return f"{OBSERVER}.{self.names.torque}"
 
     @property
     def sample_time(self) -> float:
@@ -113,6 +136,11 @@ class ClosedLoop:
         return _Run(self, inputs, dict(start or {})).until(stop)
 
 
+def _names(model: FlatModel) -> set[str]:
+    groups = (model.states, model.inputs, model.parameters, model.outputs, model.signals)
+    return {v.name for group in groups for v in group}
+
+
 class _Run:
     """One simulation: the steppers, the wiring, the record."""
 
@@ -120,7 +148,8 @@ class _Run:
         self.loop = loop
         self.observer, self.controller = DiscreteStepper(loop.observer), DiscreteStepper(loop.controller)
         self.open = dict(inputs)
-        self.current = [v.name for v in loop.plant.inputs].index(CURRENT)
+        self.current_name = loop.names.current
+        self.current = [v.name for v in loop.plant.inputs].index(self.current_name)
         self.sources = {
             f"{owner}.{v.name}": self._source(owner, v.name)
             for owner, model in ((OBSERVER, loop.observer), (CONTROLLER, loop.controller))
@@ -128,8 +157,10 @@ class _Run:
         }
         self._check_open()
         self._check_sources()
-        seen = {s.partition(".")[2] for s in self.sources.values() if s.startswith(PLANT + ".")} - {CURRENT}
-        self.seen = sorted(seen)
+        used = set(self.sources.values())
+        self.seen = sorted(
+            name for name in _names(loop.plant) if name != self.current_name and f"{PLANT}.{name}" in used
+        )
         self.plant = PlantStepper(loop.plant, loop.sample_time, loop.substeps, self.seen)
         self._begin(start)
 
@@ -143,7 +174,7 @@ class _Run:
         return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
 
     def _check_open(self) -> None:
-        known = {f"{PLANT}.{v.name}" for v in self.loop.plant.inputs} - {f"{PLANT}.{CURRENT}"}
+        known = {f"{PLANT}.{v.name}" for v in self.loop.plant.inputs} - {f"{PLANT}.{self.current_name}"}
         known |= {name for name, source in self.sources.items() if source == name}
         known |= {f"{CONTROLLER}.{v.name}" for v in self.loop.controller.inputs}
         for name in self.open:
@@ -151,9 +182,7 @@ class _Run:
                 raise unknown_name("input of the loop", name, known)
 
     def _check_sources(self) -> None:
-        plant = self.loop.plant
-        groups = (plant.states, plant.inputs, plant.parameters, plant.outputs, plant.signals)
-        known = {f"{PLANT}.{v.name}" for group in groups for v in group}
+        known = {f"{PLANT}.{name}" for name in _names(self.loop.plant)}
         known |= {f"{OBSERVER}.{v.name}" for v in self.loop.observer.outputs}
         for name, source in self.sources.items():
             if source in known or source == name:
@@ -215,30 +244,31 @@ class _Run:
         """Step observer and controller at one sample; return the current that acts in the coming one."""
         if waiting:
             self.plant.begin[self.current] = waiting[0]
-        found = {f"{PLANT}.{n}": v for n, v in zip(self.seen, self.plant.read(now), strict=False)}
-        found[f"{PLANT}.{CURRENT}"] = self.plant.begin[self.current]
-        self._feed(OBSERVER, self.observer, found, now)
+        acting_now = f"{PLANT}.{self.current_name}"
+        known = {f"{PLANT}.{n}": v for n, v in zip(self.seen, self.plant.read(now), strict=False)}
+        known[acting_now] = self.plant.begin[self.current]
+        self._feed(OBSERVER, self.observer, known, now)
         self.observer.evaluate()
-        found |= {
+        known |= {
             f"{OBSERVER}.{v.name}": self.observer.outputs[i] for i, v in enumerate(self.loop.observer.outputs)
         }
-        self._feed(CONTROLLER, self.controller, found, now)
+        self._feed(CONTROLLER, self.controller, known, now)
         self.controller.evaluate()
         self.controller.advance()
         waiting.append(float(self.controller.outputs[0]))
         acting = waiting.pop(0)
         if self.loop.delay == 0:
-            # What was computed just now acts at once: the observer hears of it before it moves on.
-            self.plant.begin[self.current] = found[f"{PLANT}.{CURRENT}"] = acting
-            self._feed(OBSERVER, self.observer, found, now)
+            # What was computed just now acts at once: the observer is given it before it moves on.
+            self.plant.begin[self.current] = known[acting_now] = acting
+            self._feed(OBSERVER, self.observer, known, now)
             self.observer.evaluate()
         self.observer.advance()
         return acting
 
-    def _feed(self, owner: str, stepper: DiscreteStepper, found: Mapping[str, float], now: float) -> None:
+    def _feed(self, owner: str, stepper: DiscreteStepper, known: Mapping[str, float], now: float) -> None:
         for i, v in enumerate(stepper.model.inputs):
             source = self.sources[f"{owner}.{v.name}"]
-            stepper.inputs[i] = found[source] if source in found else self._drive(source, v.start)(now)
+            stepper.inputs[i] = known[source] if source in known else self._drive(source, v.start)(now)
 
     def _drive(self, name: str, rest: float) -> Callable[[float], float]:
         given = self.open.get(name, rest)

@@ -71,9 +71,9 @@ class DiscreteStepper:
         """Compute outputs and following state from the present state and inputs, without moving on."""
         start = 0
         for table, source, place in self._lookups:
-            found = table.look_up(float(source[place]))
-            self._row[start : start + len(found)] = found
-            start += len(found)
+            columns = table.look_up(float(source[place]))
+            self._row[start : start + len(columns)] = columns
+            start += len(columns)
         self._step()
 
     def advance(self) -> None:

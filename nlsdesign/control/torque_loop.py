@@ -3,16 +3,65 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import casadi as ca
 
-from ..errors import ValueRangeError, unknown_name
+from ..errors import ArrangementError, ValueRangeError
 from ..model import FlatModel, Variable
+from ..model.roles import motor_of, series_spring
 from ..symbolic import Expression
 
-DRIVE = ("motor.inertia", "motor.gear_ratio", "motor.torque_constant", "motor.current_limit")
-"""Parameters of the plant that the controller knows under the same names."""
+DESIRED = "desired"
+"""What is added to the name of the torque for the torque that the spring should have."""
+
+
+@dataclass(frozen=True)
+class LoopNames:
+    """Names of the variables by which a torque loop is wired: those of the plant.
+
+    Parameters
+    ----------
+    angle, speed
+        Motion of the motor and its rate.
+    torque
+        Torque of the series spring.
+    current
+        Input of the motor.
+    """
+
+    angle: str
+    speed: str
+    torque: str
+    current: str
+
+    @property
+    def desired(self) -> str:
+        """Name of the torque that the spring should have."""
+        return f"{self.torque}.{DESIRED}"
+
+
+def loop_names(plant: FlatModel) -> LoopNames:
+    """Return the names of a plant by which its torque loop is wired, decided from its structure.
+
+    Parameters
+    ----------
+    plant
+        With one series spring and one motor that is driven by a current.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not decide, or the motor is not driven by a current.
+    """
+    body, motor = motor_of(plant)
+    if motor.command is None or plant.variable(motor.command).unit != "A":
+        raise ArrangementError(
+            f"motor '{body.name}'", "is not driven by a current, which a torque controller gives",
+            next_step="declare it as a GearedMotor and keep its current among the inputs",
+        )  # fmt: skip
+    return LoopNames(body.motion, body.rate, series_spring(plant).effort, motor.command)
 
 
 @dataclass(frozen=True)
@@ -29,15 +78,15 @@ class TorqueGains:
     derivative
         In rad per N·m.
     derivative_bandwidth
-        Corner of the filter on the derivative, in Hz.
+        Cut-off frequency of the filter on the derivative, in Hz.
     speed_limit
         Largest speed command, in rad/s.
     velocity_bandwidth
         Of the velocity loop, in Hz.
     velocity_integral
-        Corner below which the velocity loop integrates, in Hz.
+        Frequency below which the velocity loop integrates, in Hz.
     speed_bandwidth
-        Corner of the filter on the difference of the encoder, in Hz.
+        Cut-off frequency of the filter on the difference of the encoder, in Hz.
     compensation
         Share of the estimated spring torque that is added to the current, so that the velocity loop does not
         have to carry it.
@@ -77,99 +126,122 @@ _UNITS = {
     "compensation": ("1", "velocity loop: share of the estimated spring torque added to the current"),
 }
 
-_STATES = (
-    Variable("motor.angle.previous", "rad", "measured angle one sample ago"),
-    Variable("motor.speed.filtered", "rad/s", "filtered difference of the measured angle"),
-    Variable("torque_loop.error.previous", "N*m", "torque error one sample ago"),
-    Variable("torque_loop.error.rate", "N*m/s", "filtered rate of the torque error"),
-    Variable("torque_loop.integral", "rad/s", "integral part of the speed command"),
-    Variable("velocity_loop.integral", "N*m", "integral part of the motor torque"),
-)
-
 
 def torque_controller(
     plant: FlatModel,
     *,
     gains: TorqueGains | None = None,
     sample_time: float = 1e-3,
-    current: str = "motor.current",
+    current: str | None = None,
 ) -> FlatModel:
     """Return the controller as a discrete flat model.
 
-    Inputs ``spring.torque.desired``, ``spring.torque`` (the estimate) and ``motor.angle`` (the encoder);
-    output the motor current. Speed command v = Kp·e + ∫Ki·e dt + Kd·de/dt, held within its limit; motor
-    torque J·ω_b·(v − ω̂)·(1 + ω_i∫dt) + c·T̂, with J, gear ratio, torque constant and current limit from the
-    plant. Where a command is limited, the integrators that push further into the limit stand still.
+    Inputs are the desired torque, the estimate of the spring's torque and the measured angle of the motor;
+    output is the motor current. Their names are those of the plant, the desired torque has the ending
+    ``.desired``: ``spring.torque.desired``, ``spring.torque``, ``motor.angle`` and ``motor.current`` where
+    the plant's parts are called spring and motor. Speed command v = Kp·e + ∫Ki·e dt + Kd·de/dt, held within
+    its limit; motor torque J·ω_b·(v − ω̂)·(1 + ω_i∫dt) + c·T̂, with J, gear ratio, torque constant and current
+    limit from the plant. Where a command is limited, the integrators that push further into the limit stand
+    still.
 
     Parameters
     ----------
     plant
-        Gives inertia, gear ratio, torque constant and current limit of ``motor``.
+        Gives names, and inertia, gear ratio, torque constant and current limit of its motor.
     gains
         Settings; the defaults of :class:`TorqueGains` where none are given.
     sample_time
         In s.
     current
-        Name of the output.
+        Name of the output; by default that of the input of the motor.
 
     Raises
     ------
-    UnknownNameError
-        If the plant has no geared motor by the name of ``motor``.
+    ArrangementError
+        If the plant has no geared motor that is driven by a current, or no series spring.
     ValueRangeError
         If the sample time is not positive.
     """
     if not sample_time > 0.0:
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
-    known = {v.name: v for v in plant.parameters}
-    for name in DRIVE:
-        if name not in known:
-            raise unknown_name("parameter", name, known)
-    chosen = gains or TorqueGains()
-    own = [
-        Variable(f"controller.{n}", unit, text, getattr(chosen, n), getattr(chosen, n) or 1.0, 0.0)
-        for n, (unit, text) in _UNITS.items()
-    ]
-    parameters = (*own, *(known[name] for name in DRIVE))
+    names, drive = loop_names(plant), _drive_numbers(plant)
+    settings = _settings(gains or TorqueGains())
     inputs = (
-        Variable("spring.torque.desired", "N*m", "torque that the spring should have"),
-        Variable("spring.torque", "N*m", "estimate of the torque that the spring has"),
-        Variable("motor.angle", "rad", "measured angle of the motor"),
+        Variable(names.desired, "N*m", "torque that the spring should have"),
+        Variable(names.torque, "N*m", "estimate of the torque that the spring has"),
+        Variable(names.angle, "rad", "measured angle of the motor"),
     )
-    limit = known["motor.current_limit"].start
+    limit = drive["current_limit"].start
     output = Variable(
-        current, "A", "current for the coming sample", nominal=limit, minimum=-limit, maximum=limit
-    )
-    signals = (
-        Variable("motor.speed.desired", "rad/s", "speed command"),
-        Variable("motor.speed.measured", "rad/s", "filtered speed"),
-    )
+        current or names.current, "A", "current for the coming sample",
+        nominal=limit, minimum=-limit, maximum=limit,
+    )  # fmt: skip
+    states = _states(names)
     return FlatModel(
-        "torque_controller",
-        "PID on the estimated torque around a velocity loop",
-        _STATES,
-        inputs,
-        parameters,
-        (output,),
-        signals,
-        _equations(parameters, sample_time),
-        sample_time,
+        name="torque_controller",
+        description="PID on the estimated torque around a velocity loop",
+        states=tuple(states.values()),
+        inputs=inputs,
+        parameters=(*settings.values(), *drive.values()),
+        outputs=(output,),
+        signals=(
+            Variable(f"{names.speed}.{DESIRED}", "rad/s", "speed command"),
+            Variable(f"{names.speed}.measured", "rad/s", "filtered speed"),
+        ),
+        equations=_equations(states, settings | drive, sample_time),
+        sample_time=sample_time,
     )
 
 
-def _equations(parameters: tuple[Variable, ...], time: float) -> ca.Function:
-    p = {v.name.rpartition(".")[2]: ca.SX.sym(v.name) for v in parameters}
-    x = {v.name: ca.SX.sym(v.name) for v in _STATES}
+def _drive_numbers(plant: FlatModel) -> dict[str, Variable]:
+    body, motor = motor_of(plant)
+    if motor.gear_ratio is None:
+        raise ArrangementError(
+            f"motor '{body.name}'", "has no gear ratio of its own",
+            next_step="declare it as a GearedMotor: the controller knows a motor behind its gear",
+        )  # fmt: skip
+    return {
+        "inertia": plant.variable(motor.inertia),
+        "gear_ratio": plant.variable(motor.gear_ratio),
+        "torque_constant": plant.variable(motor.torque_constant),
+        "current_limit": plant.variable(motor.current_limit),
+    }
+
+
+def _settings(gains: TorqueGains) -> dict[str, Variable]:
+    values = {name: getattr(gains, name) for name in _UNITS}
+    return {
+        name: Variable(f"controller.{name}", unit, text, values[name], values[name] or 1.0, 0.0)
+        for name, (unit, text) in _UNITS.items()
+    }
+
+
+def _states(names: LoopNames) -> dict[str, Variable]:
+    return {
+        "angle before": Variable(f"{names.angle}.previous", "rad", "measured angle one sample ago"),
+        "speed": Variable(f"{names.speed}.filtered", "rad/s", "filtered difference of the measured angle"),
+        "error before": Variable("torque_loop.error.previous", "N*m", "torque error one sample ago"),
+        "error rate": Variable("torque_loop.error.rate", "N*m/s", "filtered rate of the torque error"),
+        "speed integral": Variable("torque_loop.integral", "rad/s", "integral part of the speed command"),
+        "torque integral": Variable("velocity_loop.integral", "N*m", "integral part of the motor torque"),
+    }
+
+
+def _equations(
+    states: Mapping[str, Variable], parameters: Mapping[str, Variable], time: float
+) -> ca.Function:
+    p = {key: ca.SX.sym(v.name) for key, v in parameters.items()}
+    x = {key: ca.SX.sym(v.name) for key, v in states.items()}
     desired, torque, angle = (ca.SX.sym(n) for n in ("desired", "torque", "angle"))
-    raw = (angle - x["motor.angle.previous"]) / time
-    speed = _low_pass(x["motor.speed.filtered"], raw, p["speed_bandwidth"], time)
+    raw = (angle - x["angle before"]) / time
+    speed = _low_pass(x["speed"], raw, p["speed_bandwidth"], time)
     error = desired - torque
-    difference = (error - x["torque_loop.error.previous"]) / time
-    rate = _low_pass(x["torque_loop.error.rate"], difference, p["derivative_bandwidth"], time)
-    command = p["proportional"] * error + x["torque_loop.integral"] + p["derivative"] * rate
+    difference = (error - x["error before"]) / time
+    rate = _low_pass(x["error rate"], difference, p["derivative_bandwidth"], time)
+    command = p["proportional"] * error + x["speed integral"] + p["derivative"] * rate
     limited = _limited(command, p["speed_limit"])
     stiffness = p["inertia"] * 2.0 * math.pi * p["velocity_bandwidth"]
-    slow = x["velocity_loop.integral"]
+    slow = x["torque integral"]
     constant = p["gear_ratio"] * p["torque_constant"]
     wanted = (stiffness * (limited - speed) + slow + p["compensation"] * torque) / constant
     current = _limited(wanted, p["current_limit"])
@@ -177,7 +249,7 @@ def _equations(parameters: tuple[Variable, ...], time: float) -> ca.Function:
     # An integrator rests while it pushes further into a limit, and only then.
     free = (error * beyond_speed <= 0) * (error * beyond_current <= 0)
     free_slow = (limited - speed) * beyond_current <= 0
-    integral = x["torque_loop.integral"] + time * p["integral"] * error * free
+    integral = x["speed integral"] + time * p["integral"] * error * free
     slow_rate = 2.0 * math.pi * p["velocity_integral"] * stiffness * (limited - speed)
     following = [angle, speed, error, rate, integral, slow + time * slow_rate * free_slow]
     return ca.Function(

@@ -2,7 +2,7 @@
 
 from .cam_drawing import fingerprint, write_drawings
 from .contour import CamFit, cam_from_profile, contour_of_cam
-from .energy import Profile, energy_profile
+from .energy import CamProfile, energy_profile
 from .equilibrium import ElasticLaw, elastic_law, equilibrium_torque
 from .geometry import Contour, contour_from_curvature, contour_from_lever_arm
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
@@ -29,6 +29,7 @@ __all__ = [
     "AreaRange",
     "CamDesign",
     "CamFit",
+    "CamProfile",
     "Contour",
     "ElasticLaw",
     "ExponentialTorque",
@@ -45,7 +46,6 @@ __all__ = [
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
-    "Profile",
     "RestLengthRange",
     "Sensitivity",
     "SmoothContour",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InfeasibleError
 from .limits import Bound
-from .problem import Problem
+from .problem import DesignProblem
 from .program import Program, Rows
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ class Give:
         return f"{self.bound} would have to give by {amount} (to {end})"
 
 
-def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable[[], None]) -> Floats:
+def feasible_point(problem: DesignProblem, bounds: Sequence[Bound], progress: Callable[[], None]) -> Floats:
     """Return unknowns that keep all limits, or say why there are none.
 
     Every limit gets a slack, and the sum of the slacks, each relative to the size of its limit, is made as
@@ -80,15 +80,15 @@ def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable
     ConvergenceError
         If the solver finds no answer.
     """
-    program, count = _softened(problem, bounds), len(problem.unknowns)
+    program, count = _softened(problem, bounds), len(problem.variables)
     starts = [np.append(start, np.ones(len(bounds))) for start in problem.starts[:2]]
-    found = [outcome for outcome in program.solve(*starts, progress=progress) if outcome.solved]
-    if not found:
+    solved = [outcome for outcome in program.solve(*starts, progress=progress) if outcome.solved]
+    if not solved:
         raise ConvergenceError(
             "design: search for a cam within the limits", "IPOPT found neither a cam nor a proof against it",
             next_step="leave out limits one by one, or start from a deck that is closer to the target",
         )  # fmt: skip
-    best = min(found, key=lambda outcome: outcome.cost)
+    best = min(solved, key=lambda outcome: outcome.cost)
     if best.cost <= _FEASIBLE * len(bounds):
         return best.point[:count]
     prices = best.prices[len(problem.structure) :]
@@ -107,14 +107,14 @@ def feasible_point(problem: Problem, bounds: Sequence[Bound], progress: Callable
     raise _conflict([bounds[i] for i in involved], alone, hopeless, together)
 
 
-def _softened(problem: Problem, bounds: Sequence[Bound]) -> Program:
+def _softened(problem: DesignProblem, bounds: Sequence[Bound]) -> Program:
     """Return the program that makes the sum of the slacks of all bounds small, and nothing else."""
     slacks = ca.SX.sym("slack", len(bounds))
     rows = [row_of(bound, slacks[i]) for i, bound in enumerate(bounds)]
     program = Program(
         problem.vector,
-        np.array([u.lower for u in problem.unknowns]),
-        np.array([u.upper for u in problem.unknowns]),
+        np.array([u.lower for u in problem.variables]),
+        np.array([u.upper for u in problem.variables]),
         ca.sum1(slacks),
         (*problem.structure, *rows),
     )

@@ -10,6 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 from ..components.transmission.cam import TwoSidedCam
 from ..errors import ArrangementError, ValueRangeError
+from ..quantity import Quantity
 from .geometry import Contour, contour_from_lever_arm
 
 Floats = NDArray[np.float64]
@@ -69,6 +70,10 @@ class CamFit:
 
     cam: TwoSidedCam
     error: float
+
+    def changes(self) -> dict[str, Quantity]:
+        """Return the numbers that the fit has changed, by their names in the cam."""
+        return {"lever_arm": self.cam.lever_arm, "last_angle": self.cam.last_angle}
 
 
 def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, count: int = 48) -> CamFit:

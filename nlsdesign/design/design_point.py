@@ -4,22 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import casadi as ca
 
 from ..errors import ArrangementError
+from ..model.structure import CamNames
 from ..symbolic import Expression
 from .target import Target
 
 
+def anchor_of(cam: CamNames) -> str:
+    """Return the name of the distance of the anchor from the centre.
+
+    Parameters
+    ----------
+    cam
+        Names around a cam.
+
+    Raises
+    ------
+    ArrangementError
+        If the cam has no anchor.
+    """
+    if cam.anchor_distance is None:
+        raise ArrangementError(
+            f"cam '{cam.name}'", "has no anchor", next_step="declare the spring with a TwoSidedCam"
+        )
+    return cam.anchor_distance
+
+
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class DesignPoint:
     """A cam with its rubber at nodes over the angle; columns of shape (n,), all in SI.
 
     Parameters
     ----------
-    spring
-        Path of the cam spring.
+    cam
+        Names around the cam.
     target
         Torque curve.
     angles
@@ -40,7 +62,7 @@ class Candidate:
         All parameters of the flat model by name; symbols where they are free.
     """
 
-    spring: str
+    cam: CamNames
     target: Target
     angles: Expression
     lever_arms: Expression
@@ -59,7 +81,7 @@ class Candidate:
     @property
     def elements(self) -> Expression:
         """Number of elements that share the torque."""
-        return self.parameters[f"{self.spring}.cam.elements"]
+        return self.parameters[self.cam.elements]
 
     @property
     def tangent_stiffness(self) -> Expression:
@@ -72,13 +94,13 @@ class Candidate:
         squared, steps = self.torque_errors**2, self.angles[1:] - self.angles[:-1]
         return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / self.target.last_angle
 
-    def of_rubber(self, field: str) -> dict[str, Expression]:
+    def of_rubber(self, field: Literal["area", "rest_length"]) -> dict[str, Expression]:
         """Return a parameter of each piece of rubber behind the cam by full name.
 
         Parameters
         ----------
         field
-            ``"area"`` or ``"rest_length"``.
+            Which one.
 
         Raises
         ------
@@ -87,8 +109,13 @@ class Candidate:
         """
         if not self.strains:
             raise ArrangementError(
-                f"part '{self.spring}'",
+                f"part '{self.cam.drive}'",
                 f"has no specimen behind its cam, so it has no {field.replace('_', ' ')}",
                 next_step="leave this limit out, or declare the rubber with specimen(...)",
             )
-        return {f"{path}.{field}": self.parameters[f"{path}.{field}"] for path in self.strains}
+        names = [
+            piece.area if field == "area" else piece.rest_length
+            for piece in self.cam.specimens
+            if piece.name in self.strains
+        ]
+        return {name: self.parameters[name] for name in names}

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..components.assembly.named_parts import Assembly
 from ..errors import InfeasibleError, ValueRangeError
-from ..model import Assembly, flatten
+from ..model import flatten
 from .equilibrium import ElasticLaw, elastic_law
 from .target import Target
 
@@ -34,7 +35,7 @@ _JUST_ABOVE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class CamProfile:
     """Lever arm over the angle and what the elements do meanwhile; arrays of shape (n,), in SI.
 
     Parameters
@@ -73,8 +74,8 @@ class Profile:
 
 
 def energy_profile(
-    actuator: Assembly, *, target: Target, spring: str = "spring", points: int = 401
-) -> Profile:
+    actuator: Assembly, *, target: Target, spring: str | None = None, points: int = 401
+) -> CamProfile:
     """Return the closed-form cam for the rubber, pretension and number of elements of an actuator.
 
     Parameters
@@ -84,7 +85,7 @@ def energy_profile(
     target
         Torque curve.
     spring
-        Path of the cam spring.
+        Path of the cam spring; decided from the structure if it is left out.
     points
         Number of angles.
 
@@ -98,14 +99,14 @@ def energy_profile(
     law = elastic_law(model, spring)
     values = model.values
     return closed_form(
-        law, target, elements=values[f"{spring}.cam.elements"], pretension=values[f"{spring}.pretension"],
+        law, target, elements=values[law.cam.elements], pretension=values[law.cam.pretension],
         points=points,
     )  # fmt: skip
 
 
 def closed_form(
     law: ElasticLaw, target: Target, *, elements: float, pretension: float = 0.0, points: int = 401
-) -> Profile:
+) -> CamProfile:
     """Return the closed-form cam for an elastic law.
 
     Parameters
@@ -137,7 +138,7 @@ def closed_form(
     lever_arms = np.empty(points)
     lever_arms[0] = _first_lever_arm(law, target, elements, pretension)
     lever_arms[1:] = torques[1:] / (elements * forces[1:])
-    return Profile(angles, extensions, lever_arms, forces, torques, elements, pretension)
+    return CamProfile(angles, extensions, lever_arms, forces, torques, elements, pretension)
 
 
 def _first_lever_arm(law: ElasticLaw, target: Target, elements: float, pretension: float) -> float:
@@ -168,15 +169,15 @@ def _stretched(law: ElasticLaw, energies: Floats, pretension: float) -> Floats:
     cell = np.clip(np.searchsorted(stored, energies, side="right") - 1, 0, len(grid) - 2)
     low, high = grid[cell], grid[cell + 1]
     rest = energies - stored[cell]
-    found = low + (high - low) * rest / (stored[cell + 1] - stored[cell])
+    extensions = low + (high - low) * rest / (stored[cell + 1] - stored[cell])
     for _ in range(40):
-        missing = rest - _work(law, pretension + low, pretension + found)
-        force = law.force(pretension + found)
+        missing = rest - _work(law, pretension + low, pretension + extensions)
+        force = law.force(pretension + extensions)
         step = np.divide(missing, force, out=np.zeros_like(missing), where=force > 0.0)
-        found = np.clip(found + step, low, high)
+        extensions = np.clip(extensions + step, low, high)
         if np.all(np.abs(step) <= 1e-15 * grid[-1]):
             break
-    return found
+    return extensions
 
 
 def _stored(law: ElasticLaw, needed: float, pretension: float) -> tuple[Floats, Floats]:

@@ -10,8 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import ArrangementError, ConvergenceError, unknown_name
+from ..errors import ArrangementError, ConvergenceError
 from ..model import FlatModel, Variable
+from ..model.roles import series_cam, series_spring
+from ..model.structure import CamNames
 from ..symbolic import Expression, depends
 from .rounding import rounded
 
@@ -24,24 +26,28 @@ class ElasticLaw:
 
     Parameters
     ----------
-    spring
-        Path of the cam spring, for instance ``"spring"``.
-    element
-        Path of the element behind the cam.
+    cam
+        Names around the cam, and of the pieces of rubber behind it.
     parameters
         All parameters of the flat model, in its order.
-    specimens
-        Paths of the pieces of rubber in it.
     function
         ``casadi.Function`` (extension, parameters) -> (force, stiffness, strains, stresses); one strain and
         one nominal stress for each specimen.
     """
 
-    spring: str
-    element: str
+    cam: CamNames
     parameters: tuple[Variable, ...]
-    specimens: tuple[str, ...]
     function: ca.Function
+
+    @property
+    def element(self) -> str:
+        """Path of the element behind the cam."""
+        return self.cam.element
+
+    @property
+    def specimens(self) -> tuple[str, ...]:
+        """Paths of the pieces of rubber in it."""
+        return tuple(piece.name for piece in self.cam.specimens)
 
     @property
     def numbers(self) -> NDArray[np.float64]:
@@ -99,8 +105,8 @@ class ElasticLaw:
 
     def _evaluated(self, extension: ArrayLike, which: int) -> NDArray[np.float64]:
         given = np.asarray(extension, dtype=float)
-        found = self._with_numbers(given.reshape(1, -1))[which]
-        result: NDArray[np.float64] = np.array(found, dtype=float).reshape(given.shape)
+        values = self._with_numbers(given.reshape(1, -1))[which]
+        result: NDArray[np.float64] = np.array(values, dtype=float).reshape(given.shape)
         return result
 
     @cached_property
@@ -109,7 +115,7 @@ class ElasticLaw:
         return ca.Function("law", [symbol], self.function.call([symbol, ca.SX(self.numbers)])[:2])
 
 
-def elastic_law(model: FlatModel, spring: str) -> ElasticLaw:
+def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
     """Return the equilibrium law of the element behind a cam.
 
     At angle zero with a cam without lever arm the pretension is the extension of the element: that cuts the
@@ -120,51 +126,42 @@ def elastic_law(model: FlatModel, spring: str) -> ElasticLaw:
     model
         Flat model of an assembly.
     spring
-        Path of the cam spring.
+        Path of the cam spring; decided from the structure if it is left out.
 
     Raises
     ------
     UnknownNameError
         If there is no cam spring of that name.
+    ArrangementError
+        If the structure does not decide.
     ConvergenceError
         If the inner states find no equilibrium.
     """
-    pretension = f"{spring}.pretension"
-    known = [v.name for v in model.parameters]
-    if pretension not in known:
-        springs = [name.removesuffix(".pretension") for name in known if name.endswith(".pretension")]
-        raise unknown_name("cam spring", spring, springs)
-    element = _element_behind(model, spring)
-    signals, angle, parameters = _at_rest(model, spring)
+    cam = series_cam(model, spring)
+    place = {v.name: i for i, v in enumerate(model.parameters)}
+    signals, angle, parameters = _at_rest(model, cam.angle, cam.states)
     extension = ca.SX.sym("extension")
-    flat_cam = ca.vertcat(
-        *[parameters[i] for i, name in enumerate(known) if name.startswith(f"{spring}.cam.lever_arm")]
-    )
-    old = ca.vertcat(angle, flat_cam, parameters[known.index(pretension)])
+    flat_cam = ca.vertcat(*[parameters[place[name]] for name in cam.control_values])
+    old = ca.vertcat(angle, flat_cam, parameters[place[cam.pretension]])
     new = ca.vertcat(ca.SX.zeros(1 + flat_cam.shape[0]), extension)
 
     def cut(name: str) -> Expression:
         return ca.substitute(signals[name], old, new)
 
-    specimens = tuple(
-        name.removesuffix(".area")
-        for name in known
-        if name.startswith(f"{spring}.") and name.endswith(".area")
-    )
-    force = cut(f"{element}.force")
-    strains = [cut(f"{path}.strain") for path in specimens]
-    stresses = [cut(f"{path}.force") / parameters[known.index(f"{path}.area")] for path in specimens]
+    force = cut(cam.force)
+    strains = [cut(piece.strain) for piece in cam.specimens]
+    stresses = [cut(piece.force) / parameters[place[piece.area]] for piece in cam.specimens]
     results = [force, ca.jacobian(force, extension), ca.vertcat(*strains), ca.vertcat(*stresses)]
     function = ca.Function("law", [extension, parameters], [ca.SX(e) for e in results])
     if not np.isfinite(float(function(1e-3, model.start(model.parameters))[0])):
         raise ConvergenceError(
-            f"equilibrium of '{element}'", "the inner states find no rest at an extension of 1 mm",
+            f"equilibrium of '{cam.element}'", "the inner states find no rest at an extension of 1 mm",
             next_step="look for a branch that carries no force at rest at any extension",
         )  # fmt: skip
-    return ElasticLaw(spring, element, model.parameters, specimens, function)
+    return ElasticLaw(cam, model.parameters, function)
 
 
-def torque_function(model: FlatModel, spring: str) -> ca.Function:
+def torque_function(model: FlatModel, spring: str | None = None) -> ca.Function:
     """Return the torque of a spring in equilibrium as a function (angle, parameters) -> torque.
 
     Parameters
@@ -172,13 +169,21 @@ def torque_function(model: FlatModel, spring: str) -> ca.Function:
     model
         Flat model of an assembly.
     spring
-        Path of the spring.
+        Path of the spring; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no spring of that name.
+    ArrangementError
+        If the structure does not decide, or the spring's angle is neither state nor input.
     """
-    signals, angle, parameters = _at_rest(model, spring)
-    return ca.Function("torque", [angle, parameters], [signals[f"{spring}.torque"]])
+    tie = series_spring(model, spring)
+    signals, angle, parameters = _at_rest(model, tie.motion, tie.states)
+    return ca.Function("torque", [angle, parameters], [signals[tie.effort]])
 
 
-def cam_function(model: FlatModel, spring: str) -> ca.Function:
+def cam_function(model: FlatModel, spring: str | None = None) -> ca.Function:
     """Return the law of a cam as a function (angle, parameters) -> (lever arm, extension without pretension).
 
     Parameters
@@ -186,16 +191,23 @@ def cam_function(model: FlatModel, spring: str) -> ca.Function:
     model
         Flat model of an assembly.
     spring
-        Path of the cam spring.
+        Path of the cam spring; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no cam spring of that name.
+    ArrangementError
+        If the structure does not decide, or the spring's angle is neither state nor input.
     """
-    element = _element_behind(model, spring)
-    signals, angle, parameters = _at_rest(model, spring)
-    pretension = parameters[[v.name for v in model.parameters].index(f"{spring}.pretension")]
-    results = [signals[f"{spring}.cam.lever_arm_now"], signals[f"{element}.extension"] - pretension]
+    cam = series_cam(model, spring)
+    signals, angle, parameters = _at_rest(model, cam.angle, cam.states)
+    pretension = parameters[[v.name for v in model.parameters].index(cam.pretension)]
+    results = [signals[cam.lever_arm], signals[cam.extension] - pretension]
     return ca.Function("cam", [angle, parameters], results)
 
 
-def equilibrium_torque(model: FlatModel, spring: str, angles: ArrayLike) -> NDArray[np.float64]:
+def equilibrium_torque(model: FlatModel, spring: str | None, angles: ArrayLike) -> NDArray[np.float64]:
     """Return the torque of a spring over its angle with all relaxation at rest.
 
     Parameters
@@ -203,7 +215,7 @@ def equilibrium_torque(model: FlatModel, spring: str, angles: ArrayLike) -> NDAr
     model
         Flat model of an assembly.
     spring
-        Path of the spring.
+        Path of the spring; ``None`` where the structure decides.
     angles
         In rad, any shape.
 
@@ -211,6 +223,13 @@ def equilibrium_torque(model: FlatModel, spring: str, angles: ArrayLike) -> NDAr
     -------
     numpy.ndarray
         Of the same shape, in N·m.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no spring of that name.
+    ArrangementError
+        If the structure does not decide, or the spring's angle is neither state nor input.
     """
     given = np.asarray(angles, dtype=float)
     torque = torque_function(model, spring)(given.reshape(1, -1), model.start(model.parameters))
@@ -218,44 +237,37 @@ def equilibrium_torque(model: FlatModel, spring: str, angles: ArrayLike) -> NDAr
     return result
 
 
-def _element_behind(model: FlatModel, spring: str) -> str:
-    forces = [v.name for v in model.signals if v.name.startswith(f"{spring}.") and v.name.endswith(".force")]
-    direct = [name.removesuffix(".force") for name in forces if name.count(".") == spring.count(".") + 2]
-    if len(direct) != 1:
-        raise ArrangementError(
-            f"part '{spring}'",
-            f"has {len(direct)} elements behind its cam",
-            next_step="declare it with through(cam, rubber=...)",
-        )
-    return direct[0]
+def _at_rest(
+    model: FlatModel, motion: str, states: Sequence[str]
+) -> tuple[dict[str, Expression], Expression, Expression]:
+    """Return the signals over a spring's angle and the parameters, with everything else at rest.
 
-
-def _at_rest(model: FlatModel, spring: str) -> tuple[dict[str, Expression], Expression, Expression]:
-    """Return the signals over the spring's angle and the parameters, with everything else at rest."""
+    ``motion`` is the signal of the angle, ``states`` are the inner states, which rest where they do not move.
+    """
     symbols = model.symbols()
     names = [v.name for v in model.signals]
-    if f"{spring}.torque" not in names:
-        springs = [name.removesuffix(".torque") for name in names if name.endswith(".torque")]
-        raise unknown_name("spring", spring, springs)
     movable = ca.vertcat(symbols.state, symbols.input)
-    handle = _handle(symbols.signal[names.index(f"{spring}.angle")], movable, spring)
-    inner = [i for i, v in enumerate(model.states) if v.name.startswith(f"{spring}.")]
+    handle = _handle(symbols.signal[names.index(motion)], movable, motion)
+    inner = [i for i, v in enumerate(model.states) if v.name in states]
     angle = movable[handle]
     others = ca.vertcat(*[movable[i] for i in range(movable.shape[0]) if i not in (handle, *inner)])
     both = ca.vertcat(symbols.signal, symbols.derivative)
     both = ca.substitute(both, others, ca.SX.zeros(others.shape))
-    states = ca.vertcat(*[symbols.state[i] for i in inner])
+    at_rest = ca.vertcat(*[symbols.state[i] for i in inner])
     rates = ca.vertcat(*[both[len(names) + i] for i in inner])
-    signals = ca.substitute(both[: len(names)], states, _resting_states(ca.SX(rates), ca.SX(states)))
+    signals = ca.substitute(both[: len(names)], at_rest, _resting_states(ca.SX(rates), ca.SX(at_rest)))
     return dict(zip(names, ca.vertsplit(signals), strict=True)), angle, symbols.parameter
 
 
-def _handle(angle: Expression, movable: Expression, spring: str) -> int:
+def _handle(angle: Expression, movable: Expression, motion: str) -> int:
     slopes = ca.jacobian(angle, movable)
     for i in range(movable.shape[0]):
         if ca.is_equal(slopes[i], ca.SX(1)):
             return i
-    raise ArrangementError(f"part '{spring}'", "its angle is no state and no input of the model")
+    raise ArrangementError(
+        f"'{motion}'", "is neither a state nor an input of the model",
+        next_step="tie the spring between one body that moves and one that rests",
+    )  # fmt: skip
 
 
 def _resting_states(rates: Expression, states: Expression) -> Expression:
@@ -270,10 +282,10 @@ def _resting_states(rates: Expression, states: Expression) -> Expression:
     slopes = ca.jacobian(rates, unknown)
     steps = _NEWTON_STEPS if depends(slopes, unknown) else 1
     step = ca.Function("step", [unknown, *_others(rates, states)], [-ca.solve(slopes, rates)])
-    found = ca.SX.zeros(len(moving))
+    resting = ca.SX.zeros(len(moving))
     for _ in range(steps):
-        found = found + step.call([found, *_others(rates, states)])[0]
-    result[moving] = found
+        resting = resting + step.call([resting, *_others(rates, states)])[0]
+    result[moving] = resting
     return result
 
 

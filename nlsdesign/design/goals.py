@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..symbolic import Expression
-from .design_point import Candidate
+from .design_point import DesignPoint
 
 _LENGTH = 0.01
 """Typical radius of curvature in m; it only scales the roughness."""
@@ -19,12 +19,12 @@ class Goal(ABC):
     """Base of the goals."""
 
     @abstractmethod
-    def cost(self, candidate: Candidate) -> Expression:
+    def cost(self, design: DesignPoint) -> Expression:
         """Return a pure number; one per mille of the largest torque as rms error counts as 1.
 
         Parameters
         ----------
-        candidate
+        design
             The design in symbols.
         """
 
@@ -33,9 +33,9 @@ class Goal(ABC):
 class TorqueError(Goal):
     """Mean over the angle of the squared torque error."""
 
-    def cost(self, candidate: Candidate) -> Expression:
+    def cost(self, design: DesignPoint) -> Expression:
         """Return (rms error / 0.1 % of the largest torque)²."""
-        return candidate.mean_square_error / (1e-3 * candidate.target.largest) ** 2
+        return design.mean_square_error / (1e-3 * design.target.largest) ** 2
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class SmoothContour(Goal):
 
     weight: float = 1e-5
 
-    def cost(self, candidate: Candidate) -> Expression:
+    def cost(self, design: DesignPoint) -> Expression:
         """Return weight · mean((dρ/dφ)²) / (10 mm/rad)²."""
-        rho, phi = candidate.radii_of_curvature, candidate.directions
+        rho, phi = design.radii_of_curvature, design.directions
         changes, steps = rho[1:] - rho[:-1], phi[1:] - phi[:-1]
         span = phi[-1] - phi[0]
         return self.weight * ca.sum1(changes**2 / steps) / span / _LENGTH**2
@@ -79,14 +79,12 @@ class LeastRubber(Goal):
     weight: float = 1e-3
     energy_density: float = 6e5
 
-    def cost(self, candidate: Candidate) -> Expression:
+    def cost(self, design: DesignPoint) -> Expression:
         """Return weight · volume / typical volume."""
-        if not candidate.strains:
+        if not design.strains:
             return ca.SX(0)
-        areas = list(candidate.of_rubber("area").values())
-        lengths = list(candidate.of_rubber("rest_length").values())
-        volume = candidate.elements * sum(
-            (a * x for a, x in zip(areas, lengths, strict=True)), start=ca.SX(0)
-        )
-        needed = float(candidate.target.energy(candidate.target.last_angle)) / self.energy_density
+        areas = list(design.of_rubber("area").values())
+        lengths = list(design.of_rubber("rest_length").values())
+        volume = design.elements * sum((a * x for a, x in zip(areas, lengths, strict=True)), start=ca.SX(0))
+        needed = float(design.target.energy(design.target.last_angle)) / self.energy_density
         return self.weight * volume / needed

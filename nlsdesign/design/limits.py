@@ -11,7 +11,7 @@ import casadi as ca
 from ..errors import ValueRangeError
 from ..quantity import Quantity, parse_unit
 from ..symbolic import Expression
-from .design_point import Candidate
+from .design_point import DesignPoint, anchor_of
 from .numbers import in_si, plain
 
 
@@ -65,12 +65,12 @@ class Limit(ABC):
     """Base of the limits."""
 
     @abstractmethod
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield what must hold.
 
         Parameters
         ----------
-        candidate
+        design
             The design in symbols.
         """
 
@@ -111,10 +111,10 @@ class MinimumRadiusOfCurvature(Limit):
     def __post_init__(self) -> None:
         _store(self, "radius", "m", 0.0, 0.5)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
         yield self._bound(
-            "radius of curvature", candidate.radii_of_curvature, plain(self.radius), upper=False, unit="mm"
+            "radius of curvature", design.radii_of_curvature, plain(self.radius), upper=False, unit="mm"
         )
 
 
@@ -133,9 +133,9 @@ class MaximumCamRadius(Limit):
     def __post_init__(self) -> None:
         _store(self, "radius", "m", 1e-5, 0.5)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the contour."""
-        yield self._bound("cam radius", candidate.radii, plain(self.radius), upper=True, unit="mm")
+        yield self._bound("cam radius", design.radii, plain(self.radius), upper=True, unit="mm")
 
 
 @dataclass(frozen=True)
@@ -153,10 +153,10 @@ class MaximumStrain(Limit):
     def __post_init__(self) -> None:
         _store(self, "strain", "1", 1e-4, 10.0)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each piece of rubber."""
-        candidate.of_rubber("rest_length")
-        for path, strain in candidate.strains.items():
+        design.of_rubber("rest_length")
+        for path, strain in design.strains.items():
             yield self._bound(f"strain of {path}", strain, plain(self.strain), upper=True, unit="1")
 
 
@@ -179,11 +179,11 @@ class MaximumStress(Limit):
         _store(self, "stress", "Pa", 1e3, 1e11)
         _store(self, "safety_factor", "1", 1.0, 100.0)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound for each piece of rubber."""
-        candidate.of_rubber("area")
+        design.of_rubber("area")
         allowed = plain(self.stress) / self.safety_factor
-        for path, stress in candidate.stresses.items():
+        for path, stress in design.stresses.items():
             yield self._bound(f"stress of {path}", stress, allowed, upper=True, unit="MPa")
 
 
@@ -202,9 +202,9 @@ class MaximumCableTension(Limit):
     def __post_init__(self) -> None:
         _store(self, "tension", "N", 1e-3, 1e7)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the angle."""
-        yield self._bound("cable tension", candidate.forces, plain(self.tension), upper=True, unit="N")
+        yield self._bound("cable tension", design.forces, plain(self.tension), upper=True, unit="N")
 
 
 @dataclass(frozen=True)
@@ -222,11 +222,11 @@ class PositiveStiffness(Limit):
     def __post_init__(self) -> None:
         _store(self, "minimum", "N*m/rad", 0.0, 1e7)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound over the angle."""
-        scale = candidate.target.largest / candidate.target.last_angle
+        scale = design.target.largest / design.target.last_angle
         yield self._bound(
-            "tangent stiffness", candidate.tangent_stiffness, plain(self.minimum), upper=False,
+            "tangent stiffness", design.tangent_stiffness, plain(self.minimum), upper=False,
             unit="N*m/rad", scale=scale,
         )  # fmt: skip
 
@@ -246,16 +246,16 @@ class MaximumTorqueError(Limit):
     def __post_init__(self) -> None:
         _store(self, "rms", "N*m", 1e-5, 1e6)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield one bound."""
         # The tiny addend keeps the root smooth where the error vanishes.
         floor = (1e-3 * plain(self.rms)) ** 2
-        rms = ca.sqrt(candidate.mean_square_error + floor)
+        rms = ca.sqrt(design.mean_square_error + floor)
         yield self._bound("rms torque error", rms, plain(self.rms), upper=True, unit="mN*m")
 
 
 @dataclass(frozen=True)
-class Range(Limit):
+class ParameterRange(Limit):
     """Base of the limits that hold one parameter between two numbers.
 
     Parameters
@@ -284,52 +284,52 @@ class Range(Limit):
 
 
 @dataclass(frozen=True)
-class PretensionRange(Range):
+class PretensionRange(ParameterRange):
     """Extension at angle zero between two lengths in m."""
 
     def __post_init__(self) -> None:
         self._checked("m", 0.0, 1.0)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides."""
-        name = f"{candidate.spring}.pretension"
-        yield from self._both(name, candidate.parameters[name], "mm")
+        name = design.cam.pretension
+        yield from self._both(name, design.parameters[name], "mm")
 
 
 @dataclass(frozen=True)
-class AreaRange(Range):
+class AreaRange(ParameterRange):
     """Cross-section of each piece of rubber between two areas in m²."""
 
     def __post_init__(self) -> None:
         self._checked("m^2", 1e-8, 0.1)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides for each piece."""
-        for name, value in candidate.of_rubber("area").items():
+        for name, value in design.of_rubber("area").items():
             yield from self._both(name, value, "mm^2")
 
 
 @dataclass(frozen=True)
-class RestLengthRange(Range):
+class RestLengthRange(ParameterRange):
     """Rest length of each piece of rubber between two lengths in m."""
 
     def __post_init__(self) -> None:
         self._checked("m", 1e-4, 1.0)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides for each piece."""
-        for name, value in candidate.of_rubber("rest_length").items():
+        for name, value in design.of_rubber("rest_length").items():
             yield from self._both(name, value, "mm")
 
 
 @dataclass(frozen=True)
-class AnchorDistance(Range):
+class AnchorDistance(ParameterRange):
     """Distance from the centre to the anchor of the cable between two lengths in m."""
 
     def __post_init__(self) -> None:
         self._checked("m", 1e-3, 1e6)
 
-    def bounds(self, candidate: Candidate) -> Iterator[Bound]:
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
         """Yield both sides."""
-        name = f"{candidate.spring}.cam.anchor_distance"
-        yield from self._both(name, candidate.parameters[name], "mm")
+        anchor = anchor_of(design.cam)
+        yield from self._both(anchor, design.parameters[anchor], "mm")

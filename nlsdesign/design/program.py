@@ -40,7 +40,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class Solution:
     """Where the solver stopped.
 
     Parameters
@@ -48,7 +48,7 @@ class Outcome:
     solved
         Whether it says that this is a solution.
     status
-        IPOPT's own word.
+        Status in the words of IPOPT.
     point
         Unknowns, shape (unknowns,).
     cost
@@ -109,7 +109,7 @@ class Program:
 
     def solve(
         self, *starts: Floats, upper: Floats | None = None, progress: Callable[[], None] = lambda: None
-    ) -> list[Outcome]:
+    ) -> list[Solution]:
         """Solve from each starting point.
 
         Parameters
@@ -123,7 +123,7 @@ class Program:
 
         Returns
         -------
-        list of Outcome
+        list of Solution
             In the order of the starting points.
         """
         sizes = [r.expression.shape[0] for r in self.rows]
@@ -148,11 +148,11 @@ class Program:
         }
         return ca.nlpsol("design", "ipopt", problem, _OPTIONS)
 
-    def _outcome(self, answer: dict[str, ca.DM], sizes: list[int]) -> Outcome:
+    def _outcome(self, answer: dict[str, ca.DM], sizes: list[int]) -> Solution:
         stats = self._solver.stats()
         groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])
         finite = bool(np.all(np.isfinite(np.array(answer["x"]))) and np.isfinite(float(answer["f"])))
-        return Outcome(
+        return Solution(
             finite and stats["return_status"] in _SOLVED,
             str(stats["return_status"]),
             np.array(answer["x"]).ravel(),

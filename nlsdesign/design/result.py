@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Assembly
+from ..components.assembly.named_parts import Assembly
 from ..quantity import Quantity, parse_unit
 from .cam_drawing import fingerprint
 from .geometry import Contour
@@ -106,7 +106,7 @@ class Sensitivity:
             "all moduli high" if signs == {True} else "all moduli low" if signs == {False} else "moduli mixed"
         )
         largest = max(abs(deviation) for _, deviation in self.corner)
-        return f"{1e3 * self.rms:.4g} mN*m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
+        return f"{1e3 * self.rms:.4g} mN·m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,25 +179,25 @@ class CamDesign:
     def rows(self) -> list[tuple[str, str]]:
         """Return a table of what was found: pairs of text."""
         rho, millis = self.contour.radii_of_curvature, 1e3
-        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N*m at {self._end}")]
+        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N·m at {self._end}")]
         rows += [(name, _brief(value)) for name, value in self.changes]
         rows += [
             (
                 "torque error",
-                f"{millis * self.rms:.3g} mN*m rms, {millis * self.check.largest:.3g} mN*m at most",
+                f"{millis * self.rms:.3g} mN·m rms, {millis * self.check.largest:.3g} mN·m at most",
             ),
             ("over the spread", str(self.sensitivity)),
             ("radius of curvature", f"{millis * rho.min():.3g} to {millis * rho.max():.3g} mm"),
             ("cam radius", f"{millis * self.contour.radii.max():.4g} mm"),
             ("lever arm", f"up to {millis * self.contour.lever_arms.max():.4g} mm"),
-            ("solver", f"{self.iterations} iterations{self._held}"),
+            ("solver", f"{self.iterations} iterations{self._contour_error}"),
             ("fingerprint", self.fingerprint),
         ]
         share = self.within_tolerance
         return rows if share is None else [*rows, ("within tolerance", f"{100 * share:.3g} % of the angles")]
 
     @property
-    def _held(self) -> str:
+    def _contour_error(self) -> str:
         return f", contour held to {1e6 * self.fit_error:.2g} um" if self.fit_error > 0.0 else ""
 
     @property

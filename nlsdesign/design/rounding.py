@@ -45,8 +45,8 @@ def rounded(function: ca.Function, samples: list[NDArray[np.float64]], share: fl
     _, distances = _rewritten(function, arguments, [])
     if not distances:
         return function
-    found = np.array(ca.Function("distances", arguments, [ca.vertcat(*distances)])(*samples))
-    widths = [share * float(np.max(np.abs(row))) for row in found]
+    sampled = np.array(ca.Function("distances", arguments, [ca.vertcat(*distances)])(*samples))
+    widths = [share * float(np.max(np.abs(row))) for row in sampled]
     results, _ = _rewritten(function, arguments, widths)
     return ca.Function(function.name(), arguments, results)
 

@@ -10,17 +10,20 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..components.assembly.named_parts import Assembly
 from ..errors import ConvergenceError
-from ..model import Assembly, FlatModel, flatten
+from ..model import FlatModel, flatten
+from ..model.roles import series_cam, series_spring
 from ..quantity import Quantity
 from .conflict import feasible_point, row_of
 from .contour import CamFit, cam_from_profile, contour_of_cam
+from .design_point import anchor_of
 from .equilibrium import torque_function
 from .geometry import Contour, contour_from_curvature
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Bound, Limit
-from .problem import Problem, design_problem
-from .program import Outcome, Program
+from .problem import DesignProblem, contour_names, design_problem
+from .program import Program, Solution
 from .result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .rounding import has_corners
 from .target import Target
@@ -32,11 +35,11 @@ GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 
 _ANGLES = 801
 _ACTIVE = 1e-3
-_MOST_CORNERS = 10
+_MOST_MODULI = 10
 _ROUNDING = 0.003
 """Width over which the knots of a rubber's law are rounded where needed, relative to its stretch."""
-_CIRCLES = "Maximum_Iterations_Exceeded"
-"""What IPOPT says where the knots of a law send Newton's method round in circles."""
+_ITERATION_LIMIT = "Maximum_Iterations_Exceeded"
+"""IPOPT's status where Newton's method does not settle, as at the knots of a law."""
 _CONTROL_VALUES = 64
 
 
@@ -48,9 +51,9 @@ def design_cam(
     actuator: Assembly,
     *,
     target: Target,
-    free: Sequence[str],
+    free: Sequence[str] | None = None,
     keep: Sequence[Limit],
-    spring: str = "spring",
+    spring: str | None = None,
     goals: Sequence[Goal] = GOALS,
     progress: Callable[[], None] = _quiet,
 ) -> CamDesign:
@@ -67,13 +70,14 @@ def design_cam(
     target
         Torque curve.
     free
-        Full names of what may change: ``spring.cam.contour`` (or ``spring.cam.lever_arm``, which is the
-        same), ``spring.pretension``, ``spring.rubber.area``, ``spring.rubber.rest_length``,
-        ``spring.cam.anchor_distance``, or any other single number behind the cam.
+        Full names of what may change: the contour ``<cam>.contour`` (or ``<cam>.lever_arm``, which is the
+        same), pretension, area and rest length of the rubber, distance of the anchor, or any other single
+        number behind the cam, for instance ``spring.cam.contour`` and ``spring.rubber.area``. The contour
+        alone by default.
     keep
         Limits.
     spring
-        Path of the cam spring.
+        Path of the cam spring; decided from the structure if it is left out.
     goals
         What is made small, as a sum.
     progress
@@ -92,56 +96,66 @@ def design_cam(
         If the solver stops without a solution.
     UnknownNameError
         If a free name does not exist.
+    ArrangementError
+        If the structure does not say which spring is meant, or it has no two-sided cam.
     """
-    model, cam = flatten(actuator), actuator[f"{spring}.cam"]
+    model = flatten(actuator)
+    names = series_cam(model, spring)
+    cam, chosen = actuator[names.name], contour_names(names)[:1] if free is None else free
 
-    def stated(rounding: float) -> _Stated:
-        problem = design_problem(model, cam, target=target, free=free, spring=spring, rounding=rounding)
-        return _Stated(problem, keep, goals, progress)
+    def program_of(rounding: float) -> _DesignProgram:
+        problem = design_problem(
+            model, cam, target=target, free=chosen, spring=names.drive, rounding=rounding
+        )
+        return _DesignProgram(problem, keep, goals, progress)
 
-    chosen, outcomes = _answered(stated)
-    return _finished(actuator, chosen.problem, chosen.bounds, _best(outcomes))
+    solved, outcomes = _solved(program_of)
+    return _finished(actuator, solved.problem, solved.bounds, _best(outcomes))
 
 
-def _answered(stated: Callable[[float], _Stated]) -> tuple[_Stated, list[Outcome]]:
-    """Return the problem that was solved and what came of each start."""
-    plain = stated(0.0)
+def _solved(program_of: Callable[[float], _DesignProgram]) -> tuple[_DesignProgram, list[Solution]]:
+    """Return the program that was solved and the solution from each start."""
+    plain = program_of(0.0)
     first, *others = plain.problem.starts
     outcomes = plain.solve(first)
     if outcomes[0].solved:
         return plain, outcomes + plain.solve(*others)
     # Whether there is any cam at all is found out with softened limits.
     feasible = feasible_point(plain.problem, plain.bounds, plain.progress)
-    if outcomes[0].status == _CIRCLES and has_corners(plain.problem.law.function):
-        smooth = stated(_ROUNDING)
+    if outcomes[0].status == _ITERATION_LIMIT and has_corners(plain.problem.law.function):
+        smooth = program_of(_ROUNDING)
         outcomes = smooth.solve(*smooth.problem.starts)
         if any(outcome.solved for outcome in outcomes):
             return smooth, outcomes
     return plain, plain.solve(feasible, *others)
 
 
-class _Stated:
+class _DesignProgram:
     """A problem with its limits and goals as a program."""
 
     def __init__(
-        self, problem: Problem, keep: Sequence[Limit], goals: Sequence[Goal], progress: Callable[[], None]
+        self,
+        problem: DesignProblem,
+        keep: Sequence[Limit],
+        goals: Sequence[Goal],
+        progress: Callable[[], None],
     ) -> None:
         self.problem, self.progress = problem, progress
-        self.bounds = [bound for limit in keep for bound in limit.bounds(problem.candidate)]
+        self.bounds = [bound for limit in keep for bound in limit.bounds(problem.design)]
         self.program = Program(
             problem.vector,
-            np.array([u.lower for u in problem.unknowns]),
-            np.array([u.upper for u in problem.unknowns]),
-            sum((goal.cost(problem.candidate) for goal in goals), start=ca.SX(0)),
+            np.array([v.lower for v in problem.variables]),
+            np.array([v.upper for v in problem.variables]),
+            sum((goal.cost(problem.design) for goal in goals), start=ca.SX(0)),
             (*problem.structure, *(row_of(bound) for bound in self.bounds)),
         )
 
-    def solve(self, *starts: Floats) -> list[Outcome]:
+    def solve(self, *starts: Floats) -> list[Solution]:
         """Solve from each starting point."""
         return self.program.solve(*starts, progress=self.progress)
 
 
-def _best(outcomes: Sequence[Outcome]) -> Outcome:
+def _best(outcomes: Sequence[Solution]) -> Solution:
     solved = [outcome for outcome in outcomes if outcome.solved]
     if not solved:
         raise ConvergenceError(
@@ -151,18 +165,20 @@ def _best(outcomes: Sequence[Outcome]) -> Outcome:
     return min(solved, key=lambda outcome: outcome.cost)
 
 
-def _finished(actuator: Assembly, problem: Problem, bounds: Sequence[Bound], best: Outcome) -> CamDesign:
-    target, spring = problem.candidate.target, problem.law.spring
-    found = problem.named(best.point)
-    contour, fit = _contour(actuator, problem, best, found)
-    known, source = actuator.quantities(), f"designed for {type(target).__name__}, {target.largest:.6g} N*m"
-    changes = {name: _designed(known[name], value, source) for name, value in found.items() if name in known}
+def _finished(
+    actuator: Assembly, problem: DesignProblem, bounds: Sequence[Bound], best: Solution
+) -> CamDesign:
+    target, cam = problem.design.target, problem.law.cam
+    values = problem.named(best.point)
+    contour, fit = _contour(actuator, problem, best)
+    known, source = actuator.quantities(), f"designed for {type(target).__name__}, {target.largest:.6g} N·m"
+    changes = {name: _designed(known[name], value, source) for name, value in values.items() if name in known}
     if fit is not None:
-        changes[f"{spring}.cam.lever_arm"] = fit.cam.lever_arm
-        changes[f"{spring}.cam.last_angle"] = fit.cam.last_angle
+        changes |= {f"{cam.name}.{field}": given for field, given in fit.changes().items()}
     changed = actuator.with_values(changes)
     model = flatten(changed)
-    mean_square = problem.evaluate(problem.candidate.mean_square_error, best.point)[0]
+    spring = next(each.name for each in model.springs for inside in each.cams if inside.name == cam.name)
+    mean_square = problem.evaluate(problem.design.mean_square_error, best.point)[0]
     return CamDesign(
         target=target,
         changes=tuple(changes.items()),
@@ -178,35 +194,32 @@ def _finished(actuator: Assembly, problem: Problem, bounds: Sequence[Bound], bes
 
 
 def _designed(old: Quantity, value: float, source: str) -> Quantity:
-    """Return a found number, shown in millimetres where only metres were stated."""
+    """Return a designed number, shown in millimetres where only metres were stated."""
     return replace(old.with_value(value, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
 
 
-def _contour(
-    actuator: Assembly, problem: Problem, best: Outcome, found: dict[str, float]
-) -> tuple[Contour, CamFit | None]:
-    cam = actuator[f"{problem.law.spring}.cam"]
-    if not problem.contour_is_free:
+def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
+    design, cam = problem.design, actuator[problem.law.cam.name]
+    if problem.contour is None:
         return contour_of_cam(cam), None
-    candidate = problem.candidate
-    anchor = candidate.parameters[f"{problem.law.spring}.cam.anchor_distance"]
+    anchor = design.parameters[anchor_of(design.cam)]
     contour = contour_from_curvature(
-        problem.evaluate(candidate.directions, best.point),
-        problem.evaluate(candidate.radii_of_curvature, best.point),
-        first_slope=found["first_slope"],
+        problem.evaluate(design.directions, best.point),
+        problem.evaluate(design.radii_of_curvature, best.point),
+        first_slope=float(problem.evaluate(problem.contour.first_slope.value, best.point)[0]),
         anchor_distance=float(problem.evaluate(anchor, best.point)[0]),
     )
     return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
 
 
-def _state(problem: Problem, bound: Bound, point: Floats) -> LimitState:
+def _state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
     return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active)
 
 
-def torque_check(model: FlatModel, *, target: Target, spring: str = "spring") -> TorqueCheck:
+def torque_check(model: FlatModel, *, target: Target, spring: str | None = None) -> TorqueCheck:
     """Return the equilibrium torque of a model against a target.
 
     Parameters
@@ -216,14 +229,19 @@ def torque_check(model: FlatModel, *, target: Target, spring: str = "spring") ->
     target
         Torque curve.
     spring
-        Path of the spring.
+        Path of the spring; decided from the structure if it is left out.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not say which spring is meant.
     """
     angles = np.linspace(0.0, target.last_angle, _ANGLES)
     torque = torque_function(model, spring)(angles.reshape(1, -1), model.start(model.parameters))
     return TorqueCheck(angles, np.array(torque, dtype=float).ravel(), target.torque(angles))
 
 
-def torque_sensitivity(model: FlatModel, *, target: Target, spring: str = "spring") -> Sensitivity:
+def torque_sensitivity(model: FlatModel, *, target: Target, spring: str | None = None) -> Sensitivity:
     """Return the worst rms torque error over the corners of the moduli's stated spread.
 
     The torque is linear in the moduli for the laws of this project, so the rms error is convex in them and
@@ -236,11 +254,16 @@ def torque_sensitivity(model: FlatModel, *, target: Target, spring: str = "sprin
     target
         Torque curve.
     spring
-        Path of the spring.
+        Path of the spring; decided from the structure if it is left out.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not say which spring is meant.
     """
     angles = np.linspace(0.0, target.last_angle, 201)
     wanted, numbers = target.torque(angles), model.start(model.parameters)
-    law = torque_function(model, spring)
+    law, inside = torque_function(model, spring), set(series_spring(model, spring).parameters)
 
     def torque(deviations: dict[int, float]) -> Floats:
         changed = numbers.copy()
@@ -252,15 +275,14 @@ def torque_sensitivity(model: FlatModel, *, target: Target, spring: str = "sprin
     moduli = [
         (i, v)
         for i, v in enumerate(model.parameters)
-        if v.name.startswith(f"{spring}.") and v.unit == "Pa" and v.spread > 0.0
+        if v.name in inside and v.unit == "Pa" and v.spread > 0.0
         if np.max(np.abs(torque({i: v.spread}) - nominal)) > 1e-9 * target.largest
     ]
     if not moduli:
         return Sensitivity(TorqueCheck(angles, nominal, wanted).rms, ())
-    few = len(moduli) <= _MOST_CORNERS
     signs = (
         itertools.product((-1.0, 1.0), repeat=len(moduli))
-        if few
+        if len(moduli) <= _MOST_MODULI
         else [(s,) * len(moduli) for s in (-1.0, 1.0)]
     )
     corners = [{i: sign * v.spread for sign, (i, v) in zip(corner, moduli, strict=True)} for corner in signs]

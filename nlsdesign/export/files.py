@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
+from ..errors import ExportError
 from ..writing import draft
+
+_PLACEHOLDER = re.compile(r"^(?P<indent> *)@(?P<row>\w+)@\n|@(?P<name>\w+)@", re.MULTILINE)
 
 
 def shell(name: str) -> str:
@@ -20,7 +24,7 @@ def shell(name: str) -> str:
     return (files(__package__) / "shells" / name).read_text(encoding="utf-8")
 
 
-def filled(name: str, values: Mapping[str, str]) -> str:
+def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:
     """Return a shell with its ``@name@`` placeholders replaced.
 
     Parameters
@@ -28,12 +32,25 @@ def filled(name: str, values: Mapping[str, str]) -> str:
     name
         File name in ``nlsdesign/export/shells``.
     values
-        Text by name of the placeholder.
+        By name of the placeholder: a text, or rows where the placeholder is a line of its own. Rows get the
+        indentation of that line; without rows the line is left out.
+
+    Raises
+    ------
+    ExportError
+        If a placeholder has no value.
     """
-    text = shell(name)
-    for placeholder, value in values.items():
-        text = text.replace(f"@{placeholder}@", value)
-    return text
+
+    def replacement(match: re.Match[str]) -> str:
+        key = match["row"] or match["name"]
+        if key not in values:
+            raise ExportError(f"shell '{name}'", f"has a placeholder '{key}' without a value")
+        value = values[key]
+        if isinstance(value, str):
+            return match[0].replace(f"@{key}@", value)
+        return "".join(f"{match['indent']}{row}\n" if row else "\n" for row in value)
+
+    return _PLACEHOLDER.sub(replacement, shell(name))
 
 
 def write_all(texts: Mapping[Path, str]) -> None:

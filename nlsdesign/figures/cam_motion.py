@@ -214,7 +214,7 @@ def cam_motion(
 
 
 def cam_motion_of(
-    model: FlatModel, contour: Contour, *, spring: str = "spring", count: int = 121
+    model: FlatModel, contour: Contour, *, spring: str | None = None, count: int = 121
 ) -> CamMotion:
     """Move the cam of a flat model, with the equilibrium law of the element behind it.
 
@@ -225,7 +225,7 @@ def cam_motion_of(
     contour
         Lower right lip of its cam, for instance from ``contour_of_cam`` or a finished design.
     spring
-        Path of the cam spring.
+        Path of the cam spring; decided from the structure if it is left out.
     count
         Number of angles.
 
@@ -233,14 +233,16 @@ def cam_motion_of(
     ------
     UnknownNameError
         If there is no cam spring of that name.
+    ArrangementError
+        If the structure does not say which spring is meant.
     """
     law, values = elastic_law(model, spring), model.values
-    lengths = [values[f"{path}.rest_length"] for path in law.specimens]
+    lengths = [values[piece.rest_length] for piece in law.cam.specimens]
     return cam_motion(
         contour,
         law.force,
-        elements=values[f"{spring}.cam.elements"],
-        pretension=values[f"{spring}.pretension"],
+        elements=values[law.cam.elements],
+        pretension=values[law.cam.pretension],
         rest_length=lengths[0] if lengths else 2.0 * float(np.max(contour.radii)),
         count=count,
     )

@@ -1,4 +1,4 @@
-"""Torque over the angle: against the target, and against what was measured."""
+"""Torque over the angle: against the target, and against measurements."""
 
 from __future__ import annotations
 

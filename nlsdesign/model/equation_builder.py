@@ -10,7 +10,7 @@ import casadi as ca
 from ..components.assembly.named_parts import Assembly
 from ..components.core.element import UNBOUNDED, Range
 from ..components.core.part import Part
-from ..components.core.switches import Corner, Hold, Side
+from ..components.core.switches import Jump, Kink, StictionConstraint
 from ..components.core.tie import Tie
 from ..errors import ArrangementError
 from ..symbolic import Expression, depends, symbol
@@ -34,9 +34,9 @@ class EquationBuilder:
         self.solutions = ca.SX(0, 1)
         self.checks: dict[str, Expression] = {}
         self.losses: list[tuple[str, Expression]] = []
-        self.corners: list[Corner] = []
-        self.sides: list[Side] = []
-        self.holds: list[Hold] = []
+        self.kinks: list[Kink] = []
+        self.jumps: list[Jump] = []
+        self.constraints: list[StictionConstraint] = []
         self.owners: dict[str, str] = {}
         self.order = {path: number for number, (path, _) in enumerate(assembly.walk())}
         for path, part in assembly.walk():
@@ -100,31 +100,31 @@ class EquationBuilder:
 
 
 class SwitchScope:
-    """What one part says of the places where it is not smooth."""
+    """Takes what one part declares of the places where it is not smooth."""
 
     def __init__(self, builder: EquationBuilder, path: str) -> None:
         self._builder = builder
         self.path = path
 
-    def corner(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
-        """Say that the effort has a corner where a value vanishes."""
+    def kink(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
+        """Declare that the effort has a kink where a value vanishes."""
         full = f"{self.path}.{name}" if name else self.path
-        self._builder.corners.append(Corner(full, value, above, below))
+        self._builder.kinks.append(Kink(full, value, above, below))
 
-    def side(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
+    def jump(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
         """Return a symbol that is 1 where a value is positive and −1 where it is negative."""
         full = f"{self.path}.{name}" if name else self.path
         mode = symbol(f"{full}.mode")
-        self._builder.sides.append(Side(full, value, above, below, mode))
+        self._builder.jumps.append(Jump(full, value, above, below, mode))
         return mode
 
-    def hold(self, hold: Hold) -> Expression:
+    def stiction(self, constraint: StictionConstraint) -> Expression:
         """Take an effort that holds a rate at zero, and return it."""
-        self._builder.holds.append(hold)
-        return hold.effort
+        self._builder.constraints.append(constraint)
+        return constraint.effort
 
 
-class OwnNames(SwitchScope):
+class NamingScope(SwitchScope):
     """What one part has named in the builder: numbers, inputs, states, signals."""
 
     def parameter(self, name: str) -> Expression:
@@ -175,7 +175,7 @@ class OwnNames(SwitchScope):
         self._builder.signals[full] = (variable, ca.SX(value))
 
 
-class PartScope(OwnNames):
+class PartScope(NamingScope):
     """The view of one part in the builder: its own names, and what it says of them."""
 
     def child(self, name: str) -> PartScope:

@@ -16,7 +16,7 @@ from ..quantity import Quantity, changed_source, same_dimension
 from ..symbolic import Expression
 from .notebook_view import model_html
 from .readings import ReadingNames
-from .structure import MovingBody, SpringNames, Structure
+from .structure import MovingBody, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -143,9 +143,10 @@ class FlatModel:
     tables
         Looked-up numbers w; empty for a continuous model.
     switching
-        Where the equations are not smooth; ``None`` if they are everywhere, or if nobody said.
+        Where the equations are not smooth; ``None`` if they are everywhere, or where it is not declared.
     bodies, springs, readings
-        What the model is made of: which variables belong together, in written order. Empty where nobody said.
+        What the model is made of: which variables belong together, in written order. Empty where that is
+        not declared.
     """
 
     name: str
@@ -185,24 +186,6 @@ class FlatModel:
             For instance ``model.states``.
         """
         return np.array([v.start for v in of], dtype=float)
-
-    @property
-    def structure(self) -> Structure:
-        """Bodies, springs and readings together."""
-        return Structure(self.bodies, self.springs, self.readings)
-
-    def with_structure(self, structure: Structure) -> FlatModel:
-        """Return a copy made of other bodies, springs and readings; what has no variables here is left out.
-
-        Parameters
-        ----------
-        structure
-            Of this model or of one that it came from.
-        """
-        groups = (self.states, self.inputs, self.outputs, self.signals)
-        names = {v.name for group in groups for v in group}
-        kept = structure.within(names, {v.name for v in self.inputs})
-        return replace(self, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
 
     def variable(self, name: str) -> Variable:
         """Return the variable of that name.
@@ -330,8 +313,8 @@ class FlatModel:
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """Return text, equations and picture; a notebook takes the richest that it can show."""
         latex = self._latex()
-        told = {"text/latex": f"$${latex}$$"} if latex else {}
-        return {"text/plain": str(self), **told, "text/html": self._repr_html_()}
+        equations = {"text/latex": f"$${latex}$$"} if latex else {}
+        return {"text/plain": str(self), **equations, "text/html": self._repr_html_()}
 
     def _latex(self) -> str:
         try:

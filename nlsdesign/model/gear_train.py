@@ -63,25 +63,25 @@ def trains(assembly: Assembly) -> dict[str, Wheel]:
         Its gears have been checked.
     """
     gears = [(name, part) for name, part in assembly.parts if isinstance(part, Gear)]
-    found: dict[str, Wheel] = {}
+    leading: dict[str, Wheel] = {}
     taken: set[str] = set()
     for name, part in assembly.parts:
         if isinstance(part, Free) and name not in taken and any(name in g.between for _, g in gears):
-            found[name] = _wheel(assembly, name, gears, taken)
-    return found
+            leading[name] = _wheel(assembly, name, gears, taken)
+    return leading
 
 
 def _wheel(assembly: Assembly, name: str, gears: list[tuple[str, Gear]], taken: set[str]) -> Wheel:
     taken.add(name)
     body = assembly[name]
     assert isinstance(body, Free)
-    found = Wheel(name, body)
+    wheel = Wheel(name, body)
     for label, gear in gears:
         for end, other, outward in ((0, 1, True), (1, 0, False)):
             if gear.between[end] == name and gear.between[other] not in taken:
                 behind = _wheel(assembly, gear.between[other], gears, taken)
-                found.joints.append(Joint(label, gear, outward, behind))
-    return found
+                wheel.joints.append(Joint(label, gear, outward, behind))
+    return wheel
 
 
 def train_motions(
@@ -98,12 +98,12 @@ def train_motions(
     lead
         Motion of the leading body.
     """
-    found = {root.name: (lead, ca.SX(1))}
+    motions = {root.name: (lead, ca.SX(1))}
     for front, joint in root.gears():
         ratio = scopes[joint.name].parameter("ratio")
-        turns = found[front.name][1] * (1 / ratio if joint.outward else ratio)
-        found[joint.behind.name] = Motion(turns * lead.motion, turns * lead.rate), turns
-    return found
+        turns = motions[front.name][1] * (1 / ratio if joint.outward else ratio)
+        motions[joint.behind.name] = Motion(turns * lead.motion, turns * lead.rate), turns
+    return motions
 
 
 @dataclass(frozen=True)
@@ -197,9 +197,9 @@ def _solved(
     unknown, turning = symbol(f"{root.name}.sought"), symbol(f"{root.name}.turning")
     carried: dict[str, tuple[Expression, Expression]] = {}
     lacking = _Load(stand_ins, turns, scopes, turning, unknown).missing(root, carried)
-    found = _root(lacking, unknown)
+    root_of = _root(lacking, unknown)
     rest = ca.vertcat(lacking, *[torque for pair in carried.values() for torque in pair])
-    results = ca.vertcat(found, ca.substitute(rest, unknown, found))
+    results = ca.vertcat(root_of, ca.substitute(rest, unknown, root_of))
     old, new = ca.vertcat(*stand_ins.values(), turning), ca.vertcat(*acting.values(), speed)
     acceleration, remainder, *torques = ca.vertsplit(ca.SX(ca.substitute(results, old, new)))
     if any(isinstance(joint.gear, LossyGear) for _, joint in root.gears()):

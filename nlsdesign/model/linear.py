@@ -89,10 +89,10 @@ def linearise(model: FlatModel, state: Sequence[float], inputs: Sequence[float] 
     """
     u = np.asarray(inputs if len(inputs) else model.start(model.inputs), dtype=float)
     x = np.asarray(state, dtype=float)
-    found = jacobian_function(model)(
+    matrices = jacobian_function(model)(
         0.0, x, u, model.start(model.parameters), model.look_up(list(x), list(u))
     )
-    a, b, c, d = (np.array(m, dtype=float) for m in found)
+    a, b, c, d = (np.array(m, dtype=float) for m in matrices)
     if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
         raise ValueRangeError(
             f"linearisation of {model.name} at {x.tolist()}",

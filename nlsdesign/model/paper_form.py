@@ -1,4 +1,4 @@
-"""The form in which the actuator was published: force, extension, angle and speed as states.
+"""The form of the paper on the actuator: force, extension, angle and speed as states.
 
 It is not minimal on purpose: the extension follows from the angle, and its rate is called an input. It is
 derived here from the same flat model as everything else, so that what it loses can be seen.
@@ -8,43 +8,84 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import casadi as ca
 
 from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
-from .transform import cut, named
+from .roles import driven_body, series_cam
+from .transform import cut, named, parts_of, with_parts
 
 GEOMETRIC = "geometric"
 """What stands behind the name of the extension for the one that follows from the angle."""
 
 
 @dataclass(frozen=True)
-class PublishedNames:
-    """Names of the variables that make the published form.
+class PaperFormNames:
+    """Names of the variables that make the form of the paper; each is decided from the structure by default.
 
     Parameters
     ----------
     inner
-        State of the rubber that the force replaces.
+        State of the rubber that the force replaces: the only one of the element behind the cam.
     force, extension
         Signals of one element behind the cam.
     rate
         Name of the new input dδ/dt.
     angle, speed
-        States of the drivetrain.
+        States of the driven body.
     """
 
-    inner: str = "spring.rubber.relaxing.dashpot.strain"
-    force: str = "spring.rubber.force"
-    extension: str = "spring.rubber.extension"
-    rate: str = "spring.rubber.rate"
-    angle: str = "motor.angle"
-    speed: str = "motor.speed"
+    inner: str | None = None
+    force: str | None = None
+    extension: str | None = None
+    rate: str | None = None
+    angle: str | None = None
+    speed: str | None = None
+
+    def of(self, model: FlatModel) -> KnownNames:
+        """Return the names in a model.
+
+        Parameters
+        ----------
+        model
+            Continuous, with one element behind a cam.
+
+        Raises
+        ------
+        ArrangementError
+            If the structure does not decide one that is left out.
+        """
+        cam, body = series_cam(model), driven_body(model)
+        if self.inner is None and len(cam.states) != 1:
+            raise ArrangementError(
+                f"'{cam.element}'", f"has {len(cam.states)} inner states",
+                next_step="the form of the paper knows one element with one inner state; name it as inner=",
+            )  # fmt: skip
+        return KnownNames(
+            inner=self.inner or cam.states[0],
+            force=self.force or cam.force,
+            extension=self.extension or cam.extension,
+            rate=self.rate or f"{cam.element}.rate",
+            angle=self.angle or body.motion,
+            speed=self.speed or body.rate,
+        )
 
 
-def published_form(model: FlatModel, names: PublishedNames | None = None) -> FlatModel:
+class KnownNames(NamedTuple):
+    """The variables of one model that make the form of the paper; see :class:`PaperFormNames`."""
+
+    inner: str
+    force: str
+    extension: str
+    rate: str
+    angle: str
+    speed: str
+
+
+def paper_form(model: FlatModel, names: PaperFormNames | None = None) -> FlatModel:
     """Return the model with x = (F, δ, θ, ω), u = (dδ/dt, other inputs), y = (δ, θ).
 
     dF/dt = ∂F/∂δ·dδ/dt + ∂F/∂z·ż with the inner state z eliminated by F(δ, z); dδ/dt is the input itself; the
@@ -57,16 +98,17 @@ def published_form(model: FlatModel, names: PublishedNames | None = None) -> Fla
     model
         Continuous, with one element behind a cam between ``angle`` and a fixed load.
     names
-        Which variables are meant; those of the published actuator by default.
+        Which variables are meant, where the structure of the model does not say it.
 
     Raises
     ------
     UnknownNameError
         If a name does not exist.
     ArrangementError
-        If the force does not depend on extension and inner state alone, or is not affine in the latter.
+        If the force does not depend on extension and inner state alone, or is not affine in the latter, or
+        the structure does not decide which variables are meant.
     """
-    n = PublishedNames() if names is None else names
+    n = (names or PaperFormNames()).of(model)
     states = [v.name for v in model.states]
     for name in (n.inner, n.angle, n.speed):
         if name not in states:
@@ -79,8 +121,8 @@ def published_form(model: FlatModel, names: PublishedNames | None = None) -> Fla
     force_rate = _force_rate(rubber, n, known)
     pull = _required(drive, known, f"der({n.speed})")
     extension = replace(model.variable(n.extension), start=0.0)
-    found = _expressed(drive, known, [v.name for v in drive.signals if v.name not in symbols])
-    signals = {drive.variable(name): value for name, value in found.items() if value is not None}
+    others = _expressed(drive, known, [v.name for v in drive.signals if v.name not in symbols])
+    signals = {drive.variable(name): value for name, value in others.items() if value is not None}
     signals[replace(extension, name=f"{n.extension}.{GEOMETRIC}")] = _required(model, known, n.extension)
     carried = (n.force, n.extension, n.angle, n.speed)
     equations = ca.Function(
@@ -97,32 +139,33 @@ def published_form(model: FlatModel, names: PublishedNames | None = None) -> Fla
     )  # fmt: skip
     start = model.evaluate([v.start for v in model.states])
     kept = [model.variable(name) for name in carried]
-    return replace(
+    changed = replace(
         model,
-        description=f"{model.description} (published form)".strip(),
+        description=f"{model.description} (form of the paper)".strip(),
         states=tuple(replace(v, start=start.get(v.name, v.start)) for v in kept),
         inputs=(Variable(n.rate, f"{extension.unit}/s", f"rate of {n.extension}"), *model.inputs),
         outputs=(extension, replace(model.variable(n.angle), start=0.0)),
         signals=tuple(signals),
         equations=equations,
     )
+    return with_parts(changed, parts_of(model).with_state(n.inner, n.force))
 
 
 def _required(model: FlatModel, known: Mapping[str, Expression], name: str) -> Expression:
-    found = _expressed(model, known, [name])[name]
-    if found is None:
+    expression = _expressed(model, known, [name])[name]
+    if expression is None:
         raise ArrangementError(
             f"'{name}'", "does not follow from force, extension, angle and speed alone",
-            next_step="the published form knows a fixed load and one element behind one cam",
+            next_step="the form of the paper knows a fixed load and one element behind one cam",
         )  # fmt: skip
-    return found
+    return expression
 
 
-def _force_rate(rubber: FlatModel, n: PublishedNames, symbols: Mapping[str, Expression]) -> Expression:
+def _force_rate(rubber: FlatModel, n: KnownNames, symbols: Mapping[str, Expression]) -> Expression:
     """Return dF/dt as a function of force, extension and its rate."""
     inner = ca.SX.sym(n.inner)
-    found = _expressed(rubber, {**symbols, n.inner: inner}, [n.force, f"der({n.inner})"])
-    force, inner_rate = found[n.force], found[f"der({n.inner})"]
+    of_rubber = _expressed(rubber, {**symbols, n.inner: inner}, [n.force, f"der({n.inner})"])
+    force, inner_rate = of_rubber[n.force], of_rubber[f"der({n.inner})"]
     if (
         force is None
         or inner_rate is None
@@ -130,7 +173,7 @@ def _force_rate(rubber: FlatModel, n: PublishedNames, symbols: Mapping[str, Expr
     ):
         raise ArrangementError(
             f"'{n.force}'", f"does not follow from '{n.extension}' and '{n.inner}' alone",
-            next_step="the published form knows one element with one inner state",
+            next_step="the form of the paper knows one element with one inner state",
         )  # fmt: skip
     slope = ca.jacobian(force, inner)
     if depends(slope, inner) or slope.nnz() == 0:

@@ -44,7 +44,8 @@ def series_spring(model: FlatModel, name: str | None = None) -> SpringNames:
         "the series spring (the only spring with a cam, or else the only spring)",
         _listed("spring", [spring.name for spring in candidates], "with a cam" if with_cam else ""),
         _choice(
-            "spring", [spring.name for spring in candidates], "tie an elastic element between two bodies"
+            [f"spring='{s.name}', or its torque '{s.effort}' (--spring {s.name})" for s in candidates],
+            "tie an elastic element between two bodies",
         ),
     )
 
@@ -76,12 +77,15 @@ def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
         model,
         "the cam spring (the only cam with an element behind it)",
         _listed("cam spring", list(cams)),
-        _choice("spring", list(cams), "declare the spring with through(cam, ...)"),
+        _choice(
+            [f"spring='{name}' (--spring {name})" for name in cams],
+            "declare the spring with through(cam, ...)",
+        ),
     )
 
 
 def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
-    """Return the body that the drive moves: the only one with a motor, or else the only one that is free.
+    """Return the body that the drive moves: the only one with a motor, or else the only one free to move.
 
     Parameters
     ----------
@@ -101,17 +105,16 @@ def driven_body(model: FlatModel, name: str | None = None) -> MovingBody:
     if name is not None:
         return _named("body", name, {body.name: body for body in free})
     motors = [body for body in free if body.motor]
-    candidates = motors or free
+    candidates, which = (motors, "with a motor") if motors else (free, "free to move")
     if len(candidates) == 1:
         return candidates[0]
     raise _undecided(
         model,
-        "the driven body (the only one with a motor, or else the only one that moves freely)",
-        _listed(
-            "body", [body.name for body in candidates], "with a motor" if motors else "that moves freely"
-        ),
+        "the driven body (the only one with a motor, or else the only one free to move)",
+        _listed("body", [body.name for body in candidates], which),
         _choice(
-            "measured", [body.motion for body in candidates], "declare a body that moves, such as a motor"
+            [f"its motion '{body.motion}' (--measured {body.motion})" for body in candidates],
+            "declare a body that moves, such as a motor",
         ),
     )
 
@@ -194,9 +197,8 @@ def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
     prescribed = {body.name: body for body in model.bodies if body.prescribed}
     if name is not None:
         return _named("driven load", name, prescribed)
-    ends = {
-        end for spring in model.springs if spring.cams or len(model.springs) == 1 for end in spring.between
-    }
+    with_cam = [spring for spring in model.springs if spring.cams]
+    ends = {end for spring in with_cam or model.springs for end in spring.between}
     candidates = [body for body in prescribed.values() if body.name in ends] or list(prescribed.values())
     if len(candidates) == 1:
         return candidates[0]
@@ -204,7 +206,7 @@ def moved_load(model: FlatModel, name: str | None = None) -> MovingBody:
         model,
         "the moved load (the body with a prescribed motion at the end of the series spring)",
         _listed("body", [body.name for body in candidates], "with a prescribed motion"),
-        _choice("load", [body.name for body in candidates], "declare the load as Driven()"),
+        _choice([f"load='{body.name}'" for body in candidates], "declare the load as Driven()"),
     )
 
 
@@ -236,10 +238,8 @@ def _listed(kind: str, names: Sequence[str], which: str = "") -> str:
     return f"there are {len(names)} {plural} {which}".rstrip() + ": " + _quoted(names)
 
 
-def _choice(argument: str, names: Sequence[str], otherwise: str) -> str:
-    if not names:
-        return otherwise
-    return f"say which with {argument}='{names[0]}' (--{argument} {names[0]})"
+def _choice(examples: Sequence[str], otherwise: str) -> str:
+    return f"name one, for instance {examples[0]}" if examples else otherwise
 
 
 def _quoted(names: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""Efforts that hold a rate at zero, found from the motion of everything else; and the switches of a model.
+"""Efforts that hold a rate at zero, which follow from the motion of all else; and the switches of a model.
 
 The acceleration v̇ of each rate that can be held is linear in all holding efforts λ: v̇ = A·λ + b. A rate that
 is held gives the row v̇ = 0, one that is not held the row λ = (effort while moving). The modes stay symbols
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from ..components.core.switches import Hold
+from ..components.core.switches import StictionConstraint
 from ..errors import ArrangementError
 from ..symbolic import Expression, depends
 from .equation_builder import EquationBuilder
@@ -24,7 +24,7 @@ _SMOOTH = "take the smooth form of the law: smoothed(assembly)"
 
 @dataclass(frozen=True)
 class Laws:
-    """What the switches of a builder say, in the symbols of the model and of the modes.
+    """The laws of the switches of a builder, in the symbols of the model and of the modes.
 
     ``reach`` holds one row of holding efforts for each state by name.
     """
@@ -52,85 +52,89 @@ class Laws:
 
 
 def switch_laws(builder: EquationBuilder) -> Laws:
-    """Solve for all holding efforts, note them in the builder and return what the switches say.
+    """Solve for all holding efforts, note them in the builder and return the laws of the switches.
 
     Parameters
     ----------
     builder
-        With everything that the parts have said.
+        With the equations of all parts.
 
     Raises
     ------
     ArrangementError
         If a rate that is to be held has no inertia, or two efforts hold the same one.
     """
-    holds = _merged(builder)
-    reach = _solved(builder, holds) if holds else {name: () for name in builder.derivatives}
-    others = (*builder.sides, *builder.corners)
-    corner_modes = [ca.SX.sym(f"{c.name}.mode") for c in builder.corners]
-    modes = (*(h.mode for h in holds), *(s.mode for s in builder.sides), *corner_modes)
+    constraints = _merged(builder)
+    reach = _solved(builder, constraints) if constraints else {name: () for name in builder.derivatives}
+    others = (*builder.jumps, *builder.kinks)
+    kink_modes = [ca.SX.sym(f"{c.name}.mode") for c in builder.kinks]
+    modes = (*(h.mode for h in constraints), *(s.mode for s in builder.jumps), *kink_modes)
     none = tuple(ca.SX(0) for _ in others)
-    switches = [Switch(h.name, h.words, True) for h in holds]
-    switches += [Switch(s.name, ((1, s.above), (-1, s.below)), s in builder.sides) for s in others]
-    lasts = [ca.if_else(h.mode == 0, h.stays, h.lands) for h in holds]
-    lasts += [m * s.value for m, s in zip(modes[len(holds) :], others, strict=True)]
-    first = [*(h.first for h in holds), *(ca.if_else(s.value >= 0, 1, -1) for s in others)]
+    switches = [Switch(h.name, h.words, True) for h in constraints]
+    switches += [Switch(s.name, ((1, s.above), (-1, s.below)), s in builder.jumps) for s in others]
+    lasts = [ca.if_else(h.mode == 0, h.stays, h.lands) for h in constraints]
+    lasts += [m * s.value for m, s in zip(modes[len(constraints) :], others, strict=True)]
+    first = [*(h.first for h in constraints), *(ca.if_else(s.value >= 0, 1, -1) for s in others)]
     return Laws(
         tuple(switches), modes, tuple(lasts), tuple(first),
-        (*(h.stays for h in holds), *(ca.SX(1) for _ in others)), (*(h.leads for h in holds), *none),
-        (*(h.rate for h in holds), *none), (*(h.rebound for h in holds), *none),
+        (*(h.stays for h in constraints), *(ca.SX(1) for _ in others)),
+        (*(h.leads for h in constraints), *none),
+        (*(h.rate for h in constraints), *none), (*(h.rebound for h in constraints), *none),
         {name: (*row, *none) for name, row in reach.items()},
     )  # fmt: skip
 
 
-def _merged(builder: EquationBuilder) -> list[Hold]:
-    """Return the holds with those of dry friction on the same rate made one; each gets its share."""
-    found: list[Hold] = []
-    for hold in builder.holds:
-        rate = builder.cleaned(hold.rate)
-        same = [i for i, h in enumerate(found) if ca.is_equal(ca.simplify(h.rate - rate), ca.SX(0), 2)]
-        if not same or hold.level is None or found[same[0]].level is None:
-            found.append(replace(hold, rate=rate))
+def _merged(builder: EquationBuilder) -> list[StictionConstraint]:
+    """Return the constraints with those of dry friction on the same rate made one; each gets its share."""
+    merged: list[StictionConstraint] = []
+    for constraint in builder.constraints:
+        rate = builder.cleaned(constraint.rate)
+        same = [i for i, h in enumerate(merged) if ca.is_equal(ca.simplify(h.rate - rate), ca.SX(0), 2)]
+        if not same or constraint.level is None or merged[same[0]].level is None:
+            merged.append(replace(constraint, rate=rate))
             continue
-        first, more = found[same[0]], hold.level
+        first, more = merged[same[0]], constraint.level
         before = first.level if first.level is not None else ca.SX(0)
-        moving = ca.substitute(hold.moving, hold.mode, first.mode)
+        moving = ca.substitute(constraint.moving, constraint.mode, first.mode)
         whole = ca.SX.sym(f"{first.name}.all")
         level = before + more
         share = ca.if_else(level > 0, before / ca.if_else(level > 0, level, 1), 0)
         own = ca.if_else(first.mode == 0, whole * share, first.moving)
         builder.define(first.effort, own)
         # So the sum is that of both whether they stick or not.
-        builder.define(hold.effort, whole - own)
-        builder.define(hold.mode, first.mode)
-        found[same[0]] = replace(
-            first, name=f"{first.name}+{hold.name}", effort=whole, moving=first.moving + moving,
+        builder.define(constraint.effort, whole - own)
+        builder.define(constraint.mode, first.mode)
+        merged[same[0]] = replace(
+            first, name=f"{first.name}+{constraint.name}", effort=whole, moving=first.moving + moving,
             stays=level - ca.fabs(whole), leads=ca.if_else(whole >= 0, 1, -1), level=level,
         )  # fmt: skip
-    return found
+    return merged
 
 
-def _solved(builder: EquationBuilder, holds: Sequence[Hold]) -> dict[str, list[Expression]]:
-    efforts = ca.vertcat(*[h.effort for h in holds])
+def _solved(
+    builder: EquationBuilder, constraints: Sequence[StictionConstraint]
+) -> dict[str, list[Expression]]:
+    efforts = ca.vertcat(*[h.effort for h in constraints])
     cleaned = ca.vertsplit(builder.cleaned(ca.vertcat(*builder.derivatives.values())))
     rates = dict(zip(builder.derivatives, cleaned, strict=True))
-    for hold in holds:
-        _check_rate(builder, hold)
-    accelerations = ca.vertcat(*[_acceleration(builder, h.rate, rates) for h in holds])
+    for constraint in constraints:
+        _check_rate(builder, constraint)
+    accelerations = ca.vertcat(*[_acceleration(builder, h.rate, rates) for h in constraints])
     matrix = ca.jacobian(accelerations, efforts)
-    moving = builder.cleaned(ca.vertcat(*[h.moving for h in holds]))
-    _check_linear(holds, matrix, moving, efforts)
+    moving = builder.cleaned(ca.vertcat(*[h.moving for h in constraints]))
+    _check_linear(constraints, matrix, moving, efforts)
     free = ca.substitute(accelerations, efforts, ca.SX.zeros(efforts.shape))
-    unit = ca.SX.eye(len(holds))
+    unit = ca.SX.eye(len(constraints))
     rows = [
-        ca.if_else(h.mode == 0, ca.densify(matrix[i, :]), ca.densify(unit[i, :])) for i, h in enumerate(holds)
+        ca.if_else(h.mode == 0, ca.densify(matrix[i, :]), ca.densify(unit[i, :]))
+        for i, h in enumerate(constraints)
     ]
-    right = [ca.if_else(h.mode == 0, -free[i], moving[i]) for i, h in enumerate(holds)]
-    found = right[0] / rows[0] if len(holds) == 1 else _eliminated(rows, right)
-    for hold, solution in zip(holds, ca.vertsplit(found), strict=True):
-        builder.define(hold.effort, solution)
-    for hold in holds:
-        _hold_exactly(builder, hold, rates)
+    right = [ca.if_else(h.mode == 0, -free[i], moving[i]) for i, h in enumerate(constraints)]
+    efforts_held = right[0] / rows[0] if len(constraints) == 1 else _eliminated(rows, right)
+    for constraint, solution in zip(constraints, ca.vertsplit(efforts_held), strict=True):
+        builder.define(constraint.effort, solution)
+    for constraint in constraints:
+        _hold_exactly(builder, constraint, rates)
     return {name: ca.horzsplit(ca.densify(ca.jacobian(rate, efforts))) for name, rate in rates.items()}
 
 
@@ -141,42 +145,44 @@ def _eliminated(rows: list[Expression], right: list[Expression]) -> Expression:
         for k in range(i + 1, count):
             factor = rows[k][i] / rows[i][i]
             rows[k], right[k] = rows[k] - factor * rows[i], right[k] - factor * right[i]
-    found: dict[int, Expression] = {}
+    solution: dict[int, Expression] = {}
     for i in reversed(range(count)):
-        rest = sum((rows[i][k] * found[k] for k in range(i + 1, count)), start=ca.SX(0))
-        found[i] = (right[i] - rest) / rows[i][i]
-    return ca.vertcat(*[found[i] for i in range(count)])
+        rest = sum((rows[i][k] * solution[k] for k in range(i + 1, count)), start=ca.SX(0))
+        solution[i] = (right[i] - rest) / rows[i][i]
+    return ca.vertcat(*[solution[i] for i in range(count)])
 
 
-def _check_rate(builder: EquationBuilder, hold: Hold) -> None:
+def _check_rate(builder: EquationBuilder, constraint: StictionConstraint) -> None:
     known = {
         e.element_hash()
         for group in (builder.states, builder.inputs, builder.parameters)
         for _, e in group.values()
     }
-    known |= {s.mode.element_hash() for s in builder.sides}
-    inside = [s.element_hash() for s in ca.symvar(hold.rate)]
+    known |= {s.mode.element_hash() for s in builder.jumps}
+    inside = [s.element_hash() for s in ca.symvar(constraint.rate)]
     if not inside or not known.issuperset(inside):
         raise ArrangementError(
-            hold.name, "its rate is itself an unknown, as in series with another element",
+            constraint.name, "its rate is itself an unknown, as in series with another element",
             next_step=f"tie it directly between two bodies, or {_SMOOTH}",
         )  # fmt: skip
 
 
 def _acceleration(builder: EquationBuilder, rate: Expression, rates: Mapping[str, Expression]) -> Expression:
     """Return the time derivative of a rate; what moves a driven body gets its acceleration as an input."""
-    found = ca.SX(0)
+    acceleration = ca.SX(0)
     for name, (_, state) in builder.states.items():
         if depends(rate, state):
-            found += ca.jacobian(rate, state) * rates[name]
+            acceleration += ca.jacobian(rate, state) * rates[name]
     for name, (variable, symbol) in list(builder.inputs.items()):
         if depends(rate, symbol):
-            found += ca.jacobian(rate, symbol) * builder.rate_of_input(name, variable)
-    return found
+            acceleration += ca.jacobian(rate, symbol) * builder.rate_of_input(name, variable)
+    return acceleration
 
 
-def _check_linear(holds: Sequence[Hold], matrix: Expression, moving: Expression, efforts: Expression) -> None:
-    names = " and ".join(f"'{h.name}'" for h in holds)
+def _check_linear(
+    constraints: Sequence[StictionConstraint], matrix: Expression, moving: Expression, efforts: Expression
+) -> None:
+    names = " and ".join(f"'{h.name}'" for h in constraints)
     if depends(matrix, efforts) or depends(moving, efforts):
         raise ArrangementError(
             names,
@@ -184,20 +190,22 @@ def _check_linear(holds: Sequence[Hold], matrix: Expression, moving: Expression,
             next_step=_SMOOTH,
         )
     draw = np.random.default_rng(1)
-    modes = ca.vertcat(*[h.mode for h in holds])
+    modes = ca.vertcat(*[h.mode for h in constraints])
     matrix = ca.SX(ca.substitute(matrix, modes, ca.SX.zeros(modes.shape)))
     symbols = ca.symvar(matrix)
     numbers = ca.Function("numbers", symbols, [matrix]).call(
         [float(v) for v in draw.uniform(0.5, 1.5, len(symbols))]
     )
-    found = np.array(ca.DM(numbers[0]))
-    for i, hold in enumerate(holds):
-        if not found[i, i]:
+    inertia_matrix = np.array(ca.DM(numbers[0]))
+    for i, constraint in enumerate(constraints):
+        if not inertia_matrix[i, i]:
             raise ArrangementError(
-                hold.name, "nothing with inertia can be held by it", next_step="tie it to a body that moves"
+                constraint.name,
+                "nothing with inertia can be held by it",
+                next_step="tie it to a body that moves",
             )
-    scale = np.sqrt(np.abs(np.diag(found)))
-    if np.linalg.svd(found / np.outer(scale, scale), compute_uv=False)[-1] < 1e-9:
+    scale = np.sqrt(np.abs(np.diag(inertia_matrix)))
+    if np.linalg.svd(inertia_matrix / np.outer(scale, scale), compute_uv=False)[-1] < 1e-9:
         raise ArrangementError(
             names, "hold the same motion in two ways, so the share of each is not defined",
             next_step="tie dry frictions between the same bodies in the same order, use an elastic stop, "
@@ -205,15 +213,19 @@ def _check_linear(holds: Sequence[Hold], matrix: Expression, moving: Expression,
         )  # fmt: skip
 
 
-def _hold_exactly(builder: EquationBuilder, hold: Hold, rates: Mapping[str, Expression]) -> None:
+def _hold_exactly(
+    builder: EquationBuilder, constraint: StictionConstraint, rates: Mapping[str, Expression]
+) -> None:
     """While held, let the first state in the rate follow the others, so that no rounding moves it."""
-    inside = [n for n, (_, s) in builder.states.items() if depends(hold.rate, s)]
-    slopes = {n: ca.jacobian(hold.rate, builder.states[n][1]) for n in inside}
+    inside = [n for n, (_, s) in builder.states.items() if depends(constraint.rate, s)]
+    slopes = {n: ca.jacobian(constraint.rate, builder.states[n][1]) for n in inside}
     if not inside or any(ca.symvar(slope) for slope in slopes.values()):
         return
     first = inside[0]
-    rest = _acceleration(builder, hold.rate, dict(builder.derivatives) | {first: ca.SX(0)})
-    builder.derivatives[first] = ca.if_else(hold.mode == 0, -rest / slopes[first], builder.derivatives[first])
+    rest = _acceleration(builder, constraint.rate, dict(builder.derivatives) | {first: ca.SX(0)})
+    builder.derivatives[first] = ca.if_else(
+        constraint.mode == 0, -rest / slopes[first], builder.derivatives[first]
+    )
 
 
 def natural_modes(laws: Laws) -> Expression:
@@ -230,19 +242,19 @@ def natural_modes(laws: Laws) -> Expression:
         If the side of a switch depends on itself, as inside a series.
     """
     modes = ca.vertcat(*laws.modes) if laws.modes else ca.SX(0, 1)
-    found = ca.vertcat(*laws.first) if laws.first else ca.SX(0, 1)
+    natural = ca.vertcat(*laws.first) if laws.first else ca.SX(0, 1)
     for _ in laws.modes:
-        if not depends(found, modes):
+        if not depends(natural, modes):
             break
-        found = ca.SX(ca.substitute(found, modes, found))
-    if depends(found, modes):
+        natural = ca.SX(ca.substitute(natural, modes, natural))
+    if depends(natural, modes):
         names = ", ".join(s.name for s in laws.switches)
         raise ArrangementError(names, "on which side it is depends on itself", next_step=_SMOOTH)
     for _ in range(sum(not s.is_zero() for s in laws.rates)):
-        at = ca.substitute(ca.vertcat(*laws.stays, *laws.leads), modes, found)
+        at = ca.substitute(ca.vertcat(*laws.stays, *laws.leads), modes, natural)
         stays, leads = at[: len(laws.modes)], at[len(laws.modes) :]
-        found = ca.if_else(ca.logic_and(found == 0, stays < 0), leads, found)
-    return ca.SX(found)
+        natural = ca.if_else(ca.logic_and(natural == 0, stays < 0), leads, natural)
+    return ca.SX(natural)
 
 
 def switching(

@@ -386,7 +386,7 @@ def number_names(path: str, part: Part, field: str) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Structure:
+class ModelParts:
     """Bodies, springs and readings of a model.
 
     Parameters
@@ -399,7 +399,7 @@ class Structure:
     springs: tuple[SpringNames, ...]
     readings: tuple[ReadingNames, ...]
 
-    def within(self, names: Collection[str], inputs: Collection[str]) -> Structure:
+    def within(self, names: Collection[str], inputs: Collection[str]) -> ModelParts:
         """Return what is left where a model has these variables only.
 
         A body stays while it has motion and rate, a spring while it has motion and effort, a reading while
@@ -412,7 +412,7 @@ class Structure:
         inputs
             Names of the inputs.
         """
-        return Structure(
+        return ModelParts(
             tuple(
                 _with_drives(body, inputs) for body in self.bodies if {body.motion, body.rate} <= set(names)
             ),
@@ -424,7 +424,7 @@ class Structure:
             tuple(reading for reading in self.readings if reading.signal in names),
         )
 
-    def with_state(self, old: str, new: str) -> Structure:
+    def with_state(self, old: str, new: str) -> ModelParts:
         """Return what there is where another inner state of a spring stands in the place of one.
 
         Parameters

@@ -1,14 +1,13 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
 from .check import ErrorStability, check_stability
-from .forms import AsPublished, Minimal, StateForm
+from .forms import Minimal, PaperForm, StateForm
 from .gains import CascadeGain, GainRule, PolePlacement, SteadyStateKalman
 from .run import observe
-from .scheduled import ObserverDesign, design_observer, observer_design
+from .scheduled import ObserverDesign, design_observer, design_observer_with_details
 from .table import FixedGrid, Grid, GridByTolerance
 
 __all__ = [
-    "AsPublished",
     "CascadeGain",
     "ErrorStability",
     "FixedGrid",
@@ -17,11 +16,12 @@ __all__ = [
     "GridByTolerance",
     "Minimal",
     "ObserverDesign",
+    "PaperForm",
     "PolePlacement",
     "StateForm",
     "SteadyStateKalman",
     "check_stability",
     "design_observer",
+    "design_observer_with_details",
     "observe",
-    "observer_design",
 ]

@@ -24,8 +24,8 @@ FINE = 2.5e-4
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Which variable of a model plays which part.
+class ScheduledNames:
+    """Which variable of a model plays which role.
 
     Parameters
     ----------
@@ -57,15 +57,18 @@ class AngleForm:
     model
         Continuous; its first output is what is wanted.
     layout
-        Which variable plays which part.
+        Which variable plays which role.
     """
 
-    def __init__(self, model: FlatModel, layout: Layout) -> None:
+    def __init__(self, model: FlatModel, layout: ScheduledNames) -> None:
         names = [v.name for v in model.states]
-        last = [names.index(layout.angle), names.index(layout.speed)]
+        moving = [names.index(layout.angle), names.index(layout.speed)]
         self.model, self.layout = model, layout
-        self.order = [i for i in range(len(names)) if i not in last] + last
-        self.n, self.inner = len(names), len(names) - 2
+        self.order = [i for i in range(len(names)) if i not in moving] + moving
+        self.n, self.inner = len(names), len(names) - len(moving)
+        # Places among the states of the model, and in the order of the observer.
+        self.angle_state, self.speed_state = moving
+        self.angle, self.speed = (self.order.index(place) for place in moving)
         self.p, self.u = model.start(model.parameters), model.start(model.inputs)
         self.free_inputs = [i for i, v in enumerate(model.inputs) if v.name != layout.rate]
         s = model.symbols()
@@ -81,7 +84,7 @@ class AngleForm:
         self._slopes = ca.Function(
             "slopes", arguments, [rate, slopes(rate, x), wanted, slopes(wanted, x), slopes(rate, led)]
         )
-        follow = slopes(rate[: self.inner], x[self.n - 1]) if self.inner else ca.SX(0, 1)
+        follow = slopes(rate[: self.inner], x[self.speed]) if self.inner else ca.SX(0, 1)
         self._follow = ca.Function("follow", arguments, [follow])
         self._sum = self._summed()
 
@@ -108,16 +111,16 @@ class AngleForm:
         rate, jacobian, wanted, row, led = evaluate_rows(self._slopes, rest, self.u, self.p)
         # Slopes in the speed are those of the moving actuator: dry friction has none there.
         _, moving, _, moving_row, _ = evaluate_rows(
-            self._slopes, _moving(rest, self.order[-1], self.layout.speed_size), self.u, self.p
+            self._slopes, _moving(rest, self.speed_state, self.layout.speed_size), self.u, self.p
         )
         a, shift = jacobian.reshape(-1, n, n).copy(), np.zeros((count, n))
         shift[:, :k] = self._shift(angles)
-        a[:, :, n - 2] = 0.0
-        a[:, :, n - 1] = moving.reshape(-1, n, n)[:, :, n - 1]
-        a[:, :k, n - 1] = 0.0
+        a[:, :, self.angle] = 0.0
+        a[:, :, self.speed] = moving.reshape(-1, n, n)[:, :, self.speed]
+        a[:, :k, self.speed] = 0.0
         carried = rest[:, self.order[:k]] - shift[:, :k]
         drive = rate - np.einsum("aij,aj->ai", a[:, :, :k], carried)
-        row[:, n - 2], row[:, n - 1] = 0.0, moving_row[:, n - 1]
+        row[:, self.angle], row[:, self.speed] = 0.0, moving_row[:, self.speed]
         offset = wanted[:, 0] - np.einsum("aj,aj->a", row[:, :k], carried)
         measured = rest[:, [i for i, v in enumerate(self.model.states) if v.name in self.layout.consistent]]
         return Coefficients(a, drive, shift, np.column_stack([row, offset]), led, measured)
@@ -127,21 +130,21 @@ class AngleForm:
         u = ca.SX.sym("input", len(self.free_inputs))
         x0 = self._rest(np.zeros(1))[0]
         given = ca.vertcat(*[self._input(i, u) for i in range(len(self.u))])
-        found = self._values(0.0, x0, given, self.p)[0] - self._values(0.0, x0, self.u, self.p)[0]
-        values = _tried(ca.Function("driven", [u], [found]), 1.0)
+        added = self._values(0.0, x0, given, self.p)[0] - self._values(0.0, x0, self.u, self.p)[0]
+        values = _sampled(ca.Function("driven", [u], [added]), 1.0)
         scale = max(float(np.max(np.abs(values), initial=0.0)), 1e-300)
         rows = tuple(int(i) for i in np.flatnonzero(np.max(np.abs(values), axis=0) > 1e-12 * scale))
-        return ca.Function("driven", [u], [ca.vertcat(*[found[i] for i in rows])]), rows
+        return ca.Function("driven", [u], [ca.vertcat(*[added[i] for i in rows])]), rows
 
     def friction(self) -> ca.Function | None:
         """Return what the speed adds to its own rate beyond its linear part, ω -> ω̇; ``None`` for nothing."""
         speed, x0 = ca.SX.sym("speed"), self._rest(np.zeros(1))[0]
-        slope = float(self.at(np.zeros(1)).a[0, self.n - 1, self.n - 1])
-        x = ca.vertcat(*[speed if i == self.order[-1] else x0[i] for i in range(len(x0))])
-        moving, still = (self._values(0.0, at, self.u, self.p)[0][self.n - 1] for at in (x, x0))
+        slope = float(self.at(np.zeros(1)).a[0, self.speed, self.speed])
+        x = ca.vertcat(*[speed if i == self.speed_state else x0[i] for i in range(len(x0))])
+        moving, still = (self._values(0.0, at, self.u, self.p)[0][self.speed] for at in (x, x0))
         function = ca.Function("friction", [speed], [moving - still - slope * speed])
         size = self.layout.speed_size
-        values = _tried(function, size)
+        values = _sampled(function, size)
         # Where nothing is left but rounding, there is no friction beyond the linear part.
         return function if np.max(np.abs(values)) > 1e-10 * abs(slope) * size + 1e-12 * size else None
 
@@ -168,14 +171,14 @@ class AngleForm:
         inputs = np.tile(self.u, (40, 1))
         inputs[:, self.free_inputs] = draw.normal(size=(40, len(self.free_inputs)))
         x = self._rest(at)
-        x[:, self.order[-1]] = speeds
+        x[:, self.speed_state] = speeds
         rate, _ = evaluate_rows(self._values, x, inputs, self.p)
         c = self.at(at)
         form = np.einsum("aij,aj->ai", c.a, x[:, self.order] - c.shift) + c.drive
         form[:, : self.inner] += self._followed(at) * speeds[:, None]
         for i, (speed, u) in enumerate(zip(speeds, inputs[:, self.free_inputs], strict=True)):
             form[i, list(rows)] += np.array(driven(u)).ravel()
-            form[i, self.n - 1] += 0.0 if friction is None else float(friction(speed))
+            form[i, self.speed] += 0.0 if friction is None else float(friction(speed))
         # At rest the rates of the inner states vanish; they are measured by what they would be far from it.
         scale = np.maximum(np.max(np.abs(rate), axis=0), np.max(np.abs(c.a) @ sizes, axis=0))
         missed = np.max(np.abs(rate - form), axis=0) / np.maximum(scale, 1e-300)
@@ -216,16 +219,16 @@ class AngleForm:
     def _followed(self, angles: Array) -> Array:
         """Return ∂ż/∂ω of the inner states, shape (N, inner); it may depend on the angle only."""
         x = np.tile(self.model.start(self.model.states), (len(angles), 1))
-        x[:, self.order[-2]] = angles
-        found: Array = evaluate_rows(
-            self._follow, _moving(x, self.order[-1], self.layout.speed_size), self.u, self.p
+        x[:, self.angle_state] = angles
+        slopes: Array = evaluate_rows(
+            self._follow, _moving(x, self.speed_state, self.layout.speed_size), self.u, self.p
         )[0]
-        return found
+        return slopes
 
     def _shift(self, angles: Array) -> Array:
         """Return Q(θ), shape (N, inner)."""
-        found: Array = np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
-        return found
+        shift: Array = np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
+        return shift
 
     def _summed(self) -> CubicHermiteSpline | None:
         """Return Q = ∫₀^θ ∂ż/∂ω dθ as a spline with its exact slope at fine nodes, zero among them."""
@@ -247,7 +250,7 @@ def _moving(x: Array, place: int, speed: float) -> Array:
     return moved
 
 
-def _tried(function: ca.Function, size: float) -> Array:
+def _sampled(function: ca.Function, size: float) -> Array:
     """Return the results of a function of one vector at random arguments of a size, one row each."""
     draw, width = np.random.default_rng(1), function.size1_in(0)
     return np.array([np.array(function(size * draw.normal(size=width))).ravel() for _ in range(16)])

@@ -78,11 +78,11 @@ def error_matrices(observer: FlatModel, angles: Array, speed: float = 0.0) -> Ar
     speed
         Estimated speed in rad/s, which matters where dry friction is part of the observer.
     """
-    memory = [i for i, v in enumerate(observer.states) if v.name.endswith("." + MEMORY)]
+    (inner, moving), (body,) = _memory(observer), observer.bodies
+    memory = [*inner, *moving]
     s = observer.symbols()
     known = {v.name: s.output[i] for i, v in enumerate(observer.outputs)}
-    angle, moving = (observer.states[i].name.removesuffix("." + MEMORY) for i in memory[-2:])
-    shown = ca.vertcat(known[f"{angle}.{INNOVATION}"], known[moving])
+    shown = ca.vertcat(known[f"{body.motion}.{INNOVATION}"], known[body.rate])
     error = ca.densify(ca.jacobian(s.derivative, s.state)[memory, memory])
     function = ca.Function("error", [s.state, s.input, s.table], [ca.vec(error.T), ca.densify(shown)])
     count = len(angles)
@@ -94,11 +94,19 @@ def error_matrices(observer: FlatModel, angles: Array, speed: float = 0.0) -> Ar
     for _ in range(2):
         # Without innovation the estimated speed is its memory and something known.
         at = np.array(many(state, given, table)[1])
-        state[memory[-2]] += at[0]
-        state[memory[-1]] += speed - at[1]
-    found = np.array(many(state, given, table)[0])
-    matrices: Array = found.T.reshape(len(angles), len(memory), len(memory))
+        state[moving] += [at[0], speed - at[1]]
+    entries = np.array(many(state, given, table)[0])
+    matrices: Array = entries.T.reshape(len(angles), len(memory), len(memory))
     return matrices
+
+
+def _memory(observer: FlatModel) -> tuple[list[int], list[int]]:
+    """Return the places of what goes from sample to sample: of the inner states, and of angle and speed."""
+    (body,) = observer.bodies
+    places = {v.name: i for i, v in enumerate(observer.states)}
+    moving = [places[f"{name}.{MEMORY}"] for name in (body.motion, body.rate)]
+    memory = {places[name] for v in observer.outputs if (name := f"{v.name}.{MEMORY}") in places}
+    return sorted(memory - set(moving)), moving
 
 
 def check_stability(
@@ -120,25 +128,24 @@ def check_stability(
     ValueRangeError
         If the model has no table over an angle.
     """
-    if len(observer.tables) != 1 or observer.tables[0].argument != observer.inputs[0].name:
+    tables, bodies = observer.tables, observer.bodies
+    if len(tables) != 1 or [body.motion for body in bodies] != [tables[0].argument]:
         raise ValueRangeError(
-            f"model '{observer.name}'", "is not an observer with one table over its first input"
+            f"model '{observer.name}'", "is not an observer with one table over the angle of a body"
         )
-    table = observer.tables[0]
+    table = tables[0]
     points = (table.values.shape[0] - 1) * finer + 1
     angles = table.lower + table.step / finer * np.arange(points)
     matrices = np.array([error_matrices(observer, angles, speed) for speed in speeds])
     radius = np.max(np.abs(np.linalg.eigvals(matrices)), axis=(0, 2))
     every = matrices.reshape(-1, *matrices.shape[2:])
-    proved, inner = _structure(every)
+    proved, inner = _structure(every, len(_memory(observer)[0]))
     return ErrorStability(angles, radius, proved, inner)
 
 
-def _structure(matrices: Array) -> tuple[bool, bool]:
+def _structure(matrices: Array, count: int) -> tuple[bool, bool]:
     """Return whether all are block triangular with the same stable blocks, and whether the first block is."""
-    inner = slice(0, matrices.shape[1] - 2)
-    own, cross = matrices[:, inner, inner], matrices[:, inner, inner.stop :]
-    moving = matrices[:, inner.stop :, inner.stop :]
+    own, cross, moving = matrices[:, :count, :count], matrices[:, :count, count:], matrices[:, count:, count:]
     first = not np.any(cross) and _same_and_stable(own)
     return first and _same_and_stable(moving), first
 

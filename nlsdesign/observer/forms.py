@@ -1,4 +1,4 @@
-"""The two forms in which an observer can carry the actuator: as it is, and as it was published."""
+"""The two forms in which an observer can carry the actuator: minimal, and that of the paper."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..analysis.rest import evaluate_rows, rate_state, rest_states, typical_sizes
 from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel
-from ..model.paper_form import GEOMETRIC, PublishedNames, published_form
+from ..model.paper_form import GEOMETRIC, PaperFormNames, paper_form
 from ..model.transform import with_outputs, without_idle_states
-from .angle_form import AngleForm, Layout
+from .angle_form import AngleForm, ScheduledNames
 from .plant import AngleScheduledPlant
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ class Minimal:
             raise unknown_name("state", angle, (v.name for v in model.states))
         model = without_idle_states(model, [estimate, angle])
         sizes, speed = typical_sizes(model, angles, angle=angle), rate_state(model, angle)
-        form = AngleForm(model, Layout(angle, speed, sizes[speed], angles, {}))
+        form = AngleForm(model, ScheduledNames(angle, speed, sizes[speed], angles, {}))
         size = np.array([sizes[model.states[i].name] for i in form.order])
         carried = form.rest(angles) - form.at(angles).shift
         largest = np.max(np.abs(carried[:, : form.inner]), axis=0)
@@ -82,7 +82,7 @@ class Minimal:
 
 
 @dataclass(frozen=True)
-class AsPublished:
+class PaperForm:
     """The states of the paper: force, extension, angle, speed; the rate of the extension is a held input.
 
     Kept as the reference. The rate is the difference of the extension at the last two measured angles over
@@ -91,12 +91,12 @@ class AsPublished:
     Parameters
     ----------
     names
-        Which variables are meant.
+        Which variables are meant; decided from the structure of the model where they are left out.
     rate_bandwidth
-        Corner of a first-order filter on the rate in Hz; infinite means none.
+        Cut-off frequency of a first-order filter on the rate in Hz; infinite means none.
     """
 
-    names: PublishedNames = field(default_factory=PublishedNames)
+    names: PaperFormNames = field(default_factory=PaperFormNames)
     rate_bandwidth: float = float("inf")
 
     def plant(self, model: FlatModel, *, estimate: str, angle: str, angles: Array) -> AngleScheduledPlant:
@@ -107,10 +107,10 @@ class AsPublished:
         ValueRangeError
             If the bandwidth of the rate is not positive.
         """
-        n = self.names
         if not self.rate_bandwidth > 0.0:
             raise ValueRangeError(f"rate_bandwidth {self.rate_bandwidth:g} Hz", "must be positive")
-        published = with_outputs(published_form(model, n), [estimate, n.extension, angle])
+        n = self.names.of(model)
+        published = with_outputs(paper_form(model, self.names), [estimate, n.extension, angle])
         consistent = {n.extension: f"{n.extension}.{GEOMETRIC}"}
         rest = rest_states(published, angles, angle=angle, consistent=consistent)
         names, sizes = [v.name for v in published.states], np.max(np.abs(rest), axis=0)
@@ -129,7 +129,8 @@ class AsPublished:
         sizes[names.index(n.speed)] = np.sqrt(
             sizes[names.index(angle)] * np.max(np.abs(rates[:, names.index(n.speed)]))
         )
-        layout = Layout(angle, n.speed, float(sizes[names.index(n.speed)]), angles, consistent, n.rate)
+        speed_size = float(sizes[names.index(n.speed)])
+        layout = ScheduledNames(angle, n.speed, speed_size, angles, consistent, n.rate)
         form = AngleForm(published, layout)
         return _finished(form, sizes[form.order], (n.extension,), self.rate_bandwidth)
 
@@ -147,7 +148,8 @@ def _finished(
             next_step="exchange an inner state with replace_state so that it becomes linear",
         )
     return AngleScheduledPlant(
-        name=model.name, states=tuple(model.states[i] for i in form.order), estimate=model.outputs[0],
+        name=model.name, states=tuple(model.states[i] for i in form.order), angle=form.layout.angle,
+        speed=form.layout.speed, estimate=model.outputs[0],
         inputs=tuple(model.inputs[i] for i in form.free_inputs), measured=measured, at=form.at,
         rest=form.rest, driven=driven, rows=rows, friction=friction, sizes=sizes, rate_bandwidth=bandwidth,
         affine_error=deviation,

@@ -34,11 +34,13 @@ class SampledPlant:
     output_matrix
         C, shape (r, n); the angle comes first.
     names
-        Of the states; the angle and its speed come last.
+        Of the states.
     sizes
         Typical sizes of the states, shape (n,).
     sample_time
         T in s.
+    speed
+        Name of the state that is the rate of the measured angle.
     """
 
     angle: float
@@ -48,6 +50,12 @@ class SampledPlant:
     names: tuple[str, ...]
     sizes: Array
     sample_time: float
+    speed: str
+
+    @property
+    def moving(self) -> tuple[int, int]:
+        """Places of the angle and of its speed among the states."""
+        return int(np.argmax(self.output_matrix[0])), self.names.index(self.speed)
 
 
 class GainRule(Protocol):
@@ -108,11 +116,12 @@ class CascadeGain:
         """Return M; see :class:`GainRule`."""
         n, c = len(plant.a), plant.output_matrix
         pole = math.exp(-2.0 * math.pi * self.bandwidth * plant.sample_time)
-        run, keep = plant.transition[n - 2, n - 1], plant.transition[n - 1, n - 1]
+        angle, speed = plant.moving
+        run, keep = plant.transition[angle, speed], plant.transition[speed, speed]
         # F = [[1, run], [0, keep]](I − m·[1, 0]): trace 1 − m₁ − run·m₂ + keep, determinant keep(1 − m₁).
         m = np.zeros((n, len(c)))
-        m[n - 2, 0] = 1.0 - pole**2 / keep
-        m[n - 1, 0] = (pole - keep) ** 2 / (keep * run)
+        m[angle, 0] = 1.0 - pole**2 / keep
+        m[speed, 0] = (pole - keep) ** 2 / (keep * run)
         for output in range(1, len(c)):
             m[int(np.argmax(c[output])), output] = 1.0
         return m
@@ -232,7 +241,7 @@ def _placed(a: Array, c: Array, poles: Spectrum) -> Array:
     # Both methods place the poles exactly; their iterations only seek well-conditioned eigenvectors.
     method = "YT" if np.any(poles.imag) else "KNV0"
     try:
-        found = place_poles(
+        placed = place_poles(
             a.T, c.T, poles if method == "YT" else poles.real, method=method, maxiter=10, rtol=1e-2
         )
     except ValueError as error:
@@ -241,7 +250,7 @@ def _placed(a: Array, c: Array, poles: Spectrum) -> Array:
             f"cannot be placed: {error}",
             next_step="keep the poles apart",
         ) from error
-    gain: Array = np.asarray(np.real(found.gain_matrix).T, dtype=np.float64)
+    gain: Array = np.asarray(np.real(placed.gain_matrix).T, dtype=np.float64)
     reached = np.sort_complex(np.linalg.eigvals(a - gain @ c))
     if np.max(np.abs(reached - np.sort_complex(np.asarray(poles)))) > 1e-3:
         raise ConvergenceError("pole placement", f"reached {reached} instead of {poles}")

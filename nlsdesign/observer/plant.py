@@ -48,7 +48,9 @@ class AngleScheduledPlant:
     name
         Name of the model.
     states
-        All states, the angle and its speed last.
+        All states: the inner ones, then angle and speed.
+    angle, speed
+        Names of the state that is measured and scheduled over, and of its rate.
     estimate
         What is wanted.
     inputs
@@ -69,13 +71,15 @@ class AngleScheduledPlant:
     sizes
         Typical sizes of the states as the observer carries them, shape (n,).
     rate_bandwidth
-        Corner of the filter on δ̇ in Hz.
+        Cut-off frequency of the filter on δ̇ in Hz.
     affine_error
         Deviation of the estimate from its tangent in the inner states, share of its largest value.
     """
 
     name: str
     states: tuple[Variable, ...]
+    angle: str
+    speed: str
     estimate: Variable
     inputs: tuple[Variable, ...]
     measured: tuple[str, ...]
@@ -94,8 +98,13 @@ class AngleScheduledPlant:
         return tuple(v.name for v in self.states)
 
     @property
+    def moving(self) -> tuple[int, int]:
+        """Places of the angle and of its speed among the states."""
+        return self.names.index(self.angle), self.names.index(self.speed)
+
+    @property
     def output_matrix(self) -> Array:
         """C, shape (r, n): the angle first, then what else is measured."""
-        places = [len(self.states) - 2, *(self.names.index(name) for name in self.measured)]
+        places = [self.names.index(name) for name in (self.angle, *self.measured)]
         matrix: Array = np.eye(len(self.states))[places]
         return matrix

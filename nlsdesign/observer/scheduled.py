@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from ..errors import ValueRangeError
 from ..model import FlatModel, Table, Variable
+from ..model.roles import measured_motion, spring_torque
 from ..symbolic import Expression
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, GainRule
-from .step import Step
+from .step import ObserverStep
 from .table import Compact, Grid, GridByTolerance
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ class ObserverDesign:
     """
 
     model: FlatModel
-    step: Step
+    step: ObserverStep
     compact: Compact
 
     @property
@@ -80,11 +81,11 @@ class ObserverDesign:
         return "\n".join(lines)
 
 
-def observer_design(
+def design_observer_with_details(
     model: FlatModel,
     *,
-    estimate: str = "spring.torque",
-    measured: str = "motor.angle",
+    estimate: str | None = None,
+    measured: str | None = None,
     sample_time: float = 1e-3,
     gain: GainRule | None = None,
     form: StateForm | None = None,
@@ -106,12 +107,14 @@ def observer_design(
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
     if model.sample_time is not None:
         raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
+    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     rule, over = gain or CascadeGain(), grid or whole_contour(model)
     reference = np.linspace(over.lower, over.upper, 65)
     plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
-    step = Step(plant, rule, sample_time, reference)
+    step = ObserverStep(plant, rule, sample_time, reference)
     compact = over.compact(step.entries)
-    design = ObserverDesign(_Writer(step, compact).model(), step, compact)
+    observed = tuple(body for body in model.bodies if body.motion == measured)
+    design = ObserverDesign(replace(_Writer(step, compact).model(), bodies=observed), step, compact)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 
@@ -121,18 +124,18 @@ def whole_contour(model: FlatModel) -> GridByTolerance:
     Parameters
     ----------
     model
-        Its parameters ``<cam>.last_angle`` say where a contour ends; beyond it there is no lever arm.
+        Its cams say where a contour ends; beyond it there is no lever arm.
     """
-    ends = [v.start for v in model.parameters if v.name.endswith(".last_angle")]
-    end = min(ends, default=math.pi / 2.0)
+    cams = [cam for spring in model.springs for cam in spring.cams]
+    end = min((model.values[cam.last_angle] for cam in cams if cam.last_angle), default=math.pi / 2.0)
     return GridByTolerance(-end, end)
 
 
 def design_observer(
     model: FlatModel,
     *,
-    estimate: str = "spring.torque",
-    measured: str = "motor.angle",
+    estimate: str | None = None,
+    measured: str | None = None,
     sample_time: float = 1e-3,
     gain: GainRule | None = None,
     form: StateForm | None = None,
@@ -150,9 +153,10 @@ def design_observer(
     model
         Continuous, load fixed.
     estimate
-        Output or signal that is wanted.
+        Output or signal that is wanted; by default the torque of the series spring.
     measured
-        State that is measured and over which everything is scheduled.
+        State that is measured and over which everything is scheduled; by default the motion of the driven
+        body.
     sample_time
         In s.
     gain
@@ -167,13 +171,14 @@ def design_observer(
     UnknownNameError
         If a name does not exist.
     ArrangementError
-        If the equations cannot be scheduled over one angle.
+        If the equations cannot be scheduled over one angle, or the structure does not say what is estimated
+        or measured.
     ValueRangeError
         If the estimate is far from linear in the inner states, or a setting is out of range.
     ConvergenceError
         If a gain cannot be found, or the table does not keep its error bound.
     """
-    return observer_design(
+    return design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, gain=gain, form=form, grid=grid
     ).model
 
@@ -181,11 +186,12 @@ def design_observer(
 class _Writer:
     """Writes the step with the entries read from the table."""
 
-    def __init__(self, step: Step, compact: Compact) -> None:
+    def __init__(self, step: ObserverStep, compact: Compact) -> None:
         self.step, self.compact, self.plant = step, compact, step.plant
         self.w = ca.SX.sym("w", len(compact.columns))
         self.n = len(self.plant.states)
-        self.angle = self.plant.states[self.n - 2]
+        self.angle_place, self.speed_place = self.plant.moving
+        self.angle = self.plant.states[self.angle_place]
 
     def read(self, kind: str, i: int, j: int = 0) -> Expression:
         """Return one entry; zero entries vanish from the expressions."""
@@ -227,9 +233,17 @@ class _Writer:
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
         return FlatModel(
-            f"{plant.name}_observer", self._description(), self._states(), self._inputs(), (),
-            self._outputs(), (), equations, self.step.sample_time, self._tables(),
-        )  # fmt: skip
+            name=f"{plant.name}_observer",
+            description=self._description(),
+            states=self._states(),
+            inputs=self._inputs(),
+            parameters=(),
+            outputs=self._outputs(),
+            signals=(),
+            equations=equations,
+            sample_time=self.step.sample_time,
+            tables=self._tables(),
+        )
 
     @property
     def _filters(self) -> bool:
@@ -263,8 +277,11 @@ class _Writer:
         # Away from zero, where the quotient is undefined; its limit there is one.
         x = x - 1e-9 * (ca.fabs(x) < 1e-9)
         left = speed + time * rate * ca.expm1(x) / x
-        change = ca.substitute(left * (left * speed > 0) - speed, speed, state[-1])
-        return [*state[:-2], state[-2] + time / 2.0 * change, state[-1] + change]
+        change = ca.substitute(left * (left * speed > 0) - speed, speed, state[self.speed_place])
+        after = list(state)
+        after[self.angle_place] += time / 2.0 * change
+        after[self.speed_place] += change
+        return after
 
     def _description(self) -> str:
         grid = self.compact.angles
@@ -290,7 +307,7 @@ class _Writer:
         return tuple(states)
 
     def _inputs(self) -> tuple[Variable, ...]:
-        grid, size = self.compact.angles, float(self.plant.sizes[-2])
+        grid, size = self.compact.angles, float(self.plant.sizes[self.angle_place])
         angle = Variable(
             self.angle.name, self.angle.unit, f"measured {self.angle.name}; the table reaches from "
             f"{grid[0]:.4g} to {grid[-1]:.4g} rad and holds its ends beyond", nominal=size,

@@ -28,7 +28,7 @@ class _Titles(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class ObserverStep:
     """What happens between two samples, written as matrices of the measured angle.
 
     With y the measured angle (and what follows from it), s the memory and e the innovation:
@@ -94,7 +94,14 @@ class Step:
         plant = self.plant
         return self.gain.correction(
             SampledPlant(
-                float(angle), a, transition, plant.output_matrix, plant.names, plant.sizes, self.sample_time
+                float(angle),
+                a,
+                transition,
+                plant.output_matrix,
+                plant.names,
+                plant.sizes,
+                self.sample_time,
+                plant.speed,
             )
         )
 
@@ -102,7 +109,8 @@ class Step:
         """Return the typical size of what the columns of each matrix multiply."""
         plant, sizes = self.plant, self.plant.sizes
         # How fast things happen; an innovation is at most what happens in one sample.
-        pace = sizes[-1] / sizes[-2]
+        angle, speed = plant.moving
+        pace = sizes[speed] / sizes[angle]
         innovation = min(1.0, self.sample_time * pace) * np.abs(plant.output_matrix) @ sizes
         led = [sizes[plant.names.index(name)] for name in plant.measured] or [0.0]
         known = pace * np.concatenate([sizes[list(plant.rows)], led])
@@ -137,14 +145,14 @@ class Step:
         angles
             Shape (N,).
         """
-        matrices, found = self.matrices(angles), []
+        matrices, entries = self.matrices(angles), []
         # The estimate first: where entries share a column, it is one that the estimate needs exactly.
         for kind in ("estimate", "next", "prior", "correction", "shift", "measured"):
             values, weights, titles = matrices[kind], self._weights[kind], self._titles(kind)
             for (i, row, start), (j, end, unit) in product(titles.rows, titles.columns):
                 name = f"{start}.{end}" if end else start
                 total = row.name if kind not in ("shift", "measured") else start
-                found.append(
+                entries.append(
                     Entry(
                         f"{kind}[{i}][{j}]",
                         total,
@@ -154,14 +162,14 @@ class Step:
                         float(weights[i, j]),
                     )
                 )
-        return found
+        return entries
 
     def _titles(self, kind: str) -> _Titles:
         """Return how rows and columns of a matrix are called in the table."""
         plant = self.plant
         of = {v.name: v for v in plant.states}
         states = [(j, f"per.{v.name}", v.unit) for j, v in enumerate(plant.states)]
-        seen = [of[plant.names[-2]], *(of[name] for name in plant.measured)]
+        seen = [of[name] for name in (plant.angle, *plant.measured)]
         pushes = [(plant.states[r].name, f"{plant.states[r].unit}/s") for r in plant.rows]
         pushes += [(f"{name}.rate", f"{of[name].unit}/s") for name in plant.measured] or [("rate", "1")]
         n = len(states)

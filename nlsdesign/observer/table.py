@@ -56,7 +56,7 @@ Entries = Callable[[Array], Sequence[Entry]]
 
 
 @dataclass(frozen=True)
-class Place:
+class ColumnPlace:
     """Where an entry is read: ``factor`` × column, or ``factor`` alone where ``column`` is ``None``."""
 
     factor: float
@@ -86,7 +86,7 @@ class Compact:
     angles: Array
     columns: tuple[Entry, ...]
     values: Array
-    places: Mapping[str, Place]
+    places: Mapping[str, ColumnPlace]
     error: Mapping[str, float]
     angle_error: float
 
@@ -162,16 +162,16 @@ class GridByTolerance(Grid):
         cells, fine = 32, entries(np.linspace(self.lower, self.upper, 32 * CHECKS + 1))
         while True:
             angles = np.linspace(self.lower, self.upper, cells * CHECKS + 1)
-            found = compacted(
+            table = compacted(
                 angles, fine, every=CHECKS, tolerance=self.tolerance, angle_error=self.angle_tolerance
             )
-            worst = max(found.error, key=lambda row: found.error[row])
-            if found.error[worst] <= self.tolerance:
-                return found
+            worst = max(table.error, key=lambda row: table.error[row])
+            if table.error[worst] <= self.tolerance:
+                return table
             if 2 * cells + 1 > self.most_points:
                 raise ConvergenceError(
                     f"table of the observer with {cells + 1} points",
-                    f"'{worst}' is off by {found.error[worst]:.2g} of its size, more than {self.tolerance:g}",
+                    f"'{worst}' is off by {table.error[worst]:.2g} of its size, more than {self.tolerance:g}",
                     next_step="allow a larger error or more points, or take FixedGrid and read its error",
                 )
             middle = (angles[1:] + angles[:-1]) / 2
@@ -234,7 +234,7 @@ def compacted(
         If an entry is not finite at some angle.
     """
     columns: list[Entry] = []
-    places: dict[str, Place] = {}
+    places: dict[str, ColumnPlace] = {}
     error: dict[str, float] = {}
     grid, spare = angles[::every], max(SHARE * tolerance, NOTHING)
     for entry in fine:
@@ -250,20 +250,20 @@ def compacted(
     return Compact(grid, tuple(columns), np.ascontiguousarray(values), places, error, angle_error)
 
 
-def _place(entry: Entry, columns: list[Entry], spare: float) -> Place:
+def _place(entry: Entry, columns: list[Entry], spare: float) -> ColumnPlace:
     """Return where an entry goes; a new column is added to ``columns`` where it needs one."""
     low, high = float(np.min(entry.values)), float(np.max(entry.values))
     if max(abs(low), abs(high)) * entry.weight <= NOTHING:
-        return Place(0.0)
+        return ColumnPlace(0.0)
     allowed = spare / entry.weight
     if (high - low) / 2.0 <= allowed:
-        return Place((high + low) / 2.0)
+        return ColumnPlace((high + low) / 2.0)
     for i, column in enumerate(columns):
         factor = float(entry.values @ column.values / (column.values @ column.values))
         if np.max(np.abs(entry.values - factor * column.values)) <= allowed:
-            return Place(factor, i)
+            return ColumnPlace(factor, i)
     columns.append(entry)
-    return Place(1.0, len(columns) - 1)
+    return ColumnPlace(1.0, len(columns) - 1)
 
 
 def _deviation(read: Array, exact: Array, angles: Array, angle_error: float) -> Array:

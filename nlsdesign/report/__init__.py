@@ -3,7 +3,7 @@
 from .calculation import OUTCOMES, CalculationSection, CalculationStep
 from .cam_section import CamSection
 from .diagnosis import verdict_sections
-from .equations import EquationsSection
+from .equations_section import EquationsSection
 from .page import report_text, write_report
 from .sections import (
     Chapter,

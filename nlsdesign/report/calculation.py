@@ -50,7 +50,7 @@ class CalculationSection(Section):
     Parameters
     ----------
     statement
-        What is tested, and who says it.
+        The tested statement and its source.
     verdict
         One of ``OUTCOMES``.
     steps

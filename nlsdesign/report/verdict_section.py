@@ -11,8 +11,8 @@ from .sections import PagePosition, Section
 
 VERDICTS = {
     "none": "nothing is missing",
-    "named": "found and named",
-    "unknown": "something is missing that has no name",
+    "named": "effect named",
+    "unknown": "an effect without a name",
     "data_suspect": "the data are suspect",
 }
 

@@ -7,8 +7,8 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
+from ..components.assembly.named_parts import Assembly
 from ..errors import UnitError, ValueRangeError, unknown_name
-from ..model import Assembly
 from ..quantity import typeset_unit
 from .trace import Trace
 

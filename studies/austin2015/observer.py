@@ -50,7 +50,10 @@ def sweep_angle(model: nls.FlatModel, count: int) -> Chart:
 
 def compare_observers(actuator: nls.Assembly, model: nls.FlatModel, stop: float) -> ObserverComparison:
     """Design both observers and run them on the bench; simulate the free drivetrain as well."""
-    minimal, published = nls.observer_design(model), nls.observer_design(model, form=nls.AsPublished())
+    minimal, published = (
+        nls.design_observer_with_details(model),
+        nls.design_observer_with_details(model, form=nls.PaperForm()),
+    )
     time = np.arange(0.0, stop, minimal.step.sample_time)
     link = nls.Inertia(inertia=nls.quantity(2e-3, "kg*m^2", source="assumed: a light link"))
     free = nls.flatten(actuator.with_part("load", link), inputs=["motor.current"])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.analysis import Observability, over_angle
-from nlsdesign.model.paper_form import published_form
+from nlsdesign.model.paper_form import paper_form
 from tests import observed as ob
 
 NOMINAL = {ob.FORCE: 302.0, ob.EXTENSION: 12e-3, "motor.angle": np.pi / 4.0, "motor.speed": 20.0}
@@ -23,7 +23,7 @@ STATED = {0.2: (5e3, 9e3), 1.0: (1.0e3, 1.8e3), 5.0: (250.0, 430.0), 45.0: (59.0
 def test_scaled_condition_number(viscosity: float, end: int) -> None:
     angles = np.radians([0.0, *STATED])
     chart = over_angle(
-        published_form(ob.bench(viscosity)),
+        paper_form(ob.bench(viscosity)),
         [Observability(nominal=NOMINAL)],
         angles=angles,
         consistent=ob.CONSISTENT,
@@ -41,7 +41,7 @@ def test_equilibrium_force_of_the_printed_parameters() -> None:
     for extension, force in stated.items():
         assert ob.equilibrium_force(extension * 1e-3) == pytest.approx(force, rel=5e-3, abs=0.05)
     # The model of the package holds the same law: at rest, where the lever arm takes the cable there.
-    form = published_form(ob.bench())
+    form = paper_form(ob.bench())
     for extension, force in stated.items():
         found = form.evaluate([force, extension * 1e-3, 0.5, 0.0], [0.0, 0.0])
         relaxing = found[f"der({ob.FORCE})"] * ob.PRINTED / ob.RELAXING

@@ -15,7 +15,7 @@ from nlsdesign.control import ClosedLoop, TorqueGains, torque_controller, zero_t
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, Variable, flatten
 from nlsdesign.model.transform import with_signal
-from nlsdesign.observer import observer_design
+from nlsdesign.observer import design_observer_with_details
 
 FREQUENCIES = [0.5, 1.0, 2.0]
 PUBLISHED = {
@@ -42,7 +42,7 @@ def found(deck: str, gains: TorqueGains) -> np.ndarray:
     bench, plant = moved(deck)
     loop = ClosedLoop(
         plant=plant,
-        observer=observer_design(bench).model,
+        observer=design_observer_with_details(bench).model,
         controller=torque_controller(bench, gains=gains),
         wires={
             "observer.motor.angle": "plant.spring.angle.measured",

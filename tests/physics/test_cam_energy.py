@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from nlsdesign.components import Assembly, Element, LinearElastic, StrainStiffening
 from nlsdesign.components.core.element import Scope
 from nlsdesign.design import (
+    CamProfile,
     PowerTorque,
-    Profile,
     cam_from_profile,
     elastic_law,
     energy_profile,
@@ -121,7 +121,7 @@ def test_rubber_that_is_too_weak_is_named() -> None:
         energy_profile(machine, target=weak)
 
 
-def _with_cam(machine: Assembly, profile: Profile) -> Assembly:
+def _with_cam(machine: Assembly, profile: CamProfile) -> Assembly:
     fit = cam_from_profile(profile.angles, profile.lever_arms, like=machine["spring.cam"], count=60)
     found = {"spring.cam.lever_arm": fit.cam.lever_arm, "spring.cam.last_angle": fit.cam.last_angle}
     return machine.with_values(found)

@@ -12,7 +12,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.control import ClosedLoop, TorqueGains, sine_response, torque_controller, zero_torque
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import observer_design
+from nlsdesign.observer import design_observer_with_details
 from tests import observed as ob
 
 MOVED = {"observer.motor.angle": "plant.spring.angle", "controller.motor.angle": "plant.motor.angle"}
@@ -31,7 +31,7 @@ def linear_loop(stiffness: float, gains: TorqueGains, *, moved: bool) -> ClosedL
     bench = linear_actuator(stiffness, moved=False)
     return ClosedLoop(
         plant=linear_actuator(stiffness, moved=True) if moved else bench,
-        observer=observer_design(bench).model,
+        observer=design_observer_with_details(bench).model,
         controller=torque_controller(bench, gains=gains),
         wires=MOVED if moved else {},
     )
@@ -106,7 +106,7 @@ def test_a_fixed_gain_and_a_stiffening_spring_lose_their_margin() -> None:
     plant = flatten(
         declare(load_deck("austin2015_figure_consistent")), outputs=["motor.angle", "spring.torque"]
     )
-    observer, distortion = observer_design(plant).model, {}
+    observer, distortion = design_observer_with_details(plant).model, {}
     reading = "plant.motor_encoder.reading"
     for proportional in (32.0, 70.0):
         controller = torque_controller(plant, gains=TorqueGains(proportional=proportional))

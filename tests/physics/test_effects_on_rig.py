@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.effects import ALL
-from nlsdesign.discrepancy.effects.friction import backlash
+from nlsdesign.discrepancy.effects import ALL, backlash
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.criteria import total_excess

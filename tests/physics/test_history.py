@@ -18,6 +18,8 @@ from scipy.integrate import cumulative_simpson, quad
 from scipy.optimize import brentq
 
 from nlsdesign.components import (
+    TRANSLATION,
+    Driven,
     Element,
     HeatBalance,
     LinearElastic,
@@ -31,11 +33,15 @@ from nlsdesign.components import (
     Springpot,
     StressSoftening,
     ViscousMaterial,
+    assembly,
     maxwell,
     parallel,
+    specimen,
+    tie,
 )
 from nlsdesign.errors import ArrangementError, ValueRangeError
-from nlsdesign.simulation import Trace
+from nlsdesign.model import flatten
+from nlsdesign.simulation import Trace, simulate
 from tests.stretched import AREA, LENGTH, VOLUME, pulled, run
 
 MU, R, M, WIDTH = 0.6e6, 1.8, 0.12e6, 1e-3
@@ -92,7 +98,7 @@ def test_softening_is_the_function_of_ogden_and_roxburgh() -> None:
     # The greatest energy lags by less than eight widths, see the next test.
     allowed = 8 * WIDTH / R * 2 / math.sqrt(math.pi) * AREA * first_stress(strain) + 1e-6
     assert np.all(np.abs(trace["rubber.force"] - expected) < allowed)
-    assert np.min(trace["rubber.law.softening"]) == pytest.approx(
+    assert np.min(trace["rubber.law.softness"]) == pytest.approx(
         1 - math.erf(np.max(greatest) / M) / R, abs=0.005
     )
 
@@ -102,7 +108,7 @@ def test_the_softening_at_rest_tends_to_its_published_limit() -> None:
     small = StressSoftening(
         members=(("law", NeoHooke(shear_modulus=MU)),), curve=OgdenRoxburgh(strength=R, scale=M / 40)
     )
-    assert cycled(small, [0.9])["rubber.law.softening"][-1] == pytest.approx(1 - 1 / R, abs=1e-6)
+    assert cycled(small, [0.9])["rubber.law.softness"][-1] == pytest.approx(1 - 1 / R, abs=1e-6)
 
 
 def test_the_rounded_switch_follows_its_closed_solution() -> None:
@@ -122,7 +128,7 @@ def test_a_smaller_width_comes_closer_to_the_sharp_law() -> None:
     for width in (1e-2, 1e-3):
         trace = cycled(soft(width), [0.7])
         sharp = 1 - math.erf(float(energy(np.array(0.7))) / M) / R
-        off.append(abs(trace["rubber.law.softening"][-1] - sharp))
+        off.append(abs(trace["rubber.law.softness"][-1] - sharp))
     assert off[1] < off[0] / 5
 
 
@@ -335,6 +341,37 @@ def stored_at_the_end(name: str, trace: Trace) -> float:
     return 0.0
 
 
-def test_laws_of_history_belong_inside_a_specimen() -> None:
-    with pytest.raises(ArrangementError, match="PermanentSet: acts on strain and stress"):
-        PermanentSet(members=(("spring", Spring(stiffness=100.0)),), share=0.1, memory=Rising(width=1e-4))
+def test_laws_of_energy_belong_inside_a_specimen() -> None:
+    spring = (("spring", Spring(stiffness=100.0)),)
+    balance = HeatBalance(heat_capacity=1.8e6, cooling=4e4, softening=3e-3)
+    with pytest.raises(
+        ArrangementError, match="HeatBalance: acts on strain and stress -> put it inside a spec"
+    ):
+        SelfHeating(members=spring, heat=balance)
+    with pytest.raises(ArrangementError, match="OgdenRoxburgh: acts on strain and stress -> put it inside"):
+        StressSoftening(members=spring, curve=OgdenRoxburgh(strength=1.8, scale=1e5))
+
+
+def test_a_set_is_one_law_with_or_without_section_and_length() -> None:
+    """A spring of k = E·A/L that sets, and a piece whose law does: the same force along the same motion."""
+    inside = (("law", LinearElastic(modulus=1e6)),)
+    law = PermanentSet(members=inside, share=0.1, memory=Rising(width=1e-4))
+    whole = PermanentSet(
+        members=(("law", Spring(stiffness=1e6 * AREA / LENGTH)),),
+        share=0.1,
+        memory=Rising(width=1e-4 * LENGTH),
+    )
+    forces = [
+        simulate(
+            flatten(assembly("pulled", grip=Driven(domain=TRANSLATION), piece=tie(piece, "grip"))),
+            np.linspace(0.0, 2.0, 41),
+            inputs={
+                "grip.position": lambda t: 0.5 * LENGTH * np.sin(np.pi * t / 2) ** 2,
+                "grip.speed": lambda t: 0.25 * np.pi * LENGTH * np.sin(np.pi * t),
+            },
+            tolerance=1e-10,
+        )["piece.force"]
+        for piece in (specimen(area=AREA, rest_length=LENGTH, law=law), whole)
+    ]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-7, abs=1e-7)
+    assert forces[0][-1] < -0.04 * 1e6 * AREA

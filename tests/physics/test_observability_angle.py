@@ -10,7 +10,7 @@ from nlsdesign.analysis import EstimateDeviation, Observability, over_angle
 from nlsdesign.analysis.rest import rest_states
 from nlsdesign.model import FlatModel
 from nlsdesign.model.linear import linearise
-from nlsdesign.model.paper_form import published_form
+from nlsdesign.model.paper_form import paper_form
 from tests import observed as ob
 
 ANGLES = np.radians([-45.0, -1.0, 0.0, 0.2, 1.0, 5.0, 45.0])
@@ -35,7 +35,7 @@ def condition_by_hand(model: FlatModel, angle: float, viscosity: float) -> float
 def test_condition_of_the_published_form(viscosity: float) -> None:
     model = ob.bench(viscosity)
     chart = over_angle(
-        published_form(model), [Observability(nominal=NOMINAL)], angles=ANGLES, consistent=ob.CONSISTENT
+        paper_form(model), [Observability(nominal=NOMINAL)], angles=ANGLES, consistent=ob.CONSISTENT
     )
     for angle, rank, found in zip(
         ANGLES, chart["observability.rank"], chart["observability.condition"], strict=True
@@ -77,7 +77,7 @@ def test_determinant_of_the_minimal_form_is_minus_h_over_j() -> None:
 
 def test_the_state_that_is_not_seen_at_zero_decays_with_the_relaxation() -> None:
     """At zero angle the force hides, with the eigenvalue −k/η; the angle is measured, its eigenvalue is 0."""
-    form = published_form(ob.bench(ob.SLOW))
+    form = paper_form(ob.bench(ob.SLOW))
     state = rest_states(form, np.zeros(1), consistent=ob.CONSISTENT)[0]
     linear = linearise(form, list(state))
     hidden = np.array([1.0, 0.0, 0.0, 0.0])

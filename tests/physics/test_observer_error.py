@@ -13,19 +13,19 @@ from nlsdesign.analysis import Stability, over_angle
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.paper_form import PublishedNames
+from nlsdesign.model.paper_form import PaperFormNames
 from nlsdesign.model.transform import replace_state
 from nlsdesign.observer import (
-    AsPublished,
     CascadeGain,
     FixedGrid,
     GridByTolerance,
     ObserverDesign,
+    PaperForm,
     PolePlacement,
     SteadyStateKalman,
     check_stability,
+    design_observer_with_details,
     observe,
-    observer_design,
 )
 from nlsdesign.observer.check import error_matrices
 from nlsdesign.simulation import Trace, simulate
@@ -49,7 +49,7 @@ def model() -> FlatModel:
 
 @pytest.fixture(scope="module")
 def cascade(model: FlatModel) -> ObserverDesign:
-    return observer_design(ob.on_relaxing_force(model), grid=FINE)
+    return design_observer_with_details(ob.on_relaxing_force(model), grid=FINE)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_the_minimal_form_does_not_depend_on_the_state_that_carries_it(
     """Strain, relaxing force and total force: known functions of the angle apart, and integrated as such."""
     estimates = []
     for other in (model, ob.on_relaxing_force(model), replace_state(model, ob.STRAIN, ob.FORCE)):
-        observer = observer_design(other, grid=FixedGrid(-1.0, 1.0, points=1001)).model
+        observer = design_observer_with_details(other, grid=FixedGrid(-1.0, 1.0, points=1001)).model
         estimates.append(observe(observer, moving)["spring.torque"])
     size = np.max(np.abs(moving["spring.torque"]))
     assert np.max(np.abs(estimates[1] - estimates[0])) < 1e-4 * size
@@ -127,13 +127,13 @@ def test_integrating_the_rate_of_the_extension_costs_accuracy(viscosity: float) 
     better; it is not here.
     """
     model, grid = ob.bench(viscosity), FixedGrid(-0.9, 0.9, points=481)
-    relaxing = PublishedNames(force="spring.rubber.relaxing.stress")
+    relaxing = PaperFormNames(force="spring.rubber.relaxing.stress")
     observers = {
-        "total": observer_design(model, form=AsPublished(rate_bandwidth=30.0), grid=grid).model,
-        "relaxing": observer_design(
-            model, form=AsPublished(names=relaxing, rate_bandwidth=30.0), grid=grid
+        "total": design_observer_with_details(model, form=PaperForm(rate_bandwidth=30.0), grid=grid).model,
+        "relaxing": design_observer_with_details(
+            model, form=PaperForm(names=relaxing, rate_bandwidth=30.0), grid=grid
         ).model,
-        "minimal": observer_design(model, grid=grid).model,
+        "minimal": design_observer_with_details(model, grid=grid).model,
     }
     for frequency in (2.0, 11.0):
         record = ob.servoed(viscosity, frequency, np.radians(45.0), duration=0.8)
@@ -157,8 +157,8 @@ def test_the_correction_reduces_what_the_rubber_model_has_wrong() -> None:
     Kalman against the model alone, with the current known: at 31 kPa·s the angle does tell.
     """
     model, draw = ob.on_relaxing_force(ob.bench(ob.SLOW)), np.random.default_rng(6)
-    cascade = observer_design(model, grid=GridByTolerance(-1.2, 1.2))
-    kalman = observer_design(model, gain=KALMAN, grid=GridByTolerance(-1.2, 1.2))
+    cascade = design_observer_with_details(model, grid=GridByTolerance(-1.2, 1.2))
+    kalman = design_observer_with_details(model, gain=KALMAN, grid=GridByTolerance(-1.2, 1.2))
     time, held = np.arange(0.0, 3.0, TIME), 0.6
     density = KALMAN.process
     state = np.array([held, 0.0, 0.0])
@@ -198,8 +198,8 @@ def test_the_correction_reduces_what_the_rubber_model_has_wrong() -> None:
 @pytest.mark.parametrize("form", ["minimal", "published"])
 def test_the_cascade_is_proved_for_every_motion(viscosity: float, form: str) -> None:
     grid = FixedGrid(-1.2, 1.2, points=241)
-    design = observer_design(
-        ob.bench(viscosity), form=AsPublished() if form == "published" else None, grid=grid
+    design = design_observer_with_details(
+        ob.bench(viscosity), form=PaperForm() if form == "published" else None, grid=grid
     )
     check = check_stability(design.model)
     assert check.proved
@@ -223,7 +223,7 @@ def test_random_motion_does_not_shake_the_cascade(cascade: ObserverDesign) -> No
 
 def test_dry_friction_leaves_the_proof_of_the_force() -> None:
     check = check_stability(
-        observer_design(ob.bench(ob.SLOW, friction=0.02), grid=FixedGrid(-1.2, 1.2)).model
+        design_observer_with_details(ob.bench(ob.SLOW, friction=0.02), grid=FixedGrid(-1.2, 1.2)).model
     )
     assert check.proved_inner
     assert not check.proved
@@ -232,7 +232,7 @@ def test_dry_friction_leaves_the_proof_of_the_force() -> None:
 
 def test_dry_friction_does_not_make_the_estimated_speed_chatter() -> None:
     model = ob.bench(ob.SLOW, friction=0.1)
-    design = observer_design(model, grid=GridByTolerance(-1.2, 1.2))
+    design = design_observer_with_details(model, grid=GridByTolerance(-1.2, 1.2))
     time = np.arange(0.0, 0.5, TIME)
     record = simulate(model, time, inputs={"motor.current": 1.5 * np.sin(9.0 * time)}, hold=True)
     found = observe(design.model, record)
@@ -253,14 +253,14 @@ def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: 
     model = flatten(actuator, outputs=["motor.angle", "spring.torque"])
     grid = FixedGrid(-1.1, 1.1, points=points)
     check = check_stability(
-        observer_design(model, gain=PolePlacement((first, -80.0, -100.0)), grid=grid).model
+        design_observer_with_details(model, gain=PolePlacement((first, -80.0, -100.0)), grid=grid).model
     )
     assert np.max(check.radius[::10]) < 0.95  # at the grid points the poles are where they were placed
     angle, worst = check.worst
     assert worst > 1.05
     assert 0.0 < abs(angle) < 2.2 / (points - 1)
     assert not check.proved
-    cascade = check_stability(observer_design(model, gain=CascadeGain(), grid=grid).model)
+    cascade = check_stability(design_observer_with_details(model, gain=CascadeGain(), grid=grid).model)
     assert cascade.proved
     assert np.max(cascade.radius) < 0.95
 
@@ -268,7 +268,7 @@ def test_pole_placement_is_unstable_between_its_grid_points(points: int, first: 
 @pytest.mark.parametrize("deck", ["austin2015_as_printed", "austin2015_figure_consistent"])
 def test_the_decks_have_an_observer_that_is_right(deck: str) -> None:
     model = flatten(declare(load_deck(deck)), outputs=["motor.angle", "spring.torque"])
-    design = observer_design(model)
+    design = design_observer_with_details(model)
     assert max(design.table_error.values()) <= 2e-3
     time = np.arange(0.0, 1.0, TIME)
     record = simulate(

@@ -14,7 +14,7 @@ from nlsdesign.components import Dashpot, Mass, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, Variable, flatten
-from nlsdesign.model.paper_form import published_form
+from nlsdesign.model.paper_form import paper_form
 from tests import observed as ob
 
 ANGLES = np.radians([-45.0, -5.0, 0.0, 5.0, 45.0])
@@ -57,7 +57,7 @@ def test_rest_states_are_at_rest(model: FlatModel) -> None:
 
 
 def test_the_extension_of_the_published_form_follows_the_angle() -> None:
-    form = published_form(ob.bench(ob.SLOW))
+    form = paper_form(ob.bench(ob.SLOW))
     states = rest_states(form, ANGLES, consistent=ob.CONSISTENT)
     names = [v.name for v in form.states]
     for state in states:

@@ -13,11 +13,10 @@ import pytest
 
 from nlsdesign.bibliography import Reference, cited, origins, references
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.deck import deck_names, load_deck
 from nlsdesign.discrepancy.effects import ALL
 from tests import source
 
-DECKS = ("austin2015_figure_consistent", "janot2019_positioning_drive", "vhb4910_specimen")
 YEAR = re.compile(r"(?<![\w.])(?:1[6-9]\d\d|20[0-2]\d)(?!\w|\.\d)")
 SENTENCE = re.compile(r"\bSources?:\s+(.*?)(?:\n\s*\n|\Z)", flags=re.DOTALL)
 
@@ -78,10 +77,10 @@ def documented(root: Path) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def of_effects(root: Path) -> dict[str, str]:
-    """Sources of the effects on three decks, and all texts in their files that have a year."""
+    """Sources of the effects on every deck, and all texts in their files that have a year."""
     named = {
         candidate.effect: candidate.source
-        for name in DECKS
+        for name in deck_names()
         for effect in ALL
         for candidate in effect(declare(load_deck(name)))
     }

@@ -13,8 +13,8 @@ from tests.parts.cable import ROW
 
 
 def capstan(**numbers: object) -> CapstanFriction:
-    given = {"friction": 0.1, "wrap_angle": 1.0, **numbers}
-    return CapstanFriction(members=(("k", Spring(stiffness=1e3)),), **given)  # type: ignore[arg-type]
+    guide = Guide(**{"friction": 0.1, "wrap_angle": 1.0, **numbers})  # type: ignore[arg-type]
+    return CapstanFriction(members=(("k", Spring(stiffness=1e3)),), guide=guide)
 
 
 def anchored(**numbers: object) -> AnchoredCam:
@@ -73,5 +73,5 @@ def test_it_is_named(make: Callable[[], Part], kind: type[NlsError], message: st
 
 
 def test_the_same_numbers_without_the_mistake_are_sound() -> None:
-    assert capstan().friction.number == 0.1
+    assert capstan().parameters()["friction"].number == 0.1
     assert anchored().anchor_distance.number == 0.035

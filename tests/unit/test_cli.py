@@ -139,7 +139,7 @@ def test_every_part_that_a_deck_can_name_is_listed_with_its_law(run: Run) -> Non
     assert listed["TwoSidedCam"]["kind"] == "cam"
     assert all(entry["law"] for entry in listed.values())
     _, out, _ = run("parts", "StribeckFriction")
-    assert "Source:" in out
+    assert "Sources: Stribeck 1902" in out
     assert "stribeck_speed" in out
     assert "Armstrong-Hélouvry, B. (1991): Control of Machines with Friction" in out
     status, _, err = run("parts", "StribekFriction")
@@ -155,7 +155,8 @@ def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_
     assert [file.name for file in (tmp_path / "fmu").iterdir()] == ["plant.fmu"]
     status, _, err = run("export", "c", "--deck", deck, "--out", "c")
     assert status == 2
-    assert "no parts 'motor' and 'spring'" in err
+    assert "needs the series spring" in err or "needs the driven body" in err
+    assert "export fmu --plant-only writes the plant alone" in err
     assert not (tmp_path / "c").exists()
 
 

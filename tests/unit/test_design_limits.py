@@ -78,7 +78,7 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
     problem = design_problem(
         flatten(machine), machine["spring.cam"], target=TARGET, free=RUBBER, spring="spring"
     )
-    first, *rest = limit.bounds(problem.candidate)
+    first, *rest = limit.bounds(problem.design)
     assert str(first) == f"{type(limit).__name__}: {text}"
     assert len(rest) == (1 if hasattr(limit, "maximum") else 0)
     # The row is the distance from the bound in units of its scale; a slack of 1 gives way by one scale.

@@ -40,7 +40,7 @@ from nlsdesign.discrepancy.effects import (
     stress_softening,
     wrapped,
 )
-from nlsdesign.discrepancy.effects.cable import stretched
+from nlsdesign.discrepancy.effects.places import stretched
 from nlsdesign.discrepancy.selection.comparison import moved_numbers
 from nlsdesign.model import flatten
 

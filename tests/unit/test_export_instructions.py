@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import ctypes
 
 import casadi as ca
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.errors import ExportError
+from nlsdesign.export import files
 from nlsdesign.export.c.c_text import DOUBLE, FLOAT, Real, comment, identifier, real_type, string
 from nlsdesign.export.c.instructions import print_statements
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library
@@ -149,3 +151,25 @@ def test_names_and_comments_cannot_break_the_c_text():
     assert identifier("") == "_"
     assert comment("a */ b /* c ??/ d\ne\\") == "a * / b / * c ? ?/ d e"
     assert string('say "a\\b"') == '"say \\"a\\\\b\\""'
+
+
+def test_a_shell_is_filled_by_texts_and_rows(monkeypatch):
+    text = "int @name@_size;\n    @rows@\n@none@\nend @name@\n"
+    monkeypatch.setattr(files, "shell", lambda name: text)
+    values = {"name": "@rows@", "rows": ["a = 1;", "", "b = @name@;"], "none": []}
+    assert files.filled("a.c", values) == "int @rows@_size;\n    a = 1;\n\n    b = @name@;\nend @rows@\n"
+    with pytest.raises(ExportError, match="placeholder 'rows' without a value"):
+        files.filled("a.c", {"name": "x"})
+
+
+def test_functions_of_c_stand_in_shells(root):
+    """Python fills rows: no text in it is an include, a loop, a return or the head of a fixed function."""
+    quoted = ("#include", "return ", "for (", "int main", "static void", "void ")
+    found = [
+        f"{file.name}:{node.lineno}: {node.value!r}"
+        for file in sorted((root / "nlsdesign" / "export").rglob("*.py"))
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if node.value.lstrip().startswith(quoted)
+    ]
+    assert not found

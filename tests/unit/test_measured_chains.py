@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -33,6 +34,7 @@ from nlsdesign.discrepancy.screening.other_rig import out_of_reach
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.identification import Column, Record, RecordSet, load_records
 from nlsdesign.model import flatten
+from nlsdesign.model.readings import reading_of
 from nlsdesign.simulation import Trace
 from tests.rig import ACTUATORS, make_records, write_records
 from tests.unit.test_identification_shooting import TRUE
@@ -160,6 +162,18 @@ def test_a_window_begins_at_the_state_behind_the_chain(sensors: dict[str, Sensor
     for number in found.numbers:
         assert abs(number.fitted - TRUE[number.name]) < 3.0 * number.standard_error
         assert abs(number.fitted - TRUE[number.name]) < 0.25 * abs(number.declared - TRUE[number.name])
+
+
+def test_the_value_behind_a_chain_is_inferred_from_the_last_sensor_to_the_first() -> None:
+    """Reading = 2·(F + drift so far) + 1: 4 N less 0.5 N of drift is 3.5 N."""
+    made = pulled(
+        warming=Drift(of="strip.force", drift=0.1), cell=ForceSensor(of="warming.reading", gain=2.0, bias=1.0)
+    )
+    model = flatten(made)
+    reading = reading_of(model.readings, "cell.reading")
+    numbers = {name: ca.SX(value) for name, value in model.values.items()} | {"warming.drifted": ca.SX(0.5)}
+    assert float(reading.inferred(ca.SX(9.0), numbers)) == pytest.approx(3.5)
+    assert (reading.measured, reading.sensors) == ("strip.force", ("cell", "warming"))
 
 
 def test_a_column_without_a_mapping_is_the_last_of_its_chain(tmp_path: Path, rig: Assembly) -> None:

@@ -23,17 +23,17 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import (
-    AsPublished,
     CascadeGain,
     FixedGrid,
     GridByTolerance,
     Minimal,
     ObserverDesign,
+    PaperForm,
     PolePlacement,
     check_stability,
     design_observer,
+    design_observer_with_details,
     observe,
-    observer_design,
 )
 from nlsdesign.observer.scheduled import whole_contour
 from nlsdesign.quantity import parse_unit
@@ -50,7 +50,7 @@ def model() -> FlatModel:
 
 @pytest.fixture(scope="module")
 def design(model: FlatModel) -> ObserverDesign:
-    return observer_design(model, grid=GRID)
+    return design_observer_with_details(model, grid=GRID)
 
 
 def test_names_are_those_of_the_plant(design: ObserverDesign) -> None:
@@ -140,7 +140,7 @@ def test_beyond_the_table_its_ends_are_held(design: ObserverDesign) -> None:
 
 def test_the_published_form_has_the_same_interface(model: FlatModel) -> None:
     observer = design_observer(
-        model, form=AsPublished(rate_bandwidth=30.0), grid=FixedGrid(-1.0, 1.0, points=101)
+        model, form=PaperForm(rate_bandwidth=30.0), grid=FixedGrid(-1.0, 1.0, points=101)
     )
     assert [v.name for v in observer.inputs] == ["motor.angle", "motor.current"]
     assert observer.outputs[0].name == "spring.torque"
@@ -154,7 +154,7 @@ def test_a_linear_spring_needs_no_inner_state() -> None:
         "spring": tie(Spring(stiffness=1.7, domain=ROTATION), "motor", "load")
     }
     model = flatten(assembly("soft", **parts), outputs=["motor.angle", "spring.torque"])
-    design = observer_design(model)
+    design = design_observer_with_details(model)
     assert whole_contour(model).upper == pytest.approx(np.pi / 2.0)
     assert design.model.evaluate([0.0, 0.0], [0.25, 0.0])["spring.torque"] == pytest.approx(
         1.7 * 0.25, rel=1e-6
@@ -210,7 +210,7 @@ def test_bad_numbers_are_named(model: FlatModel, design: ObserverDesign) -> None
     with pytest.raises(ValueRangeError, match="continuous model"):
         design_observer(design.model)
     with pytest.raises(ValueRangeError, match="rate_bandwidth"):
-        design_observer(model, form=AsPublished(rate_bandwidth=0.0))
+        design_observer(model, form=PaperForm(rate_bandwidth=0.0))
     with pytest.raises(ValueRangeError, match="needs 3 poles"):
         design_observer(model, gain=PolePlacement((-1.0,)), form=Minimal(), grid=FixedGrid())
     with pytest.raises(ConvergenceError, match="allow a larger error or more points"):

@@ -25,14 +25,14 @@ def minimal(arm: float, viscosity: float = ob.SLOW) -> SampledPlant:
     )
     names = (ob.RELAXING_FORCE, "motor.angle", "motor.speed")
     sizes = np.array([160.0, 0.785, 57.0])
-    return SampledPlant(0.5, a, expm(a * TIME), np.array([[0.0, 1.0, 0.0]]), names, sizes, TIME)
+    return SampledPlant(0.5, a, expm(a * TIME), np.array([[0.0, 1.0, 0.0]]), names, sizes, TIME, names[-1])
 
 
 def published(arm: float, viscosity: float = ob.SLOW) -> SampledPlant:
     a, c = ob.published_matrices(3e-3, arm, viscosity)
     names = (ob.FORCE, ob.EXTENSION, "motor.angle", "motor.speed")
     sizes = np.array([300.0, 12e-3, 0.785, 57.0])
-    return SampledPlant(0.5, a, expm(a * TIME), c[::-1], names, sizes, TIME)
+    return SampledPlant(0.5, a, expm(a * TIME), c[::-1], names, sizes, TIME, names[-1])
 
 
 def error_matrix(plant: SampledPlant, rule: GainRule) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 
 from nlsdesign.errors import ConvergenceError, ValueRangeError
 from nlsdesign.observer import FixedGrid, GridByTolerance
-from nlsdesign.observer.table import Compact, Entry, Grid, Place
+from nlsdesign.observer.table import ColumnPlace, Compact, Entry, Grid
 
 
 def entry(key: str, values: np.ndarray, *, row: str = "sum", weight: float = 1.0) -> Entry:
@@ -37,12 +37,12 @@ def read(compact: Compact, key: str, angle: float) -> float:
 def test_only_what_changes_costs_a_column(grid: Grid) -> None:
     compact = grid.compact(smooth)
     assert [column.key for column in compact.columns] == ["wave"]
-    assert compact.places["wave"] == Place(1.0, 0)
+    assert compact.places["wave"] == ColumnPlace(1.0, 0)
     assert compact.places["half"].column == 0
     assert compact.places["half"].factor == pytest.approx(0.5)
-    assert compact.places["number"] == Place(7.0)
-    assert compact.places["nothing"] == Place(0.0)
-    assert compact.places["small"] == Place(0.0)
+    assert compact.places["number"] == ColumnPlace(7.0)
+    assert compact.places["nothing"] == ColumnPlace(0.0)
+    assert compact.places["small"] == ColumnPlace(0.0)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])

@@ -484,7 +484,7 @@ def test_a_report_on_a_diagnosis_has_units_on_every_axis() -> None:
     bins = SimpleNamespace(centre=np.linspace(0.0, 1.0, 5), mean=np.linspace(0.1, 0.2, 5))
     time = np.linspace(0.0, 1.0, 50)
     diagnosis = SimpleNamespace(
-        verdict="named", block="load", where=("load",), effects=(), runners_up=(), next_steps=(),
+        verdict="named", block="load", where=("load",), effects=(), runners_up=(), skipped=(), next_steps=(),
         declared=wheel, rows=list, words=lambda: "Named.",
         gaps=[SimpleNamespace(block="load", record="a", role="held_out", before=2.0, after=1.0,
                               noise_floor=0.5, unit="N*m")],

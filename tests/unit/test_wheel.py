@@ -46,6 +46,6 @@ def test_every_file_travels(root: Path, wheel: set[str], folder: str) -> None:
 
 
 def test_types_and_command_travel(wheel: set[str]) -> None:
-    assert "nlsdesign/py.typed" in wheel
+    assert {"nlsdesign/py.typed", "nlsdesign/__init__.pyi", "nlsdesign/bibliography.toml"} <= set(wheel)
     assert any(name.endswith(".dist-info/entry_points.txt") for name in wheel)
     assert any(name.endswith(".dist-info/licenses/LICENSE") for name in wheel)

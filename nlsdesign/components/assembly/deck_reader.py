@@ -195,11 +195,11 @@ class Builder:
         Parameters
         ----------
         name
-            As for :meth:`part`.
+            Of the table.
         element
             The element; its ends are checked even where it could not be made.
         table
-            As for :meth:`part`.
+            As read.
         """
         ends = table.get("between")
         if not isinstance(ends, list) or not all(isinstance(end, str) for end in ends):

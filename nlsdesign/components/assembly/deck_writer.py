@@ -24,7 +24,7 @@ from .sensor_chains import source_problems
 
 
 def deck_problems(deck: Deck) -> list[NlsError]:
-    """Return everything that is wrong with a deck, each with file, line and column.
+    """Return all problems of a deck, each with file, line and column.
 
     Parameters
     ----------
@@ -157,10 +157,10 @@ def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:
 
     Raises
     ------
-    NlsError
-        If the table is missing or is another component, or a number is missing, unknown or not valid.
     DeckError
-        If the deck has a part there that the model has not, or has problems.
+        If the table is missing or is another component.
+    NlsError
+        If a number is missing, unknown or not valid.
     """
     table: Any = deck.tables
     for step in path.split("."):

@@ -75,12 +75,12 @@ class Assembly:
         return {name: part for name, part in self.parts if isinstance(part, Sensor)}
 
     def measured(self, signal: str) -> tuple[str, tuple[str, ...]]:
-        """Return what a signal shows, and the sensors between, the one that gives the reading first.
+        """Return the variable that a signal measures, and the chain of sensors, the last one first.
 
         Parameters
         ----------
         signal
-            Full name; a signal that is not the reading of a sensor shows itself.
+            Full name; a signal that is not the reading of a sensor is returned itself.
 
         Raises
         ------

@@ -87,9 +87,9 @@ class Sharp(CornerContact, FrictionContact):
     ) -> Pair:
         """Return max(v, 0) and its step."""
         if jumps:
-            share = (1 + scope.side(value, above=words[0], below=words[1], name=name)) / 2
+            share = (1 + scope.jump(value, above=words[0], below=words[1], name=name)) / 2
             return share * value, share
-        scope.corner(value, above=words[0], below=words[1], name=name)
+        scope.kink(value, above=words[0], below=words[1], name=name)
         return ca.fmax(value, 0), ca.if_else(value > 0, 1, 0)
 
     def against(
@@ -104,7 +104,7 @@ class Sharp(CornerContact, FrictionContact):
 
     def size(self, scope: Scope, value: Expression, words: tuple[str, str], name: str) -> Expression:
         """Return |v| with its corner."""
-        scope.corner(value, above=words[0], below=words[1], name=name)
+        scope.kink(value, above=words[0], below=words[1], name=name)
         return ca.fabs(value)
 
 

@@ -212,10 +212,10 @@ def quantities(part: Part, path: str = "") -> dict[str, Quantity]:
     path
         Path of the root.
     """
-    found: dict[str, Quantity] = {}
+    by_name: dict[str, Quantity] = {}
     for where, each in walk(part, path):
-        found |= {f"{where}.{name}" if where else name: q for name, q in each.parameters().items()}
-    return found
+        by_name |= {f"{where}.{name}" if where else name: q for name, q in each.parameters().items()}
+    return by_name
 
 
 def find(part: Part, path: str) -> Part:
@@ -303,18 +303,18 @@ def resolved(
     UnknownNameError
         With the nearest name that exists.
     """
-    found: dict[str, Quantity] = {}
+    changed: dict[str, Quantity] = {}
     for name, value in values.items():
         row, index = _row_item(name)
         if row not in known:
             raise unknown_name("parameter", name, known)
-        found[row] = _changed(name, found.get(row, known[row]), value, index)
-    return found
+        changed[row] = _changed(name, changed.get(row, known[row]), value, index)
+    return changed
 
 
 def _row_item(name: str) -> tuple[str, int | None]:
-    found = re.fullmatch(r"(.+)\[(\d+)\]", name)
-    return (found[1], int(found[2])) if found else (name, None)
+    item = re.fullmatch(r"(.+)\[(\d+)\]", name)
+    return (item[1], int(item[2])) if item else (name, None)
 
 
 def _changed(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ...symbolic import Expression
 from .element import UNBOUNDED, Range, Scope
-from .switches import Hold
+from .switches import StictionConstraint
 
 
 class Forwarding:
@@ -55,17 +55,17 @@ class Forwarding:
         """Tell whether anything given so far contains this symbol."""
         return self._scope.rate_is_used(rate)
 
-    def corner(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
+    def kink(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
         """Say that the effort has a corner where a value vanishes."""
-        self._scope.corner(value, above=above, below=below, name=name)
+        self._scope.kink(value, above=above, below=below, name=name)
 
-    def side(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
+    def jump(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
         """Return a symbol that is 1 where a value is positive and −1 where it is negative."""
-        return self._scope.side(value, above=above, below=below, name=name)
+        return self._scope.jump(value, above=above, below=below, name=name)
 
-    def hold(self, hold: Hold) -> Expression:
+    def stiction(self, constraint: StictionConstraint) -> Expression:
         """Take an effort that holds a rate at zero, and return it."""
-        return self._scope.hold(hold)
+        return self._scope.stiction(constraint)
 
 
 class ReducedTime(Forwarding):

@@ -138,10 +138,10 @@ def _shared_by_many(
     if any(scope.rate_is_used(v) for v in rates):
         pairs = zip(efforts, shares, rates, strict=True)
         drifts = [scope.total_rate(f, {z: v}) for f, z, v in pairs]
-        for v, found in zip(rates, split(drifts, rates, whole_rate), strict=True):
-            scope.define(v, found)
-    for z, found in zip(shares, ca.vertsplit(solutions), strict=True):
-        scope.define(z, found)
+        for v, solution in zip(rates, split(drifts, rates, whole_rate), strict=True):
+            scope.define(v, solution)
+    for z, solution in zip(shares, ca.vertsplit(solutions), strict=True):
+        scope.define(z, solution)
     scope.define(whole, motion)
     scope.define(whole_rate, rate)
     return ca.substitute(efforts[0], shares[0], ca.substitute(solutions[0], whole, motion))

@@ -31,17 +31,17 @@ def split(efforts: Sequence[Expression], shares: Sequence[Expression], whole: Ex
         Sum of the shares.
     """
     unknowns = ca.vertcat(*shares)
-    found = ca.vertcat(*efforts)
+    stacked = ca.vertcat(*efforts)
     slopes = ca.vertcat(*[ca.jacobian(f, z) for f, z in zip(efforts, shares, strict=True)])
     if not depends(slopes, unknowns):
         flexible = 1 / slopes
-        offsets = ca.substitute(found, unknowns, ca.SX.zeros(unknowns.shape))
+        offsets = ca.substitute(stacked, unknowns, ca.SX.zeros(unknowns.shape))
         common = (whole + ca.dot(offsets, flexible)) / ca.sum1(flexible)
         return ca.vertsplit((common - offsets) * flexible)
     own = {z.element_hash() for z in shares}
-    free = [s for s in ca.symvar(ca.vertcat(found, slopes)) if s.element_hash() not in own]
-    law = ca.Function("law", [unknowns, *free], [found, slopes])
-    only = ca.Function("only", [unknowns, *free], [found])
+    free = [s for s in ca.symvar(ca.vertcat(stacked, slopes)) if s.element_hash() not in own]
+    law = ca.Function("law", [unknowns, *free], [stacked, slopes])
+    only = ca.Function("only", [unknowns, *free], [stacked])
     at = ca.SX.ones(len(shares)) * whole / len(shares)
     best, least = at, ca.SX(ca.inf)
     for _ in range(NEWTON_STEPS):

@@ -1,9 +1,9 @@
 """What a law says of the places where it is not smooth, so that simulation can find them.
 
-Three kinds. A *corner* keeps the effort continuous; only its derivative jumps. At a *side* the effort itself
-jumps, so the law is written with a symbol that is 1 on one side and −1 on the other. A *hold* keeps a rate at
-zero by an effort that is found from the motion of everything else: dry friction that sticks, a body at rest
-against a stop.
+Three kinds. At a *kink* the effort is continuous and only its derivative jumps. At a *jump* the effort itself
+jumps, so the law is written with a symbol that is 1 on one side and −1 on the other. A *stiction constraint*
+keeps a rate at zero by an effort that follows from the motion of everything else: dry friction that sticks, a
+body at rest against a stop.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from ...symbolic import Expression, symbol
 
 
 @dataclass(frozen=True)
-class Corner:
-    """A place at which an effort has a corner.
+class Kink:
+    """A place at which an effort has a kink.
 
     Parameters
     ----------
     name
         Full name, for messages and events.
     value
-        Vanishes at the corner.
+        Vanishes at the kink.
     above, below
         What has happened when the value has become positive, or negative.
     """
@@ -38,7 +38,7 @@ class Corner:
 
 
 @dataclass(frozen=True)
-class Side(Corner):
+class Jump(Kink):
     """A place at which an effort jumps.
 
     Parameters
@@ -51,7 +51,7 @@ class Side(Corner):
 
 
 @dataclass(frozen=True)
-class Hold:
+class StictionConstraint:
     """An effort that keeps a rate at zero, and what acts while it does not.
 
     Parameters
@@ -101,15 +101,15 @@ class Switches(Protocol):
 
     path: str
 
-    def corner(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
-        """Say that the effort has a corner where a value vanishes."""
+    def kink(self, value: Expression, *, above: str, below: str, name: str = "") -> None:
+        """Declare that the effort has a kink where a value vanishes."""
         ...
 
-    def side(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
+    def jump(self, value: Expression, *, above: str, below: str, name: str = "") -> Expression:
         """Return a symbol that is 1 where a value is positive and −1 where it is negative."""
         ...
 
-    def hold(self, hold: Hold) -> Expression:
+    def stiction(self, constraint: StictionConstraint) -> Expression:
         """Take an effort that holds a rate at zero, and return it."""
         ...
 
@@ -131,8 +131,8 @@ def dry(
         Largest effort at which the two sides stick.
     """
     mode, effort = symbol(f"{scope.path}.mode"), symbol(f"{scope.path}.holding")
-    return scope.hold(
-        Hold(
+    return scope.stiction(
+        StictionConstraint(
             scope.path, effort, mode, rate,
             moving=mode * slipping(mode * rate),
             stays=sticking - ca.fabs(effort),

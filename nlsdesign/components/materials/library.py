@@ -196,11 +196,11 @@ def _material(deck: Deck, name: str, table: Any) -> Material:
                 did_you_mean=nearest(key, _WORDS),
                 next_step=f"fields are: {', '.join(_WORDS)}; a property is a table",
             )  # fmt: skip
-    words = {word: _text(deck, name, table, word) for word in _WORDS}
+    texts = {field: _text(deck, name, table, field) for field in _WORDS}
     properties = tuple(_property(deck, name, key, raw) for key, raw in table.items() if isinstance(raw, dict))
     if not properties:
         raise DeckError(deck.place(name), "has no property", next_step=f"add a table [{name}.loss_tangent]")
-    return Material(name=name, properties=properties, **words)
+    return Material(name=name, properties=properties, **texts)
 
 
 def _property(deck: Deck, owner: str, name: str, raw: Mapping[str, Any]) -> Property:
@@ -233,17 +233,17 @@ def _conditions(
             continue
         place = f"{full}.{name}"
         given = raw[name] | {"source": quantity.source} if isinstance(raw[name], dict) else raw[name]
-        found = deck.number(place, given)
-        if not same_dimension(found.unit, unit):
+        condition = deck.number(place, given)
+        if not same_dimension(condition.unit, unit):
             raise DeckError(
                 deck.place(place),
-                f"'{found.unit}' does not measure it",
+                f"'{condition.unit}' does not measure it",
                 next_step=f"use for instance '{unit}'",
             )
-        rows = len(found.values), len(quantity.values)
-        if isinstance(found.value, tuple) and rows[0] != rows[1]:
+        rows = len(condition.values), len(quantity.values)
+        if isinstance(condition.value, tuple) and rows[0] != rows[1]:
             raise DeckError(deck.place(place), f"has {rows[0]} numbers, the value has {rows[1]}")
-        yield name, found
+        yield name, condition
 
 
 def _text(deck: Deck, full: str, table: Mapping[str, Any], key: str) -> str:

@@ -155,7 +155,7 @@ class SelfHeating(Combination):
 
     What heats, and how g falls, is the reading ``heat``: :class:`HeatBalance` in a material,
     :class:`WorkHeat` or :class:`ViscousHeat` around a piece whose section and length are not known apart.
-    The readings name their sources.
+    Source: first law of thermodynamics.
 
     Examples
     --------

@@ -35,7 +35,7 @@ class CoulombFriction(WithFriction, Viscous):
 
     At rest T is what keeps both sides together: valid between two bodies, one of which has inertia. With
     ``contact=Regularised(creep_speed=...)`` it is T_c·tanh(ω/ω_s), C∞, and creeps at rest. Viscous friction
-    goes beside it as a :class:`Dashpot`. Source: Coulomb 1785; Pfeiffer and Glocker 1996 (as a set-valued
+    goes beside it as a :class:`Dashpot`. Sources: Coulomb 1785; Pfeiffer and Glocker 1996 (as a set-valued
     law); Armstrong-Hélouvry 1991 (the smooth form).
 
     Examples
@@ -61,7 +61,7 @@ class StribeckFriction(CoulombFriction):
 
     |T| ≤ T_c + ΔT while ω = 0; ΔT is what the friction near standstill has beyond sliding. With
     ``contact=Regularised(creep_speed=...)`` tanh(ω/ω_s) stands for the sign. Valid as
-    :class:`CoulombFriction`. Source: Stribeck 1902; Armstrong-Hélouvry 1991 (this form).
+    :class:`CoulombFriction`. Sources: Stribeck 1902; Armstrong-Hélouvry 1991 (this form).
     """
 
     breakaway: Quantity = parameter(
@@ -87,8 +87,8 @@ class LoadFriction(WithFriction, Combination):
     T_in is the effort of the elements inside; the drive's efficiency is about 1 − µ forward and 1/(1 − µ)
     backward. While ω = 0 the friction is at most µ·|T_in|, so a loaded gear stays where it is, and none of
     the elements inside may be sharp dry friction itself. With ``contact=Regularised(creep_speed=...)``
-    tanh(ω/ω_s) stands for the sign: C∞ but for the corner of |T_in|. Source: Coulomb 1785 (the load as normal
-    force); Niemann and Winter 2003 (losses of gears).
+    tanh(ω/ω_s) stands for the sign: C∞ but for the corner of |T_in|. Sources: Coulomb 1785 with the load as
+    normal force; Niemann and Winter 2003 (losses of gears).
     """
 
     takes: ClassVar[tuple[Domain, ...]] = (ROTATION, TRANSLATION)

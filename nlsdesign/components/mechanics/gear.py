@@ -123,9 +123,9 @@ def gear_problems(
     for name, gear in parts:
         if not isinstance(gear, Gear) or set(unsure) & set(gear.between):
             continue
-        found = list(_end_problems(name, gear, bodies))
-        yield from ((name, error) for error in found)
-        if found:
+        problems = list(_end_problems(name, gear, bodies))
+        yield from ((name, error) for error in problems)
+        if problems:
             continue
         one, other = (train[end] for end in gear.between)
         if one == other:

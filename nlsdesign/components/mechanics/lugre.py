@@ -60,16 +60,16 @@ class LuGreFriction(Viscous):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return T."""
         stiffness, share = scope.parameter("stiffness"), scope.parameter("elastic_share")
-        bent = scope.state(
+        deflection = scope.state(
             "deflection", self.domain.motion_unit, f"deflection of the bristles of {scope.path}"
         )
         fall = stribeck(rate, scope.parameter("stribeck_speed"))
         most = (scope.parameter("sliding_effort") + scope.parameter("breakaway") * fall) / stiffness
         # From 0 at the break-away deflection to 1 at the largest.
-        place = ca.fmin(ca.fmax((ca.fabs(bent) / most - share) / (1 - share), 0), 1)
-        plastic = ca.if_else(bent * rate > 0, (1 - ca.cos(ca.pi * place)) / 2, 0)
-        bending = rate * (1 - plastic * ca.fabs(bent) / most)
-        scope.derive(bent, bending)
+        place = ca.fmin(ca.fmax((ca.fabs(deflection) / most - share) / (1 - share), 0), 1)
+        plastic = ca.if_else(deflection * rate > 0, (1 - ca.cos(ca.pi * place)) / 2, 0)
+        bending = rate * (1 - plastic * ca.fabs(deflection) / most)
+        scope.derive(deflection, bending)
         damping = scope.parameter("bristle_damping") * bending + scope.parameter("damping") * rate
-        scope.loss(stiffness * bent * (rate - bending) + damping * rate)
-        return stiffness * bent + damping
+        scope.loss(stiffness * deflection * (rate - bending) + damping * rate)
+        return stiffness * deflection + damping

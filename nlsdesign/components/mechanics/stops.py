@@ -17,7 +17,7 @@ from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Element, Scope
 from ..core.part_numbers import one_of, parameter
 from ..core.springs import Elastic
-from ..core.switches import Hold
+from ..core.switches import StictionConstraint
 
 
 def _check_order(lower: Quantity, upper: Quantity) -> None:
@@ -118,8 +118,8 @@ class RigidStop(Elastic):
         gap = ca.fmin(ca.fmax(upper - motion, -rate), ca.fmax(motion - lower, rate))
         inside = ca.logic_and(motion < upper, motion > lower)
         slow = ca.fabs(rate) <= scope.parameter("resting_speed")
-        return scope.hold(
-            Hold(
+        return scope.stiction(
+            StictionConstraint(
                 scope.path, effort, mode, rate,
                 moving=ca.SX(0),
                 stays=ca.if_else(at_upper, effort, -effort),

@@ -88,7 +88,7 @@ class Eccentricity(Sensor):
     n is the number of turns of the disc per turn of what is read: 1, or the gear ratio for a disc on the
     motor's shaft. The error vanishes at zero, where encoders are set to zero. An eccentricity e under a read
     head at radius R gives a² + b² = (e/R)². Valid while n·√(a² + b²) < 1, so that counts grow with the angle.
-    Source: geometry; data sheets of optical encoders ("eccentricity error").
+    Source: geometry; data sheets (of optical encoders, "eccentricity error").
 
     Examples
     --------

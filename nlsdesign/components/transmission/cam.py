@@ -156,5 +156,5 @@ def control_values(
     position = dense / angles[-1] * (count - 3)
     distance = np.abs(position[:, None] - (np.arange(count) - 1)[None, :])
     basis = (np.clip(2 - distance, 0, None) ** 3 - 4 * np.clip(1 - distance, 0, None) ** 3) / 6
-    found, *_ = np.linalg.lstsq(basis, values, rcond=None)
-    return tuple(float(item) for item in found)
+    control_points, *_ = np.linalg.lstsq(basis, values, rcond=None)
+    return tuple(float(item) for item in control_points)

@@ -137,10 +137,10 @@ class AnchoredCam(Cam):
         leaning = ca.asin(self._support(scope, unknown) / scope.parameter("anchor_distance"))
         residual = unknown - leaning - given
         start = given + ca.substitute(leaning, unknown, given)
-        found = ca.substitute(newton_root(residual, unknown, start), given, on_side)
-        remainder = ca.substitute(ca.substitute(residual, unknown, found), given, on_side)
+        direction = ca.substitute(newton_root(residual, unknown, start), given, on_side)
+        remainder = ca.substitute(ca.substitute(residual, unknown, direction), given, on_side)
         scope.check(f"{scope.path}.direction", remainder)
-        return found
+        return direction
 
     def _taken(self, scope: Scope, direction: Expression) -> Expression:
         arm, anchor = self._support(scope, direction), scope.parameter("anchor_distance")

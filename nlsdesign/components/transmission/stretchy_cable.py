@@ -54,8 +54,8 @@ class StretchyCable(Combination):
         if scope.rate_is_used(left_rate):
             # The rate follows from the time derivative of the same balance; dry friction inside bends it.
             drift = scope.total_rate(residual, {left: left_rate, whole: whole_rate})
-            found = solve_monotone(lambda v: ca.substitute(drift, left_rate, v), left_rate, whole_rate)
-            scope.define(left_rate, found)
+            solved_rate = solve_monotone(lambda v: ca.substitute(drift, left_rate, v), left_rate, whole_rate)
+            scope.define(left_rate, solved_rate)
         scope.define(left, solution)
         scope.define(whole, motion)
         scope.define(whole_rate, rate)

@@ -83,7 +83,7 @@ class InextensibleCable(Combination):
         # While taut this is the positive force itself; while slack it must vanish.
         remainder = ca.fmin(ca.substitute(force, left, place), 0)
         scope.check(f"{scope.path}.left", remainder / (1 + ca.fabs(ca.substitute(force, left, motion))))
-        scope.corner(motion - resting, above="becomes taut", below="goes slack")
+        scope.kink(motion - resting, above="becomes taut", below="goes slack")
         scope.define(left, place)
         scope.define(left_rate, ca.if_else(motion >= resting, rate, 0))
         return ca.fmax(ca.substitute(force, left, place), 0)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench, measured_inputs
 from ...identification.records.measurement import Record, RecordSet
-from ...model import Assembly, flatten
+from ...model import flatten
 from ...simulation import RangeWarning, Trace, range_warnings, simulate
 from ...symbolic import depends
 from .tearing import blocks_of
@@ -51,8 +52,7 @@ def predict(actuator: Assembly, records: RecordSet, name: str) -> Trace:
         for each in bench.evidence(bench.driven(block, []), chosen, {}):
             shown = block.target or block.output
             signals[shown], units[shown] = each.predicted({}), block.model.outputs[0].unit
-    found = [each for block in blocks for each in _range_warnings(block, chosen[0])]
-    warnings = {each.name: each for each in found}
+    warnings = {each.name: each for block in blocks for each in _range_warnings(block, chosen[0])}
     return Trace(chosen[0].trace.time, signals, units, name, warnings=tuple(warnings.values()))
 
 
@@ -67,6 +67,6 @@ def _range_warnings(block: Block, record: Record) -> tuple[RangeWarning, ...]:
         inputs = {v.name: row for v, row in zip(model.inputs, rows, strict=True)}
         return simulate(model, time, inputs=inputs, tolerance=1e-6).warnings
     state, values = model.start(model.states), model.start(model.parameters)
-    found = np.array(ca.densify(model.equations(0.0, state, rows, values, np.zeros(0))[2]))
-    signals = {v.name: found[i] for i, v in enumerate(model.signals)}
+    computed = np.array(ca.densify(model.equations(0.0, state, rows, values, np.zeros(0))[2]))
+    signals = {v.name: computed[i] for i, v in enumerate(model.signals)}
     return range_warnings(model.signals, time, signals)

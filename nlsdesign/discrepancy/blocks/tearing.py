@@ -171,39 +171,51 @@ class _Tearing:
         body
             Whose balance it is.
         """
-        model, s, replaced = self._model, self._s, self._replaced
-        states, inputs = [v.name for v in model.states], [v.name for v in model.inputs]
-        kept = [i for i, name in enumerate(states) if name not in replaced]
-        resting = [i for i, name in enumerate(inputs) if name not in replaced]
+        model, s = self._model, self._s
+        kept = [i for i, v in enumerate(model.states) if v.name not in self._replaced]
+        resting = [i for i, v in enumerate(model.inputs) if v.name not in self._replaced]
         # Signals with a stated range stay, so that a prediction can say where it is left.
         bounded = [i for i, v in enumerate(model.signals) if v.bounded]
-        rows = [_column(s.derivative, kept), result.value, _column(s.signal, bounded)]
-        # An effort that was cut is an input and goes on as a signal: the input is what is replaced.
-        symbols = dict(zip(states + inputs, ca.vertsplit(ca.vertcat(s.state, s.input)), strict=True))
-        old = ca.vertcat(*[symbols[name] for name in replaced])
-        rows = ca.substitute(rows, [old], [ca.vertcat(*replaced.values())])
-        rows[1] = self._in_drive_units(rows[1], body)
+        derivative, value, signal = self._in_readings(
+            [_column(s.derivative, kept), result.value, _column(s.signal, bounded)]
+        )
+        value = self._in_drive_units(value, body)
+        driven = ca.vertcat(*[symbol for _, symbol in self._inputs.values()])
         columns = [
             s.time,
-            ca.vertcat(*[s.state[i] for i in kept]),
-            ca.vertcat(*[symbol for _, symbol in self._inputs.values()], *[s.input[i] for i in resting]),
+            _column(s.state, kept),
+            ca.vertcat(driven, _column(s.input, resting)),
             s.parameter,
             s.table,
         ]
-        equations = ca.Function(
-            "equations", [ca.SX(c) for c in columns], [ca.densify(rows[0]), rows[1], rows[2], ca.SX(0, 1)]
-        )
+        rows = [ca.densify(derivative), value, signal, ca.SX(0, 1)]
         torn = replace(
             model,
-            equations=equations,
+            equations=ca.Function("equations", [ca.SX(c) for c in columns], rows),
             states=tuple(model.states[i] for i in kept),
             signals=tuple(model.signals[i] for i in bounded),
             outputs=(result.variable,),
             inputs=(*[v for v, _ in self._inputs.values()], *[model.inputs[i] for i in resting]),
         )
-        torn = without_idle_states(torn, [result.variable.name])
-        output, target = result.variable.name, result.target
-        return Block(result.part, torn, self._drives, output, target, result.width, result.moving)
+        return Block(
+            name=result.part,
+            model=without_idle_states(torn, [result.variable.name]),
+            drives=self._drives,
+            output=result.variable.name,
+            target=result.target,
+            width=result.width,
+            moving=result.moving,
+        )
+
+    def _in_readings(self, rows: list[Expression]) -> list[Expression]:
+        """Return expressions with the readings in place of the variables that they show."""
+        model, s = self._model, self._s
+        names = [v.name for v in (*model.states, *model.inputs)]
+        # An effort that was cut is an input and goes on as a signal: the input is what is replaced.
+        symbols = dict(zip(names, ca.vertsplit(ca.vertcat(s.state, s.input)), strict=True))
+        shown = ca.vertcat(*[symbols[name] for name in self._replaced])
+        replaced: list[Expression] = ca.substitute(rows, [shown], [ca.vertcat(*self._replaced.values())])
+        return replaced
 
     def _in_drive_units(self, balance: Expression, body: MovingBody | None) -> Expression:
         """Return a balance as the error of the measured drive, times the declared effort per drive.

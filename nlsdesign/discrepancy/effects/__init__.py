@@ -15,8 +15,8 @@ from .effect import Edit, Effect, Form, Ranked, ranked
 
 
 def _rows() -> Iterator[Effect | Ranked]:
-    for found in pkgutil.iter_modules(__path__, f"{__name__}."):
-        module = importlib.import_module(found.name)
+    for listed in pkgutil.iter_modules(__path__, f"{__name__}."):
+        module = importlib.import_module(listed.name)
         yield from (value for value in vars(module).values() if isinstance(value, Effect | Ranked))
 
 

@@ -140,10 +140,10 @@ def free_name(assembly: Assembly, name: str) -> str:
     name
         The name wanted; a number is added where it is taken.
     """
-    taken, number, found = {n for n, _ in assembly.parts}, 2, name
-    while found in taken:
-        found, number = f"{name}_{number}", number + 1
-    return found
+    taken, number, free = {n for n, _ in assembly.parts}, 2, name
+    while free in taken:
+        free, number = f"{name}_{number}", number + 1
+    return free
 
 
 def numbers_of(part: Part) -> dict[str, Any]:

@@ -13,11 +13,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeAlias
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import ConvergenceError
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.estimation.least_squares import Fit, fit, predicted_cost
 from ...identification.estimation.parameters import Parameter
-from ...model import Assembly, flatten
+from ...model import flatten
 from ..blocks.tearing import blocks_of
 from .unpredictable import Key, Tally, quickest, unpredictable
 
@@ -69,7 +70,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class FitProblem:
     """The free numbers of a group of blocks, and everything that the records say of them.
 
     Parameters
@@ -153,7 +154,7 @@ class Strategy(ABC):
     """Whether its fits take much longer than others, so that they are begun first."""
 
     @abstractmethod
-    def beginnings(self, problem: Problem, slow: Sequence[Evidence]) -> list[Start]:
+    def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return better starts than those of the unknowns; nothing where there are none.
 
         Parameters
@@ -169,7 +170,7 @@ class Strategy(ABC):
 class Plain(Strategy):
     """Begin where the unknowns of the effect say."""
 
-    def beginnings(self, problem: Problem, slow: Sequence[Evidence]) -> list[Start]:
+    def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return nothing: the unknowns say it."""
         return []
 
@@ -195,7 +196,7 @@ class Continuation(Strategy):
 
     takes_long: ClassVar[bool] = True
 
-    def beginnings(self, problem: Problem, slow: Sequence[Evidence]) -> list[Start]:
+    def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         """Return the starts that the simpler form leaves; nothing where it has no response."""
         bench, first = problem.bench, problem.starts[0]
         every = blocks_of(flatten(self.through), bench.records.signals)
@@ -228,7 +229,7 @@ class Method(ABC):
     """How a group of blocks is fitted from its starts."""
 
     @abstractmethod
-    def fit(self, problem: Problem, strategy: Strategy) -> Fit:
+    def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
         """Fit the numbers.
 
         Parameters
@@ -245,7 +246,7 @@ class Method(ABC):
         """
 
     @abstractmethod
-    def set_aside(self, problem: Problem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return which blocks and records are to be judged by the others.
 
         Parameters
@@ -260,11 +261,11 @@ class Method(ABC):
 class Smooth(Method):
     """Least squares over all records, from several starts."""
 
-    def fit(self, problem: Problem, strategy: Strategy) -> Fit:
+    def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
         """Fit to all records that are predictable."""
         return best_fit(problem.predictable, problem.starts, problem.limits)
 
-    def set_aside(self, problem: Problem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return what was set aside before."""
         return frozenset(key for key in problem.unpredictable if key in after)
 
@@ -275,7 +276,7 @@ class RobustOverFreeFlight(Smooth):
     Short implicit steps take long, so evaluations are few and begin where the strategy says.
     """
 
-    def fit(self, problem: Problem, strategy: Strategy) -> Fit:
+    def fit(self, problem: FitProblem, strategy: Strategy) -> Fit:
         """Fit to the slower records, then to all that are predictable, each bounded by what it was before."""
         limits = self._limits(problem)
         if not problem.coarse:
@@ -299,13 +300,13 @@ class RobustOverFreeFlight(Smooth):
             known=known,
         )
 
-    def set_aside(self, problem: Problem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return the quick records that a new effect leaves unpredicted."""
         if not (problem.coarse and problem.new):
             return super().set_aside(problem, after)
         return unpredictable(problem.before, after, quickest(problem.evidence))
 
-    def _limits(self, problem: Problem) -> Limits:
+    def _limits(self, problem: FitProblem) -> Limits:
         whole = problem.coarse and problem.effects < 2
         return replace(problem.limits, evaluations=LONG_EVALUATIONS if whole else LONG_EVALUATIONS // 3)
 
@@ -316,7 +317,7 @@ class RobustOverFreeFlight(Smooth):
         return now - cost >= WORTH_FITTING * (now - 0.5 * sum(t.rows for t in tallies))
 
 
-def refusal(problem: Problem) -> str:
+def refusal(problem: FitProblem) -> str:
     """Return why a further effect is not fitted at all; empty if it is.
 
     Bounds count operations and starts, never seconds, so that every machine gives the same verdict.
@@ -333,7 +334,7 @@ def refusal(problem: Problem) -> str:
     return f"is too expensive to try: {problem.instructions} operations per step, {starts} starts"
 
 
-def method_for(problem: Problem) -> Method:
+def method_for(problem: FitProblem) -> Method:
     """Return how a group of blocks is fitted.
 
     Parameters

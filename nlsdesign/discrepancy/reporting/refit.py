@@ -12,13 +12,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.evidence import Bench
 from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...model import Assembly, flatten
+from ...model import flatten
 from ..blocks.tearing import blocks_of
 from ..screening.other_rig import out_of_reach
 from ..screening.scale_check import scale_findings, typical_sizes

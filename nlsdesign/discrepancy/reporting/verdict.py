@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
-from ...model import Assembly
 from ..selection.search import Skipped
 from .remainder import Remainder
 

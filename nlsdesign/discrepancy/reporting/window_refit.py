@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.block import Drive
 from ...identification.estimation.least_squares import Fit
@@ -15,7 +16,7 @@ from ...identification.output_error.simulation_error import Shots, Weights
 from ...identification.output_error.wiring import Wiring
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.statistics.metrics import rmse
-from ...model import Assembly, FlatModel, flatten
+from ...model import FlatModel, flatten
 from ...model.readings import reading_of
 from ..blocks.shown_values import shown_values
 from .verdict import RecordGap

@@ -9,11 +9,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import Record, RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.loop_work import Loop, loop_of
-from ...model import Assembly, FlatModel, flatten
+from ...model import FlatModel, flatten
 from ...model.readings import reading_of
 from ...model.structure import motions_of_efforts
 from ...symbolic import depends

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...model import Assembly, flatten
+from ...model import flatten
 from ...model.readings import reading_of
 from ..selection.comparison import Comparison
 from ..selection.criteria import DECLARED

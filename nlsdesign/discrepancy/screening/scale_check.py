@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...model import Assembly, FlatModel, flatten
+from ...model import FlatModel, flatten
 from ...model.readings import reading_of
 from ..blocks.shown_values import shown_values
 from ..selection.comparison import Comparison

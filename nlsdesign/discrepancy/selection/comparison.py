@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from ...components.assembly.named_parts import Assembly
 from ...errors import ConvergenceError
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
@@ -18,8 +19,8 @@ from ...identification.estimation.least_squares import fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
 from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
-from ...model import Assembly, Variable, flatten
-from ...parallel_map import parallel_map
+from ...model import Variable, flatten
+from ...processes import parallel_map
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Tally

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
-from ...model import Assembly
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Key, Tally, like_the_others
 

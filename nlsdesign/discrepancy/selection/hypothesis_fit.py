@@ -15,7 +15,7 @@ from ...identification.estimation.parameters import Parameter, declared_paramete
 from ...identification.statistics.residuals import effective_size
 from ...model import Variable
 from ..effects.candidate import Unknown
-from ..fitting.strategies import Plain, Problem, Start, method_for, refusal
+from ..fitting.strategies import FitProblem, Plain, Start, method_for, refusal
 from ..fitting.unpredictable import Key, Tally
 from .hypothesis import Hypothesis
 
@@ -97,7 +97,9 @@ class HypothesisFit:
             return error
         return GroupFit(best, tallies, problem.has_free_flight, method.set_aside(problem, tallies))
 
-    def _problem(self, hypothesis: Hypothesis, group: Sequence[FreeBlock], new: Sequence[Unknown]) -> Problem:
+    def _problem(
+        self, hypothesis: Hypothesis, group: Sequence[FreeBlock], new: Sequence[Unknown]
+    ) -> FitProblem:
         own = [u for u in new if any(u.name in each.free for each in group)]
         starts = self._starts(hypothesis, group, own)
         values = {p.name: p.start for p in starts[0]}
@@ -106,7 +108,7 @@ class HypothesisFit:
         evidence = [
             e for d in driven for e in self._bench.evidence(d, records, values, coarse=hypothesis.coarse)
         ]
-        return Problem(
+        return FitProblem(
             self._bench,
             hypothesis.assembly,
             tuple(each.block.name for each in group),
@@ -157,7 +159,7 @@ class HypothesisFit:
         )
 
 
-def _tallies(problem: Problem, best: Fit) -> dict[Key, Tally]:
+def _tallies(problem: FitProblem, best: Fit) -> dict[Key, Tally]:
     result = {}
     for each in problem.evidence:
         residual = each.residual(best.values)[0]

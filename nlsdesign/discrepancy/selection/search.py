@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 from ...errors import ConvergenceError
-from ...parallel_map import parallel_map
+from ...processes import parallel_map
 from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
 from .criteria import (

@@ -17,7 +17,7 @@ from ...locations import version
 from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
-from .controller_step import step_function, step_head
+from .controller_step import step_body
 from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
@@ -137,43 +137,20 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
         Number type.
     """
     upper = name.upper()
-    bits = [
-        f"#define {upper}_{flag} 0x{bit:x}u /* {meaning} */" for flag, (bit, meaning) in STATUS_BITS.items()
-    ]
-    lines = [
-        *_title(model),
-        f"#ifndef {upper}_H",
-        f"#define {upper}_H",
-        "",
-        "#include <stdint.h>",
-        "",
-        "#ifdef __cplusplus",
-        'extern "C" {',
-        "#endif",
-        "",
-        f"#define {upper}_SAMPLE_TIME {real.literal(float(model.sample_time or 0.0))} /* s */",
-        "",
-        "/* Bits of the status word. Bit 8 + i names input i (of step) or parameter i (of init and",
-        "   set_parameters) as numbered below; bit 30 stands for all from 22 on. */",
-        *bits,
-        "",
-        *structure(f"{name}_inputs", model.inputs, real, "What step reads.", numbered=True),
-        "",
-        *structure(f"{name}_outputs", model.outputs, real, "What step gives, always finite."),
-        "",
-        *structure(f"{name}_parameters", model.parameters, real, "Tunable numbers.", numbered=True),
-        "",
-        *structure(f"{name}_states", model.states, real, "What is remembered from sample to sample."),
-        "",
-        *_interface(name),
-        "",
-        "#ifdef __cplusplus",
-        "}",
-        "#endif",
-        "",
-        "#endif",
-    ]
-    return "\n".join(lines) + "\n"
+    groups: tuple[tuple[str, tuple[Variable, ...], str, bool], ...] = (
+        ("inputs", model.inputs, "What step reads.", True),
+        ("outputs", model.outputs, "What step gives, always finite.", False),
+        ("parameters", model.parameters, "Tunable numbers.", True),
+        ("states", model.states, "What is remembered from sample to sample.", False),
+    )
+    structures = {
+        group: structure(f"{name}_{group}", variables, real, title, numbered=numbered)
+        for group, variables, title, numbered in groups
+    }
+    bits = [f"#define {upper}_{flag} 0x{bit:x}u /* {text} */" for flag, (bit, text) in STATUS_BITS.items()]
+    sample_time = real.literal(float(model.sample_time or 0.0))
+    values = {"name": name, "NAME": upper, "title": _title(model), "bits": bits, "sample_time": sample_time}
+    return filled("controller.h", values | _heads(name) | structures)
 
 
 def _title(model: FlatModel) -> list[str]:
@@ -184,32 +161,16 @@ def _title(model: FlatModel) -> list[str]:
     ]
 
 
-def _interface(name: str) -> list[str]:
-    return [
-        "/* One running instance; the caller owns it, there may be many. */",
-        "typedef struct {",
-        f"    {name}_parameters parameters;",
-        f"    {name}_states states;",
-        f"    {name}_inputs inputs; /* last good */",
-        f"    {name}_outputs outputs; /* last good */",
-        f"}} {name}_state;",
-        "",
-        "/* Gives the parameters of the design. */",
-        f"void {name}_defaults({name}_parameters *parameters);",
-        "",
-        "/* Starts an instance; null stands for the parameters of the design. Returns a status word. */",
-        _head(name, "init", "parameters") + ";",
-        "",
-        "/* Takes over parameters, each only if it is within its range. Returns a status word. */",
-        _head(name, "set_parameters", "parameters") + ";",
-        "",
-        "/* Computes the outputs of this sample and the state of the next. Returns a status word. */",
-        step_head(name) + ";",
-    ]
-
-
-def _head(name: str, function: str, group: str) -> str:
-    return signature(f"uint32_t {name}_{function}", f"{name}_state *state", f"const {name}_{group} *{group}")
+def _heads(name: str) -> dict[str, str]:
+    """Return the heads of the functions with parameters."""
+    state, parameters = f"{name}_state *state", f"const {name}_parameters *parameters"
+    return {
+        "init": signature(f"uint32_t {name}_init", state, parameters),
+        "set_parameters": signature(f"uint32_t {name}_set_parameters", state, parameters),
+        "step": signature(
+            f"uint32_t {name}_step", state, f"const {name}_inputs *inputs", f"{name}_outputs *outputs"
+        ),
+    }
 
 
 def source_text(model: FlatModel, name: str, real: Real) -> str:
@@ -224,70 +185,35 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     real
         Number type.
     """
-    values = {"real": real.name, "zero": real.literal(0.0), "NAME": name.upper()}
-    step, used = step_function(model, name, real)
-    lines = [
-        *_title(model),
-        "#include <math.h>",
-        "#include <stddef.h>",
-        "",
-        f'#include "{name}.h"',
-        "",
-        "#ifdef __FAST_MATH__",
-        '#error "the guards need IEEE arithmetic: compile without -ffast-math"',
-        "#endif",
-        "",
-    ]
-    for each in indexed_tables(model):
-        if each.columns(used):
-            lines += [*table_data(each, real), ""]
+    body, used = step_body(model, name, real)
+    tables = [table_data(each, real) for each in indexed_tables(model) if each.columns(used)]
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
-    for group, variables in (
-        ("parameters", model.parameters),
-        ("states", model.states),
-        ("inputs", inputs),
-        ("outputs", outputs),
-    ):
-        lines += [f"static const {name}_{group} start_{group} = {{", *initialiser(variables, real), "};", ""]
-    if model.inputs:
-        lines += [filled("controller_guard.c", values)]
-    if model.parameters:
-        lines += [filled("controller_parameter.c", values)]
-    return "\n".join([*lines, *_start(model, name, real), "", *step]) + "\n"
+    names = {"real": real.name, "zero": real.literal(0.0), "name": name, "NAME": name.upper()}
+    guards = [filled("controller_guard.c", names)] if model.inputs else []
+    guards += [filled("controller_parameter.c", names)] if model.parameters else []
+    values = {
+        "title": _title(model),
+        "tables": [line for table in tables for line in (*table, "")],
+        "start_parameters": initialiser(model.parameters, real),
+        "start_states": initialiser(model.states, real),
+        "start_inputs": initialiser(inputs, real),
+        "start_outputs": initialiser(outputs, real),
+        "guards": [line for guard in guards for line in (*guard.splitlines(), "")],
+        "assignments": _assignments(model, real),
+        "body": body,
+    }
+    return filled("controller.c", {**names, **_heads(name), **values})
 
 
 def _at(variable: Variable, start: float) -> Variable:
     return Variable(variable.name, variable.unit, variable.description, start)
 
 
-def _start(model: FlatModel, name: str, real: Real) -> list[str]:
+def _assignments(model: FlatModel, real: Real) -> list[str]:
     paths = member_paths(model.parameters)
-    assignments = [
+    return [
         f"take_over(parameters->{paths[v.name]}, {real.bound(v.minimum)}, {real.bound(v.maximum)}, "
         f"&state->parameters.{paths[v.name]}, 0x{index_bit(i):x}u, &status);"
         for i, v in enumerate(model.parameters)
     ] or ["(void)state;", "(void)parameters;"]
-    return [
-        f"void {name}_defaults({name}_parameters *parameters)",
-        "{",
-        "    *parameters = start_parameters;",
-        "}",
-        "",
-        _head(name, "set_parameters", "parameters"),
-        "{",
-        "    uint32_t status = 0u;",
-        "",
-        *[f"    {line}" for line in assignments],
-        "    return status;",
-        "}",
-        "",
-        _head(name, "init", "parameters"),
-        "{",
-        "    state->parameters = start_parameters;",
-        "    state->states = start_states;",
-        "    state->inputs = start_inputs;",
-        "    state->outputs = start_outputs;",
-        f"    return parameters == NULL ? 0u : {name}_set_parameters(state, parameters);",
-        "}",
-    ]

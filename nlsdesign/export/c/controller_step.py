@@ -7,22 +7,22 @@ from collections.abc import Sequence
 import casadi as ca
 
 from ...model.flat import FlatModel
-from .c_text import Real, signature
+from .c_text import Real
 from .guarded_step import index_bit
 from .instructions import named_indices, print_statements
 from .structures import member_paths
 from .table_lookup import look_up
 
 
-def step_function(model: FlatModel, name: str, real: Real) -> tuple[list[str], set[int]]:
-    """Return the lines of the step function and the indices of the looked-up numbers it uses.
+def step_body(model: FlatModel, name: str, real: Real) -> tuple[list[str], set[int]]:
+    """Return the statements of the step function and the indices of the looked-up numbers it uses.
 
     Parameters
     ----------
     model
         Discrete model.
     name
-        First word of all C names.
+        Prefix of all C names.
     real
         Number type.
     """
@@ -45,32 +45,13 @@ def step_function(model: FlatModel, name: str, real: Real) -> tuple[list[str], s
     arguments |= {v.name: f"u{i}" for i, v in enumerate(model.inputs)}
     tables = look_up(model, real, arguments, used)
     body = [
-        "uint32_t status = 0u;",
-        "",
         *_loads(model, real, [*tables, *equations]),
         *tables,
         *equations,
         "",
         *_stores(model, name, real),
-        "return status;",
     ]
-    return [step_head(name), "{", *[f"    {line}" if line else "" for line in body], "}"], used
-
-
-def step_head(name: str) -> str:
-    """Return the head of the step function.
-
-    Parameters
-    ----------
-    name
-        First word of all C names.
-    """
-    return signature(
-        f"uint32_t {name}_step",
-        f"{name}_state *state",
-        f"const {name}_inputs *inputs",
-        f"{name}_outputs *outputs",
-    )
+    return body, used
 
 
 def _loads(model: FlatModel, real: Real, following: Sequence[str]) -> list[str]:
@@ -95,7 +76,7 @@ def _loads(model: FlatModel, real: Real, following: Sequence[str]) -> list[str]:
 
 
 def _stores(model: FlatModel, name: str, real: Real) -> list[str]:
-    """Return what is done with the results: stored when all are finite, else the last good ones stay."""
+    """Return the assignments of the results: stored if all are finite, else the last good ones are kept."""
     lines: list[str] = []
     states, outputs = member_paths(model.states), member_paths(model.outputs)
     if states:

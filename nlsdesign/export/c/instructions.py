@@ -19,8 +19,8 @@ import casadi as ca
 from ...errors import ExportError
 from .c_text import Real
 
-_INLINE = 64  # longest text that may stand inside another expression
-# Strength of binding, strongest first.
+_INLINE = 64  # longest text that is written inside another expression
+# Precedence of operators, highest first.
 _ATOM, _CALL, _UNARY, _PRODUCT, _SUM, _RELATION, _JUNCTION, _CHOICE = range(8)
 _SELECT = -1  # condition ? this : that; not an operation of CasADi
 
@@ -41,7 +41,7 @@ _BINARY = {
 _COMPARED = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _JOINED = {ca.OP_AND: "&&", ca.OP_OR: "||"}
 _LOGICAL = frozenset([*_COMPARED, *_JOINED, ca.OP_NOT])
-# Operations that name an operand twice; the operand gets a name of its own.
+# Operations that use an operand twice; the operand becomes a constant with a name.
 _TWICE_NAMED = frozenset([ca.OP_SQ, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX])
 
 
@@ -64,7 +64,7 @@ class _Text:
 
 
 class _Graph:
-    """Values in the order in which CasADi computes them, each written once."""
+    """Values in the order of CasADi's computation, each written once."""
 
     def __init__(self, function: ca.Function, inputs: Sequence[Sequence[str]]) -> None:
         self.nodes: list[_Node] = []
@@ -99,7 +99,7 @@ class _Graph:
         return node
 
     def uses(self) -> Counter[int]:
-        """Return how often each value is named; values that no result needs are left out."""
+        """Return the number of uses of each value; values that no result needs are left out."""
         count: Counter[int] = Counter(self.results.values())
         for index in range(len(self.nodes) - 1, -1, -1):
             if count[index]:
@@ -172,7 +172,7 @@ class _Printer:
         if operation == ca.OP_SIGN:
             return _Text(f"({self.real.name})(({first} > {zero}) - ({first} < {zero}))", _UNARY)
         if operation in (ca.OP_FMIN, ca.OP_FMAX):
-            # One machine instruction; fmin() of math.h is a library call for the sake of NaN.
+            # One machine instruction; fmin() of math.h is a library call because of its rule for NaN.
             second, sign = self.number(operands[1], _UNARY), "<" if operation == ca.OP_FMIN else ">"
             return _Text(f"{first} {sign} {second} ? {first} : {second}", _CHOICE)
         if operation in (ca.OP_ASSIGN, ca.OP_LIFT):
@@ -184,7 +184,7 @@ class _Printer:
         )
 
     def name(self, index: int) -> None:
-        """Give a value a name of its own."""
+        """Write a value as a named constant."""
         text = self.texts[index]
         kind = "int" if text.logical else self.real.name
         self.lines.append(f"const {kind} {self.prefix}{index} = {text.text};")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.flat import FlatModel, Variable
+from ..files import filled
 from .c_text import Real
 from .guarded_step import GuardedModel
 from .structures import member_paths
@@ -77,49 +78,22 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
     relative = DOUBLE_TOLERANCE if real.name == "double" else FLOAT_TOLERANCE
     tolerance = [relative * float(v) + real.epsilon**2 for v in size]
     u, y = member_paths(model.inputs).values(), member_paths(model.outputs).values()
-    status = ", ".join(f"0x{s:x}u" for _, s in results)
-    lines = [
-        f"/* Self-test of {name}: returns 0, or the number of the first sample that differs. */",
-        "#include <math.h>",
-        "#include <stddef.h>",
-        "#include <stdio.h>",
-        "",
-        f'#include "{name}.h"',
-        "",
-        f"#define SAMPLES {len(results)}",
-        "",
-        *_rows("given", inputs.tolist(), real),
-        *_rows("expected", outputs.tolist(), real),
-        *_rows("tolerance", [tolerance], real),
-        f"static const uint32_t word[SAMPLES] = {{{status}}};",
-        "",
-        "int main(void)",
-        "{",
-        f"    {name}_state state;",
-        f"    {name}_inputs inputs = {{0}};",
-        f"    {name}_outputs outputs = {{0}};",
-        "",
-        f"    if ({name}_init(&state, NULL) != 0u) {{",
-        "        return 1;",
-        "    }",
-        "    for (int k = 0; k < SAMPLES; ++k) {",
-        *[f"        inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
-        f"        int differs = {name}_step(&state, &inputs, &outputs) != word[k];",
-        *[_comparison(real, path, i) for i, path in enumerate(y)],
-        "        if (differs) {",
-        '            (void)printf("sample %d differs\\n", k + 1);',
-        "            return k + 1;",
-        "        }",
-        "    }",
-        "    return 0;",
-        "}",
-    ]
-    return "\n".join(lines) + "\n"
+    values = {
+        "name": name,
+        "samples": str(len(results)),
+        "given": _rows("given", inputs.tolist(), real),
+        "expected": _rows("expected", outputs.tolist(), real),
+        "tolerance": _rows("tolerance", [tolerance], real),
+        "status": ", ".join(f"0x{s:x}u" for _, s in results),
+        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
+        "comparisons": [_comparison(real, path, i) for i, path in enumerate(y)],
+    }
+    return filled("controller_selftest.c", values)
 
 
 def _comparison(real: Real, path: str, i: int) -> str:
     difference = f"{real.function('fabs')}(outputs.{path} - expected[k][{i}])"
-    return f"        differs |= !({difference} <= tolerance[0][{i}]);"
+    return f"differs |= !({difference} <= tolerance[0][{i}]);"
 
 
 def _rows(name: str, rows: Sequence[Sequence[float]], real: Real) -> list[str]:

@@ -100,7 +100,7 @@ def structure(
     return [*lines, f"}} {name};"]
 
 
-def initialiser(variables: Sequence[Variable], real: Real, indent: str = "    ") -> list[str]:
+def initialiser(variables: Sequence[Variable], real: Real) -> list[str]:
     """Return designated initialisers with the start values of variables.
 
     Parameters
@@ -109,13 +109,11 @@ def initialiser(variables: Sequence[Variable], real: Real, indent: str = "    ")
         Members of the structure.
     real
         Number type.
-    indent
-        Indentation of each line.
     """
     if not variables:
-        return [f"{indent}.none = 0"]
+        return [".none = 0"]
     paths = member_paths(variables)
-    return [f"{indent}.{paths[each.name]} = {real.literal(each.start)}," for each in variables]
+    return [f".{paths[each.name]} = {real.literal(each.start)}," for each in variables]
 
 
 def _remark(variable: Variable) -> str:

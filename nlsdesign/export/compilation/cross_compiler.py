@@ -1,4 +1,4 @@
-"""Compiling with the C cross-compiler of the ``ziglang`` wheel; no system compiler is needed or asked for."""
+"""Compiling with the C cross-compiler of the ``ziglang`` wheel; no system compiler is used."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
 
 
 def compiler() -> list[str]:
-    """Return the words that start the C compiler.
+    """Return the command of the C compiler.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def compile_library(
     """
     where = platform or PLATFORMS[host_platform()]
     arguments: list[str | Path] = ["-target", where.target, "-shared", "-O2", *flags]
-    # Same numbers on every machine: no fused multiply-add; and the checks stay IEEE.
+    # Same numbers on every machine: no fused multiply-add, IEEE comparisons.
     arguments += ["-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-s"]
     if where.extension == ".so":
         arguments += ["-fPIC", "-lm"]
@@ -217,7 +217,7 @@ def compile_library(
 
 
 def _windows(folder: Path) -> list[str | Path]:
-    """Return arguments that spare Windows libraries the start-up code, see the shell for why."""
+    """Return arguments that omit the start-up code of Windows libraries, see the shell for the reason."""
     start = folder / "windows.c"
     start.write_text(shell("windows.c"), encoding="utf-8")
     home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..c.controller_code import CSource
 from ..c.structures import member_paths
+from ..files import filled
 from .cross_compiler import compile_library
 
 
@@ -109,51 +110,12 @@ def _adapter(source: CSource) -> str:
         list(member_paths(group).values())
         for group in (model.states, model.inputs, model.parameters, model.outputs)
     )
-    return "\n".join(
-        [
-            "#include <stddef.h>",
-            f'#include "{name}.h"',
-            "#ifdef _WIN32",
-            "#define GIVEN __declspec(dllexport)",
-            "#else",
-            '#define GIVEN __attribute__((visibility("default")))',
-            "#endif",
-            f"static void taken({name}_parameters *to, const {real} p[])",
-            "{",
-            f"    {name}_defaults(to);",
-            "    (void)p;",
-            *[f"    to->{path} = p[{i}];" for i, path in enumerate(p)],
-            "}",
-            f"GIVEN size_t adapter_size(void) {{ return sizeof({name}_state); }}",
-            f"GIVEN uint32_t adapter_set_parameters({name}_state *state, const {real} p[])",
-            "{",
-            f"    {name}_parameters parameters;",
-            "    taken(&parameters, p);",
-            f"    return {name}_set_parameters(state, &parameters);",
-            "}",
-            f"GIVEN uint32_t adapter_init({name}_state *state, const {real} p[])",
-            "{",
-            f"    {name}_parameters parameters;",
-            "    if (p != NULL) {",
-            "        taken(&parameters, p);",
-            "    }",
-            f"    return {name}_init(state, p != NULL ? &parameters : NULL);",
-            "}",
-            f"GIVEN uint32_t adapter_step({name}_state *state, const {real} u[], {real} y[])",
-            "{",
-            f"    {name}_inputs inputs = {{0}};",
-            f"    {name}_outputs outputs = {{0}};",
-            "    (void)u, (void)y;",
-            *[f"    inputs.{path} = u[{i}];" for i, path in enumerate(u)],
-            f"    const uint32_t status = {name}_step(state, &inputs, &outputs);",
-            *[f"    y[{i}] = outputs.{path};" for i, path in enumerate(y)],
-            "    return status;",
-            "}",
-            f"GIVEN void adapter_states(const {name}_state *state, {real} x[])",
-            "{",
-            "    (void)state, (void)x;",
-            *[f"    x[{i}] = state->states.{path};" for i, path in enumerate(x)],
-            "}",
-            "",
-        ]
-    )
+    values = {
+        "name": name,
+        "real": real,
+        "parameters": [f"to->{path} = p[{i}];" for i, path in enumerate(p)],
+        "inputs": [f"inputs.{path} = u[{i}];" for i, path in enumerate(u)],
+        "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(y)],
+        "states": [f"x[{i}] = state->states.{path};" for i, path in enumerate(x)],
+    }
+    return filled("adapter.c", values)

@@ -1,11 +1,11 @@
 """Several FMUs as one system: wired by name, stepped together, recorded.
 
 Order. Without ``order`` all inputs are read before any instance steps (Jacobi): the result does not depend on
-how the instances are listed, and whatever a *sampled* instance computes at a communication point reaches the
-others one step later. With ``order`` each instance sees what those before it have computed in the same step
-(Gauss-Seidel): sensors, observer and controller before the plant give a loop without computing delay; a wire
-from a :class:`Late` source keeps it, as when the plant gets the current of one sample
-ago. The result says for every wire by how many steps it is late.
+how the instances are listed, and the output that a *sampled* instance computes at a communication point
+reaches the others one step later. With ``order`` each instance reads what earlier ones have computed in the
+same step (Gauss-Seidel): sensors, observer and controller before the plant give a loop without computing
+delay; a wire from a :class:`Late` source keeps it, for instance when the plant gets the current of the
+previous sample. The result lists the delay of every wire in steps.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def cosimulate(
 
 @contextmanager
 def _instances(fmus: Mapping[str, str | Path]) -> Iterator[dict[str, FmuInstance]]:
-    """Give loaded instances; at the end, whatever happens, all are freed and every unpacked file is gone."""
+    """Yield loaded instances; afterwards, also after an error, all are freed and their files removed."""
     with tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-") as folder, ExitStack() as stack:
         instances: dict[str, FmuInstance] = {}
         for number, (name, path) in enumerate(fmus.items()):
@@ -184,7 +184,7 @@ def _check_units(instances: Mapping[str, FmuInstance], target: str, source: str)
         one, other = (parse_unit(unit or "1") for unit in units)
     except UnitError:
         return  # a unit of a foreign FMU that cannot be read here
-    # The radian is left out: torque is written as N*m and as N*m/rad.
+    # Without the radian: torque is given in N·m and in N·m/rad.
     if (one.factor, one.mechanical) != (other.factor, other.mechanical):
         raise UnitError(f"wire '{target}' [{units[0]}]", f"reads '{source}', which is in [{units[1]}]")
 

@@ -1,4 +1,4 @@
-"""The master algorithm: who reads what when."""
+"""The master algorithm: order of steps, and the age of the values that each instance reads."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 class Late(str):
-    """A wire's source that is read as it was before the step: its reader works with what is one step old."""
+    """Source of a wire that is read as it was before the step, one communication step old."""
 
 
 class System:
-    """Instances, wires between them and signals from outside.
+    """Instances, wires between them and external signals.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ class System:
         self._before: dict[str, float] = {}
 
     def delays(self) -> dict[str, int]:
-        """Return by how many steps each wire target reads late, see the class that gives the result."""
+        """Return the delay of each wire target in steps, see :class:`.cosimulate.CoSimulation`."""
         late: dict[str, int] = {}
         for name, wires in self._wires.items():
             for variable, source in wires.items():
                 of, output = split_name(source)
                 sampled = self._instances[of].variables[output].variability == "discrete"
-                # What a sampled source shows at the end of its step it has computed at the beginning.
+                # A sampled source computes its output at the beginning of a step.
                 before = bool(self._order) and self._order.index(of) < self._order.index(name)
                 before = before and f"{name}.{variable}" not in self._late
                 late[f"{name}.{variable}"] = (1 if sampled else 0) - (1 if before else 0)
@@ -122,7 +122,7 @@ class System:
     def _initialise(self, stop: float) -> None:
         for instance in self._instances.values():
             instance.begin(0.0, stop)
-        # As many rounds as there may be instances in a chain of direct feedthrough.
+        # One round for each instance that a chain of direct feedthrough may have.
         for _ in range(len(self._instances) + 1):
             for name in self._instances:
                 self._read(name)

@@ -31,7 +31,7 @@ class FmiUnknown:
 
 
 @dataclass(frozen=True)
-class Structure:
+class ModelStructure:
     """The model structure.
 
     Parameters
@@ -47,7 +47,7 @@ class Structure:
     initial: tuple[FmiUnknown, ...]
 
 
-def model_structure(layout: FmuLayout) -> Structure:
+def model_structure(layout: FmuLayout) -> ModelStructure:
     """Return the model structure of an FMU.
 
     Parameters
@@ -77,7 +77,7 @@ def model_structure(layout: FmuLayout) -> Structure:
 
     outputs, derivatives = [v for v, _ in given], [v for v, _ in rates]
     computed = sorted([*layout.outputs, *derivatives], key=lambda v: v.reference)
-    return Structure(
+    return ModelStructure(
         tuple(entry(v, initial=False) for v in outputs),
         tuple(entry(v, initial=False) for v in derivatives),
         tuple(entry(v, initial=True) for v in computed),

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from html import escape
 
 from ...locations import version as own_version
+from ...quantity import typeset_unit
 from ..files import filled
 from .fmu_variables import FmuLayout, FmuVariable
 
@@ -38,13 +39,15 @@ def page(layout: FmuLayout) -> str:
         ("Derivatives and signals", (*layout.derivatives, *layout.signals)),
     )
     tables = "\n".join(_table(title, group) for title, group in groups if group)
-    words = {"title": model.name, "description": model.description, "kind": kind, "version": own_version()}
-    return filled("index.html", {key: escape(text) for key, text in words.items()} | {"tables": tables})
+    texts = {"title": model.name, "description": model.description, "kind": kind, "version": own_version()}
+    return filled("index.html", {key: escape(text) for key, text in texts.items()} | {"tables": tables})
 
 
 def _table(title: str, group: Sequence[FmuVariable]) -> str:
     rows = "\n".join(_table_row(each) for each in group)
-    head = "<tr><th>name</th><th>value</th><th>unit</th><th>range</th><th>what it is</th><th>source</th></tr>"
+    head = (
+        "<tr><th>name</th><th>value</th><th>unit</th><th>range</th><th>description</th><th>source</th></tr>"
+    )
     return f"<h2>{title}</h2>\n<table>\n{head}\n{rows}\n</table>"
 
 
@@ -55,7 +58,7 @@ def _table_row(each: FmuVariable) -> str:
     cells = (
         v.name,
         f"{v.start:g}{spread}" if each.has_start else "",
-        v.unit,
+        typeset_unit(v.unit),
         limits,
         v.description,
         v.source,

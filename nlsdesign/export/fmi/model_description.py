@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from ...locations import version as own_version
 from ...quantity import BASE, parse_unit
 from ..c.c_text import identifier
-from .dependencies import FmiUnknown, Structure, model_structure
+from .dependencies import FmiUnknown, ModelStructure, model_structure
 from .fmu_sources import main_source
 from .fmu_variables import RELATIVE_TOLERANCE, FmuLayout, FmuVariable
 
@@ -175,7 +175,7 @@ def _variable3(parent: ElementTree.Element, each: FmuVariable) -> None:
         real.set("derivative", str(each.derivative_of))
 
 
-def _structure2(parent: ElementTree.Element, structure: Structure) -> None:
+def _structure2(parent: ElementTree.Element, structure: ModelStructure) -> None:
     # Variables stand in the order of their references, so the index is the reference + 1.
     for name, unknowns in (
         ("Outputs", structure.outputs),
@@ -188,7 +188,7 @@ def _structure2(parent: ElementTree.Element, structure: Structure) -> None:
                 _element(group, "Unknown", index=each.variable.reference + 1, **_dependencies(each, 1))
 
 
-def _structure3(parent: ElementTree.Element, structure: Structure) -> None:
+def _structure3(parent: ElementTree.Element, structure: ModelStructure) -> None:
     for name, unknowns in (
         ("Output", structure.outputs),
         ("ContinuousStateDerivative", structure.derivatives),

@@ -206,7 +206,7 @@ def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:
     """Return the standard deviation with which each independent number of the residuals counts as one.
 
     What a model leaves over is rarely noise: neighbouring samples say the same. With these as ``sigma`` a
-    fit weighs the records against priors by what the records are worth.
+    fit weighs the records against priors by their effective number of samples.
 
     Parameters
     ----------
@@ -223,12 +223,12 @@ def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:
             place += each.measured.shape[1]
     sigma = dict(zip(rows, problem.sigma, strict=True))
     return {
-        name: float(sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / _worth(r)))
+        name: float(sigma[name] * rmse(np.concatenate(r)) * np.sqrt(sum(map(len, r)) / _effective_size(r)))
         for name, r in rows.items()
     }
 
 
-def _worth(rows: Sequence[Array]) -> float:
+def _effective_size(rows: Sequence[Array]) -> float:
     return sum(effective_size(row) for row in rows)
 
 

@@ -1,4 +1,4 @@
-"""An order of records that hangs on what was measured and never on how files are called."""
+"""A canonical order of records, which depends on their content and not on file names."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from .quality import Finding
 
 
 def in_canonical_order(records: RecordSet) -> RecordSet:
-    """Return the same records and findings, ordered by what the records hold.
+    """Return the same records and findings, ordered by the content of the records.
 
-    Sums of floating-point numbers, choices among equals and the first of several differ with the order in
-    which records come; so results would differ in the last digits, and where those decide in more, with the
-    names of files.
+    Rounding of sums and choices among equals depend on the order of records. In canonical order results do
+    not depend on the names of files.
 
     Parameters
     ----------
@@ -35,7 +34,7 @@ def _content(record: Record) -> tuple[int, str, str]:
 
 
 def _place(finding: Finding, ordered: tuple[Record, ...]) -> int:
-    """Return the place of the record that a finding is about; behind all others if it is about none."""
+    """Return the index of the record of a finding; the number of records if it belongs to none."""
     file = finding.place.partition(":")[0]
     known = [k for k, record in enumerate(ordered) if (record.source or record.name).startswith(file)]
     return known[0] if known else len(ordered)

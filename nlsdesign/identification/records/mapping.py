@@ -1,4 +1,4 @@
-"""Which column of a file measures which signal of a model, and in what unit."""
+"""Mapping of the columns of a file to signals of a model, with units."""
 
 from __future__ import annotations
 

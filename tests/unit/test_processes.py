@@ -11,16 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.parallel_map import parallel_map
+from nlsdesign.processes import parallel_map
 
+# Where the suite itself was begun in the background, children inherit that interrupts are ignored.
 ENDLESS = """
+import signal
 import time
-from nlsdesign.parallel_map import parallel_map
+from nlsdesign.processes import parallel_map
 
 def work(number):
     print("at work", flush=True)
     time.sleep(60)
 
+signal.signal(signal.SIGINT, signal.default_int_handler)
 list(parallel_map(work, 4))
 """
 

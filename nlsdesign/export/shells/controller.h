@@ -1,0 +1,49 @@
+@title@
+#ifndef @NAME@_H
+#define @NAME@_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define @NAME@_SAMPLE_TIME @sample_time@ /* s */
+
+/* Bits of the status word. Bit 8 + i names input i (of step) or parameter i (of init and
+   set_parameters) as numbered below; bit 30 stands for all from 22 on. */
+@bits@
+
+@inputs@
+
+@outputs@
+
+@parameters@
+
+@states@
+
+/* One running instance; the caller owns it, there may be many. */
+typedef struct {
+    @name@_parameters parameters;
+    @name@_states states;
+    @name@_inputs inputs; /* last good */
+    @name@_outputs outputs; /* last good */
+} @name@_state;
+
+/* Gives the parameters of the design. */
+void @name@_defaults(@name@_parameters *parameters);
+
+/* Starts an instance; null stands for the parameters of the design. Returns a status word. */
+@init@;
+
+/* Takes over parameters, each only if it is within its range. Returns a status word. */
+@set_parameters@;
+
+/* Computes the outputs of this sample and the state of the next. Returns a status word. */
+@step@;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

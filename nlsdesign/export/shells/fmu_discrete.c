@@ -1,0 +1,40 @@
+#include "@name@.c"
+
+@tables@
+typedef @name@_state model_memory;
+
+static void model_tune(model_memory *memory, const double p[])
+{
+    @name@_parameters parameters;
+
+    @name@_defaults(&parameters);
+    @parameters@
+    (void)@name@_set_parameters(memory, &parameters);
+    (void)p;
+}
+
+static void model_start(model_memory *memory, const double x[], const double p[])
+{
+    (void)@name@_init(memory, NULL);
+    @start@
+    model_tune(memory, p);
+    (void)x;
+}
+
+/* One sample. The states that are shown are those that its outputs came from. */
+static int32_t model_sample(model_memory *memory, const double u[], double x[], double y[],
+                            double s[])
+{
+    const @name@_states before = memory->states;
+    @name@_inputs inputs = {0};
+    @name@_outputs outputs = {0};
+
+    @inputs@
+    const uint32_t status = @name@_step(memory, &inputs, &outputs);
+    @states@
+    @outputs@
+    @signals@
+    (void)before, (void)u, (void)x, (void)y, (void)s;
+    return (int32_t)status;
+}
+
