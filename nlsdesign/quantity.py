@@ -351,6 +351,26 @@ def significant(values: Iterable[float], digits: int = 9) -> tuple[float, ...]:
     return tuple(round(v, places) + 0.0 for v in row)
 
 
+def to_resolution(value: float, error: float) -> float:
+    """Return a number rounded to at most a thousandth of its standard error.
+
+    Parameters
+    ----------
+    value
+        In any unit.
+    error
+        Standard error in the same unit; where it is zero or not finite, nine significant digits stay.
+
+    Examples
+    --------
+    >>> to_resolution(0.0212345678, 2e-4)
+    0.0212346
+    """
+    if not (math.isfinite(error) and error > 0.0):
+        return significant([value])[0]
+    return round(value, 3 - math.floor(math.log10(error))) + 0.0
+
+
 def degrees(value: float) -> float:
     """Return an angle in rad from degrees.
 

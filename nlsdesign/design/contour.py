@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 from ..components.transmission.cam import TwoSidedCam
 from ..errors import ArrangementError, ValueRangeError
-from ..quantity import Quantity
+from ..quantity import Quantity, significant
 from .geometry import Contour, contour_from_lever_arm
 
 Floats = NDArray[np.float64]
@@ -119,7 +119,7 @@ def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, 
     error = float(np.max(np.abs(basis @ values - wanted)[beyond], initial=0.0))
     source = "designed: fitted to a lever arm over the angle"
     cam = TwoSidedCam(
-        lever_arm=like.lever_arm.with_value(tuple(values), source),
+        lever_arm=like.lever_arm.with_value(significant(values), source),
         last_angle=like.last_angle.with_value(float(theta[-1]), source),
         changeover=like.changeover,
         anchor_distance=like.anchor_distance,

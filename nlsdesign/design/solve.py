@@ -14,7 +14,7 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ConvergenceError
 from ..model import FlatModel, flatten
 from ..model.roles import series_cam, series_spring
-from ..quantity import Quantity
+from ..quantity import Quantity, significant
 from .conflict import feasible_point, row_of
 from .contour import CamFit, cam_from_profile, contour_of_cam
 from .design_point import anchor_of
@@ -195,7 +195,8 @@ def _finished(
 
 def _designed(old: Quantity, value: float, source: str) -> Quantity:
     """Return a designed number, shown in millimetres where only metres were stated."""
-    return replace(old.with_value(value, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
+    (rounded,) = significant([value])
+    return replace(old.with_value(rounded, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
 
 
 def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:

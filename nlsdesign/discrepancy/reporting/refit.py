@@ -20,6 +20,7 @@ from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...model import flatten
+from ...quantity import to_resolution
 from ..blocks.tearing import blocks_of
 from ..screening.other_rig import out_of_reach
 from ..screening.scale_check import scale_findings, typical_sizes
@@ -229,9 +230,19 @@ def sourced(hypothesis: Hypothesis) -> Assembly:
     fitted = hypothesis.fitted
     known, declared = fitted.quantities(), hypothesis.assembly.quantities()
     rows = {name.partition("[")[0] for name in hypothesis.values}
+    errors = {p.name: fit.standard_error(p.name) for fit in hypothesis.fits.values() for p in fit.parameters}
+
+    def rounded(name: str) -> float | tuple[float, ...]:
+        value = known[name].value
+        if isinstance(value, tuple):
+            return tuple(
+                to_resolution(v, errors.get(f"{name}[{i}]", 0.0)) for i, v in enumerate(value, start=1)
+            )
+        return to_resolution(value, errors.get(name, 0.0))
+
     return fitted.with_values(
         {
-            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {declared[n].source}")
+            n: known[n].with_value(rounded(n), f"fitted to bench records; declared: {declared[n].source}")
             for n in rows
         }
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
+from ...quantity import significant, to_resolution
 from ..selection.search import Skipped
 from .remainder import Remainder
 
@@ -218,13 +219,18 @@ class Verdict:
                     "name": e.name,
                     "location": e.location,
                     "parameters": [
-                        {"name": n, "value": v, "unit": u, "standard_error": s}
+                        {
+                            "name": n,
+                            "value": to_resolution(v, s),
+                            "unit": u,
+                            "standard_error": significant([s], 4)[0],
+                        }
                         for n, (v, u, s) in e.parameters.items()
                     ],
                     "aliases": list(e.aliases),
                     "evidence": {
-                        "share_fit": e.share_fit,
-                        "share_held_out": e.share_held_out,
+                        "share_fit": _six_digits(e.share_fit),
+                        "share_held_out": _six_digits(e.share_held_out),
                         "signature": e.signature,
                     },
                 }
@@ -234,20 +240,19 @@ class Verdict:
             "error": {
                 "unit": unit,
                 "block": self.block,
-                "noise_floor": self.rms("noise_floor", "held_out"),
-                "fit": {"before": self.rms("before", "fit"), "after": self.rms("after", "fit")},
-                "held_out": {
-                    "before": self.rms("before", "held_out"),
-                    "after": self.rms("after", "held_out"),
+                "noise_floor": _six_digits(self.rms("noise_floor", "held_out")),
+                **{
+                    role: {when: _six_digits(self.rms(when, role)) for when in ("before", "after")}
+                    for role in ("fit", "held_out")
                 },
             },
-            "runners_up": [{"name": n, "share": s} for n, s in self.runners_up],
+            "runners_up": [{"name": n, "share": _six_digits(s)} for n, s in self.runners_up],
             "skipped": [
                 {"name": s.effect, "location": s.location, "beside": list(s.beside), "reason": s.reason}
                 for s in self.skipped
             ],
             "unidentified": list(self.unidentified),
-            "remainder": None if self.remainder is None else self.remainder.to_dict(),
+            "remainder": None if self.remainder is None else _six_digits(self.remainder.to_dict()),
             "next": list(self.next_steps),
             "model": model,
         }
@@ -269,3 +274,12 @@ class Verdict:
     def __str__(self) -> str:
         sentences = (self.words(), *self.where, *self.skipped_words(), *self.next_steps)
         return "\n".join([f"verdict: {self.verdict}", *sentences])
+
+
+def _six_digits(content: Any) -> Any:
+    """Return numbers in any nest of mappings and lists as they are written: the last digits mean nothing."""
+    if isinstance(content, float):
+        return significant([content], 6)[0]
+    if isinstance(content, dict):
+        return {key: _six_digits(value) for key, value in content.items()}
+    return [_six_digits(each) for each in content] if isinstance(content, list) else content
