@@ -120,7 +120,8 @@ def _decision(comparison: Comparison, base: Hypothesis, outcome: Outcome) -> _De
 
 def _verdict(comparison: Comparison, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Verdict:
     verdict = decision.verdict
-    better = outcome.last if verdict == "named" else base
+    base = base.as_written()
+    better = outcome.last.as_written() if verdict == "named" else base
     steps = outcome.steps if verdict == "named" else ()
     before, after = excesses(base, comparison.bench), excesses(better, comparison.bench)
     worst = _furthest([n for n in before if n != DECLARED], before)

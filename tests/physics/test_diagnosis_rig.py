@@ -23,7 +23,7 @@ SINGLE = [
     ("arm", "coulomb_friction", "dry_friction.sliding_effort", "friction"),
     ("wrist", "second_relaxation", "second_relaxing.spring.modulus", "branch_modulus"),
     ("wrist", "cable_compliance", "elastic.stiffness", "cable_stiffness"),
-    ("arm", "force_sensor_delay", "force_sensor.delay", "force_delay"),
+    ("arm", "force_sensor_delay", "force_sensor_delay.delay", "force_delay"),
 ]
 
 

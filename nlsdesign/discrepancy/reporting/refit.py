@@ -206,6 +206,7 @@ def refit(
         fitted = comparison.on_all_samples(replace(fitted, values=values))
         fits, window_errors = (fit,), window_gaps(actuator, values, records, window)
     numbers = tuple(_number(fit, p) for fit in fits for p in fit.parameters)
+    fitted = fitted.as_written()
     gaps = gaps_of(comparison.declared(actuator), fitted, comparison)
     return Refit(sourced(fitted), fits, numbers, (*gaps, *window_errors), findings)
 
@@ -216,7 +217,8 @@ def _number(fit: Fit, parameter: Parameter) -> FittedNumber:
     # The prior of a range of half width w has the standard deviation w/√3.
     strain = moved / (math.sqrt(3.0) * parameter.sigma)
     error = fit.standard_error(parameter.name)
-    return FittedNumber(parameter.name, parameter.unit, parameter.centre, value, error, strain)
+    written = to_resolution(value, error)
+    return FittedNumber(parameter.name, parameter.unit, parameter.centre, written, error, strain)
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:
@@ -230,19 +232,9 @@ def sourced(hypothesis: Hypothesis) -> Assembly:
     fitted = hypothesis.fitted
     known, declared = fitted.quantities(), hypothesis.assembly.quantities()
     rows = {name.partition("[")[0] for name in hypothesis.values}
-    errors = {p.name: fit.standard_error(p.name) for fit in hypothesis.fits.values() for p in fit.parameters}
-
-    def rounded(name: str) -> float | tuple[float, ...]:
-        value = known[name].value
-        if isinstance(value, tuple):
-            return tuple(
-                to_resolution(v, errors.get(f"{name}[{i}]", 0.0)) for i, v in enumerate(value, start=1)
-            )
-        return to_resolution(value, errors.get(name, 0.0))
-
     return fitted.with_values(
         {
-            n: known[n].with_value(rounded(n), f"fitted to bench records; declared: {declared[n].source}")
+            n: known[n].with_value(known[n].value, f"fitted to bench records; declared: {declared[n].source}")
             for n in rows
         }
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
+from ...quantity import to_resolution
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Key, Tally, like_the_others
 
@@ -69,6 +70,14 @@ class Hypothesis:
     def fitted(self) -> Assembly:
         """The assembly with the fitted numbers."""
         return self.assembly.with_values(self.values)
+
+    def as_written(self) -> Hypothesis:
+        """Return the hypothesis with each number rounded to a thousandth of its standard error.
+
+        So the deck that is written predicts what the verdict shows, on every processor.
+        """
+        errors = {p.name: fit.standard_error(p.name) for fit in self.fits.values() for p in fit.parameters}
+        return replace(self, values={n: to_resolution(v, errors.get(n, 0.0)) for n, v in self.values.items()})
 
     def judged_by(self, tallies: Mapping[Key, Tally]) -> Hypothesis:
         """Return the hypothesis with what it leaves over; an unpredictable record counts as the others do.
