@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..quantity import Quantity, parse_unit
+from ..quantity import Quantity, parse_unit, with_unit
 from .cam_drawing import fingerprint
 from .geometry import Contour
 from .target import Target
@@ -46,10 +46,9 @@ class LimitState:
 
     def __str__(self) -> str:
         factor = parse_unit(self.unit).factor
-        unit = "" if self.unit == "1" else f" {self.unit}"
         sign = "<=" if self.upper else ">="
         mark = "  ACTIVE" if self.active else ""
-        value, bound = (f"{number / factor:.4g}{unit}" for number in (self.value, self.bound))
+        value, bound = (with_unit(f"{number / factor:.4g}", self.unit) for number in (self.value, self.bound))
         return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
 
 
@@ -106,7 +105,7 @@ class Sensitivity:
             "all moduli high" if signs == {True} else "all moduli low" if signs == {False} else "moduli mixed"
         )
         largest = max(abs(deviation) for _, deviation in self.corner)
-        return f"{1e3 * self.rms:.4g} mN*m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
+        return f"{1e3 * self.rms:.4g} mN·m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +178,12 @@ class CamDesign:
     def rows(self) -> list[tuple[str, str]]:
         """Return a table of what was found: pairs of text."""
         rho, millis = self.contour.radii_of_curvature, 1e3
-        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N*m at {self._end}")]
+        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N·m at {self._end}")]
         rows += [(name, _brief(value)) for name, value in self.changes]
         rows += [
             (
                 "torque error",
-                f"{millis * self.rms:.3g} mN*m rms, {millis * self.check.largest:.3g} mN*m at most",
+                f"{millis * self.rms:.3g} mN·m rms, {millis * self.check.largest:.3g} mN·m at most",
             ),
             ("over the spread", str(self.sensitivity)),
             ("radius of curvature", f"{millis * rho.min():.3g} to {millis * rho.max():.3g} mm"),
@@ -198,7 +197,7 @@ class CamDesign:
 
     @property
     def _contour_error(self) -> str:
-        return f", contour held to {1e6 * self.fit_error:.2g} um" if self.fit_error > 0.0 else ""
+        return f", contour held to {1e6 * self.fit_error:.2g} µm" if self.fit_error > 0.0 else ""
 
     @property
     def _end(self) -> str:

@@ -171,7 +171,7 @@ def _finished(
     target, cam = problem.design.target, problem.law.cam
     values = problem.named(best.point)
     contour, fit = _contour(actuator, problem, best)
-    known, source = actuator.quantities(), f"designed for {type(target).__name__}, {target.largest:.6g} N*m"
+    known, source = actuator.quantities(), f"designed for {type(target).__name__}, {target.largest:.6g} N·m"
     changes = {name: _designed(known[name], value, source) for name, value in values.items() if name in known}
     if fit is not None:
         changes |= {f"{cam.name}.{field}": given for field, given in fit.changes().items()}

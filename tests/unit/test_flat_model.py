@@ -134,12 +134,12 @@ def test_names_are_unique_and_say_what_they_are(name: str) -> None:
 
 def test_a_bare_number_does_not_keep_the_citation_of_the_old_one() -> None:
     declared = declare(load_deck("austin2015_as_printed"))
-    name, told = "spring.rubber.area", "not stated; changed from 1 cm^2: Austin, Schepelmann, Geyer"
+    name, told = "spring.rubber.area", "not stated; changed from 1 cm²: Austin, Schepelmann, Geyer"
     changed = declared.with_values({name: 2e-4})
     assert changed.quantities()[name].source.startswith(told)
     assert flatten(changed).variable(name).source.startswith(told)
     late = flatten(declared).with_values({name: 2e-4}).variable(name)
-    assert late.source.startswith("not stated; changed from 0.0001 m^2: Austin, Schepelmann, Geyer")
+    assert late.source.startswith("not stated; changed from 0.0001 m²: Austin, Schepelmann, Geyer")
     same = flatten(declared).with_values({name: 1e-4}).variable(name)
     assert same == flatten(declared).variable(name)
     row = declared.with_values({"spring.rubber.stiff.modulus[2]": 0.6e6}).quantities()
