@@ -332,3 +332,39 @@ def test_the_glossary_is_one_alphabetical_table(root: Path) -> None:
     terms = [term for term, _ in cells]
     assert len(terms) > 50
     assert terms == sorted(set(terms), key=str.lower)
+
+
+WALK_ROW = re.compile(r"\| ([a-z_/]+) \| \[`(\w+)`\]\(\.\./([\w/.]+)#L(\d+)\) \|")
+
+
+def walks(text: str) -> list[list[tuple[str, str, str, int]]]:
+    """The tables of room, name, file and line under the heading of the two walks."""
+    section = text.partition("## Two walks\n")[2].partition("\n## ")[0]
+    tables = [WALK_ROW.findall(table) for table in section.split("\n\n")]
+    return [[(room, name, file, int(line)) for room, name, file, line in t] for t in tables if t]
+
+
+def lost_lines(walk: list[tuple[str, str, str, int]], root: Path) -> Iterator[str]:
+    """Rows whose line does not define the name."""
+    for _, name, file, line in walk:
+        lines = (root / file).read_text(encoding="utf-8").splitlines()
+        if not re.search(rf"\b{name}\b", lines[line - 1] if line <= len(lines) else ""):
+            places = [n for n, text in enumerate(lines, 1) if re.match(rf"\s*(def |class |){name}\b", text)]
+            yield f"{file}, line {line}: '{name}' stands in line {places}"
+
+
+def test_the_two_walks_name_the_lines_and_enter_no_room_twice(root: Path) -> None:
+    tables = walks((root / "docs" / "architecture.md").read_text(encoding="utf-8"))
+    assert [len(table) > 10 for table in tables] == [True, True]
+    for table in tables:
+        assert list(lost_lines(table, root)) == []
+        rooms = [room.partition("/")[0] for room, *_ in table]
+        entered = [room for number, room in enumerate(rooms) if number == 0 or rooms[number - 1] != room]
+        assert len(entered) == len(set(entered)), entered
+
+
+def test_a_walk_that_lost_its_way_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("import b\n\n\ndef work() -> None: ...\n", encoding="utf-8")
+    row = "## Two walks\n\n| room | where |\n| model | [`work`](../a.py#L{}) |\n"
+    assert list(lost_lines(walks(row.format(4))[0], tmp_path)) == []
+    assert list(lost_lines(walks(row.format(3))[0], tmp_path)) == ["a.py, line 3: 'work' stands in line [4]"]

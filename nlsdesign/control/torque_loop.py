@@ -164,23 +164,8 @@ def torque_controller(
     """
     if not sample_time > 0.0:
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
-    names, (body, motor) = loop_names(plant), motor_of(plant)
-    if motor.gear_ratio is None:
-        raise ArrangementError(
-            f"motor '{body.name}'", "has no gear ratio of its own",
-            next_step="declare it as a GearedMotor: the controller knows a motor behind its gear",
-        )  # fmt: skip
-    chosen = gains or TorqueGains()
-    settings = {
-        n: Variable(f"controller.{n}", unit, text, getattr(chosen, n), getattr(chosen, n) or 1.0, 0.0)
-        for n, (unit, text) in _UNITS.items()
-    }
-    drive = {
-        "inertia": plant.variable(motor.inertia),
-        "gear_ratio": plant.variable(motor.gear_ratio),
-        "torque_constant": plant.variable(motor.torque_constant),
-        "current_limit": plant.variable(motor.current_limit),
-    }
+    names, drive = loop_names(plant), _drive_numbers(plant)
+    settings = _settings(gains or TorqueGains())
     inputs = (
         Variable(names.desired, "N*m", "torque that the spring should have"),
         Variable(names.torque, "N*m", "estimate of the torque that the spring has"),
@@ -191,10 +176,6 @@ def torque_controller(
         current or names.current, "A", "current for the coming sample",
         nominal=limit, minimum=-limit, maximum=limit,
     )  # fmt: skip
-    signals = (
-        Variable(f"{names.speed}.{DESIRED}", "rad/s", "speed command"),
-        Variable(f"{names.speed}.measured", "rad/s", "filtered speed"),
-    )
     states = _states(names)
     return FlatModel(
         name="torque_controller",
@@ -203,10 +184,36 @@ def torque_controller(
         inputs=inputs,
         parameters=(*settings.values(), *drive.values()),
         outputs=(output,),
-        signals=signals,
+        signals=(
+            Variable(f"{names.speed}.{DESIRED}", "rad/s", "speed command"),
+            Variable(f"{names.speed}.measured", "rad/s", "filtered speed"),
+        ),
         equations=_equations(states, settings | drive, sample_time),
         sample_time=sample_time,
     )
+
+
+def _drive_numbers(plant: FlatModel) -> dict[str, Variable]:
+    body, motor = motor_of(plant)
+    if motor.gear_ratio is None:
+        raise ArrangementError(
+            f"motor '{body.name}'", "has no gear ratio of its own",
+            next_step="declare it as a GearedMotor: the controller knows a motor behind its gear",
+        )  # fmt: skip
+    return {
+        "inertia": plant.variable(motor.inertia),
+        "gear_ratio": plant.variable(motor.gear_ratio),
+        "torque_constant": plant.variable(motor.torque_constant),
+        "current_limit": plant.variable(motor.current_limit),
+    }
+
+
+def _settings(gains: TorqueGains) -> dict[str, Variable]:
+    values = {name: getattr(gains, name) for name in _UNITS}
+    return {
+        name: Variable(f"controller.{name}", unit, text, values[name], values[name] or 1.0, 0.0)
+        for name, (unit, text) in _UNITS.items()
+    }
 
 
 def _states(names: LoopNames) -> dict[str, Variable]:

@@ -16,7 +16,7 @@ from ..quantity import Quantity, changed_source, same_dimension, with_unit
 from ..symbolic import Expression
 from .notebook_view import model_html
 from .readings import ReadingNames
-from .structure import ModelParts, MovingBody, SpringNames
+from .structure import MovingBody, SpringNames
 from .switching import Switching
 
 if TYPE_CHECKING:
@@ -186,24 +186,6 @@ class FlatModel:
             For instance ``model.states``.
         """
         return np.array([v.start for v in of], dtype=float)
-
-    @property
-    def structure(self) -> ModelParts:
-        """Bodies, springs and readings together."""
-        return ModelParts(self.bodies, self.springs, self.readings)
-
-    def with_structure(self, structure: ModelParts) -> FlatModel:
-        """Return a copy made of other bodies, springs and readings; what has no variables here is left out.
-
-        Parameters
-        ----------
-        structure
-            Of this model or of one that it came from.
-        """
-        groups = (self.states, self.inputs, self.outputs, self.signals)
-        names = {v.name for group in groups for v in group}
-        kept = structure.within(names, {v.name for v in self.inputs})
-        return replace(self, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
 
     def variable(self, name: str) -> Variable:
         """Return the variable of that name.

@@ -16,7 +16,7 @@ from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Variable
 from .roles import driven_body, series_cam
-from .transform import cut, named
+from .transform import cut, named, parts_of, with_parts
 
 GEOMETRIC = "geometric"
 """What stands behind the name of the extension for the one that follows from the angle."""
@@ -148,7 +148,7 @@ def paper_form(model: FlatModel, names: PaperFormNames | None = None) -> FlatMod
         signals=tuple(signals),
         equations=equations,
     )
-    return changed.with_structure(model.structure.with_state(n.inner, n.force))
+    return with_parts(changed, parts_of(model).with_state(n.inner, n.force))
 
 
 def _required(model: FlatModel, known: Mapping[str, Expression], name: str) -> Expression:

@@ -26,7 +26,7 @@ class Switch:
     words: tuple[tuple[int, str], ...]
     jumps: bool
 
-    def text_of(self, mode: int) -> str:
+    def event_text(self, mode: int) -> str:
         """Return what has happened when a mode begins.
 
         Parameters

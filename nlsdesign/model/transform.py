@@ -15,6 +15,7 @@ import casadi as ca
 from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Symbols, Variable
+from .structure import ModelParts
 
 
 def named(model: FlatModel, symbols: Symbols) -> dict[str, Expression]:
@@ -143,8 +144,8 @@ def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
     )  # fmt: skip
     states = tuple(variable if i == place else v for i, v in enumerate(model.states))
     signals = (*(model.signals[i] for i in kept), replace(model.states[place], start=0.0))
-    structure = model.structure.with_state(old, signal)
-    return _rebuilt(model.with_structure(structure), changed, states=states, signals=signals)
+    exchanged = parts_of(model).with_state(old, signal)
+    return with_parts(_rebuilt(model, changed, states=states, signals=signals), exchanged)
 
 
 def cut(model: FlatModel, names: Sequence[str], *, keep: bool = False) -> FlatModel:
@@ -226,6 +227,33 @@ def without_idle_states(model: FlatModel, roots: Sequence[str]) -> FlatModel:
     return _rebuilt(model, changed, states=states, signals=signals)
 
 
+def parts_of(model: FlatModel) -> ModelParts:
+    """Return bodies, springs and readings of a model together.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    """
+    return ModelParts(model.bodies, model.springs, model.readings)
+
+
+def with_parts(model: FlatModel, parts: ModelParts) -> FlatModel:
+    """Return the model made of other parts; what has no variables in it is left out.
+
+    Parameters
+    ----------
+    model
+        Continuous or discrete.
+    parts
+        Of the model that it came from.
+    """
+    groups = (model.states, model.inputs, model.outputs, model.signals)
+    names = {v.name for group in groups for v in group}
+    kept = parts.within(names, {v.name for v in model.inputs})
+    return replace(model, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
+
+
 # --- inside ---------------------------------------------------------------------------------------
 
 
@@ -265,7 +293,7 @@ def _rebuilt(
         outputs=model.outputs if outputs is None else outputs,
         signals=model.signals if signals is None else signals,
     )
-    return changed.with_structure(changed.structure)
+    return with_parts(changed, parts_of(model))
 
 
 def _column(items: Iterable[Expression]) -> Expression:

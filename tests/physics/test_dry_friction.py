@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 
 from nlsdesign.components import (
     ROTATION,
+    TRANSLATION,
     Assembly,
     CoulombFriction,
     Dashpot,
@@ -23,6 +24,7 @@ from nlsdesign.components import (
     Fixed,
     Inertia,
     LoadFriction,
+    Mass,
     Spring,
     StribeckFriction,
     parallel,
@@ -266,6 +268,18 @@ def test_power_balance(rub: Element, level: object) -> None:
     assert np.max(np.abs(work - stored - lost)) < 2e-6 * np.max(np.abs(work))
     assert lost[-1] > 0.05 * np.max(work)
     assert {"sticks", "slips forward", "slips backward"} <= {w for w, _ in told(run)}
+
+
+def test_a_sliding_body_sticks_and_slips_as_newton_says() -> None:
+    """Force 4·t against 3 N on 2 kg: it sticks until 0.75 s, then m·v = ∫ (4·t − 3) dt."""
+    friction = CoulombFriction(sliding_effort=3.0, domain=TRANSLATION)
+    made = assembly("sledge", body=Mass(mass=2.0), rub=tie(friction, "body"))
+    run = simulate(flatten(made), np.linspace(0.0, 2.0, 21), inputs={"body.force": lambda t: 4.0 * t})
+    (event,) = run.events
+    assert event.time == pytest.approx(0.75, rel=1e-9)
+    after = np.maximum(run.time - 0.75, 0.0)
+    assert run["body.speed"] == pytest.approx(after**2, abs=1e-9)
+    assert np.all(run["body.speed"][run.time < 0.75] == 0.0)
 
 
 # --- what is refused ------------------------------------------------------------------------------

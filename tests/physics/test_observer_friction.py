@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nlsdesign.model import flatten
-from nlsdesign.observer import CascadeGain, FixedGrid, ObserverDesign, observer_design
+from nlsdesign.observer import CascadeGain, FixedGrid, ObserverDesign, design_observer_with_details
 from tests import observed as ob
 
 TIME = 1e-3
@@ -19,7 +19,7 @@ def designs() -> dict[bool, ObserverDesign]:
     """The same observer with and without dry friction in its plant."""
     actuators = {True: ob.actuator(ob.SLOW, friction=FRICTION), False: ob.actuator(ob.SLOW)}
     return {
-        braked: observer_design(flatten(each), sample_time=TIME, gain=CascadeGain(), grid=GRID)
+        braked: design_observer_with_details(flatten(each), sample_time=TIME, gain=CascadeGain(), grid=GRID)
         for braked, each in actuators.items()
     }
 

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from nlsdesign.components import Assembly, Fixed, Inertia, TorsionSpring, tie
+from nlsdesign.components import Assembly, Fixed, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.effects.candidate import Candidate, Unknown
 from nlsdesign.discrepancy.fitting.unpredictable import Tally
@@ -31,7 +31,7 @@ def rig() -> Assembly:
     def number(value: float, unit: str) -> Quantity:
         return replace(Quantity(value, unit, "by hand"), spread=SPREAD)
 
-    spring = TorsionSpring(stiffness=number(2.0, "N*m/rad"))
+    spring = Spring(stiffness=number(2.0, "N*m/rad"))
     return assembly(
         "rig",
         wheel=Inertia(inertia=number(1e-3, "kg*m^2")),

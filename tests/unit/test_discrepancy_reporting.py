@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nlsdesign.components import Assembly, Encoder, Inertia, TorsionDashpot, TorsionSpring, tie
+from nlsdesign.components import Assembly, Dashpot, Encoder, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
 from nlsdesign.discrepancy.reporting.remainder import Remainder, remainder_of
@@ -160,8 +160,8 @@ def swing(stiffness: float = STIFFNESS) -> Assembly:
     return assembly(
         "swing",
         wheel=Inertia(inertia=1e-2),
-        spring=tie(TorsionSpring(stiffness=number), "wheel"),
-        damper=tie(TorsionDashpot(damping=5e-3), "wheel"),
+        spring=tie(Spring(stiffness=number), "wheel"),
+        damper=tie(Dashpot(damping=Quantity(5e-3, "N*m*s/rad", "by hand")), "wheel"),
         encoder=Encoder(of="wheel.angle", quantum=1e-9),
     )
 
@@ -191,8 +191,8 @@ def test_windows_find_the_stiffness_behind_a_free_swing_and_predict_the_held_out
 
 
 def test_readings_are_wired_to_what_their_sensors_read() -> None:
-    wiring = wiring_of(swing(), flatten(swing()), ["encoder.reading", "spring.torque"])
+    wiring = wiring_of(flatten(swing()), ["encoder.reading", "spring.torque"])
     assert wiring.inputs == {}
     assert wiring.outputs == {"encoder.reading": "wheel.angle", "spring.torque": "spring.torque"}
     with pytest.raises(MeasurementError, match="no state of the model is measured"):
-        wiring_of(swing(), flatten(swing()), ["spring.torque"])
+        wiring_of(flatten(swing()), ["spring.torque"])

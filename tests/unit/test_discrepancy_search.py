@@ -11,7 +11,7 @@ import pytest
 
 from nlsdesign.components import Assembly, Fixed
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.discrepancy.effects.candidate import Candidate, Effect, Unknown
+from nlsdesign.discrepancy.effects.candidate import Candidate, EffectFunction, Unknown
 from nlsdesign.discrepancy.fitting.strategies import Continuation, Plain
 from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.selection.comparison import Comparison
@@ -24,7 +24,7 @@ ROWS = 1000
 LONG = Continuation(through=BLANK)
 
 
-def effect(name: str, numbers: int = 1, *, strategy: Plain | Continuation | None = None) -> Effect:
+def effect(name: str, numbers: int = 1, *, strategy: Plain | Continuation | None = None) -> EffectFunction:
     unknowns = tuple(Unknown(f"{name}.{k}", (1.0,), 0.1, 10.0) for k in range(numbers))
 
     def of(assembly: Assembly) -> Sequence[Candidate]:
@@ -92,7 +92,7 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def outcome(table: Table, *effects: Effect) -> Outcome:
+def outcome(table: Table, *effects: EffectFunction) -> Outcome:
     base = table.hypothesis(())
     return search(cast(Comparison, table), base, effects, lambda text: None)
 

@@ -52,8 +52,8 @@ SMALL, LARGE = record("small", 0.1 * GAP, 1e-3), record("large", 10.0 * GAP, 1.0
 
 @pytest.mark.parametrize("order", [(SMALL, LARGE), (LARGE, SMALL)], ids=["small first", "large first"])
 def test_a_block_is_stiff_if_any_record_closes_the_gap(loose: Assembly, order: tuple[Record, ...]) -> None:
-    bench = Bench(RecordSet(order, COLUMNS), blocks_of(loose, tuple(SIGNALS)))
-    spring, motor = blocks_of(loose, tuple(SIGNALS))
+    bench = Bench(RecordSet(order, COLUMNS), blocks_of(flatten(loose), tuple(SIGNALS)))
+    spring, motor = blocks_of(flatten(loose), tuple(SIGNALS))
     assert spring.name == "spring"
     assert bench.driven(spring, []).stiff
     assert not DrivenBlock(spring, [], records=[SMALL]).stiff, "or the test would show nothing"
@@ -64,7 +64,7 @@ def test_a_block_is_stiff_if_any_record_closes_the_gap(loose: Assembly, order: t
 def test_a_fit_is_the_same_to_the_last_digit_whichever_record_comes_first(loose: Assembly) -> None:
     name, results = "spring.gap", []
     for order in ((SMALL, LARGE), (LARGE, SMALL)):
-        spring = blocks_of(loose, tuple(SIGNALS))[0]
+        spring = blocks_of(flatten(loose), tuple(SIGNALS))[0]
         bench = Bench(RecordSet(order, COLUMNS), [spring])
         free = [v.name for v in spring.model.parameters if v.spread > 0.0][:3]
         numbers = [declared_parameter(spring.model.variable(n)) for n in free]
@@ -113,3 +113,19 @@ def test_permuted_file_names_leave_the_verdict_as_it_is_to_the_byte(tmp_path: Pa
         verdicts.append((text, deck.read_bytes()))
     assert json.loads(verdicts[0][0])["verdict"] == "named"
     assert verdicts[0] == verdicts[1]
+
+
+def test_file_names_do_not_choose_among_orders_of_columns(tmp_path: Path) -> None:
+    """One file holds its columns in another order; whichever name it has, the signals come alike."""
+    arm = ACTUATORS["arm"]
+    (table,) = make_records(arm, {}, 3, only=("sine_15deg_5.0Hz",)).values()
+    write_declaration(tmp_path, arm)
+    model = flatten(declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv"))
+    orders = []
+    for turned in ("a", "b"):
+        folder = tmp_path / turned
+        write_records(folder, {"a": table, "b": table})
+        rows = [line.split(",") for line in (folder / f"{turned}.csv").read_text().splitlines()]
+        (folder / f"{turned}.csv").write_text("\n".join(",".join([r[0], *r[:0:-1]]) for r in rows) + "\n")
+        orders.append(load_records(folder, model, hold_out=["b"]).signals)
+    assert orders[0] == orders[1]

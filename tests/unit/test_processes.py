@@ -13,7 +13,9 @@ import pytest
 
 from nlsdesign.processes import parallel_map
 
+# Where the suite itself was begun in the background, children inherit that interrupts are ignored.
 ENDLESS = """
+import signal
 import time
 from nlsdesign.processes import parallel_map
 
@@ -21,6 +23,7 @@ def work(number):
     print("at work", flush=True)
     time.sleep(60)
 
+signal.signal(signal.SIGINT, signal.default_int_handler)
 list(parallel_map(work, 4))
 """
 

@@ -93,19 +93,19 @@ def where_they_differ(one: Sequence[Judged], other: Sequence[Judged]) -> str:
     one, other
         What all records say of both.
     """
-    best, difference = -1.0, "their predictions agree on every record"
+    best, sentence = -1.0, "their predictions agree on every record"
     for a, b in zip(one, other, strict=True):
         gap = np.abs(a.residual - b.residual)
         most = float(np.sqrt(np.mean(gap**2)))
         if most > best:
             best, place = most, int(np.argmax(gap))
             at = float(a.record.trace.time[a.floor.places[place]])
-            difference = (
+            sentence = (
                 f"here they differ most in record '{a.record.name}' at `{a.block.name}`, "
                 f"by {most:.2g} noise floors, around {at:.3g} s"
             )
     longer = "; repeat that motion with more periods or larger amplitude" if best < _APART else ""
-    return difference + longer
+    return sentence + longer
 
 
 def advice(name: str, aliases: Mapping[str, str]) -> tuple[str, ...]:

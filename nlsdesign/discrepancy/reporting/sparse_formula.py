@@ -69,10 +69,10 @@ def sparse_formula(
     rest, target = np.vstack([table[i] for i in others]), np.concatenate([parts[i][0] for i in others])
     size = np.sqrt(np.mean(a**2, axis=0))
     kept = size > 1e-12 * size.max()
-    solutions = _one_by_one(a[:, kept] / size[kept], b)
+    candidates = _one_by_one(a[:, kept] / size[kept], b)
     whole = float(target @ target)
     scored = []
-    for weights in solutions:
+    for weights in candidates:
         left = target - rest[:, kept] @ (weights / size[kept])
         share = 1.0 - float(left @ left) / whole if whole > 0.0 else 0.0
         scored.append((share - _PER_TERM * int(np.count_nonzero(weights)), share, weights))
@@ -106,17 +106,17 @@ def _library(signals: Mapping[str, Array]) -> dict[str, Array]:
 def _one_by_one(a: Array, b: Array) -> list[Array]:
     """Return weights with one term, two, and so on; each is the term that explains most of the rest."""
     active: list[int] = []
-    solutions, free = [], a / np.linalg.norm(a, axis=0)
+    steps, free = [], a / np.linalg.norm(a, axis=0)
     for _ in range(min(_MOST_TERMS, a.shape[1])):
         gains = np.abs(free.T @ b)
         gains[active] = -1.0
         active.append(int(np.argmax(gains)))
         weights = np.zeros(a.shape[1])
         weights[active] = np.linalg.lstsq(a[:, active], b, rcond=1e-6)[0]
-        solutions.append(weights)
+        steps.append(weights)
         taken = free[:, active[-1]]
         free = free - np.outer(taken, taken @ free)
         norms = np.linalg.norm(free, axis=0)
         # A term that the others already hold would be noise, blown up.
         free = np.where(norms > 1e-3, free / np.maximum(norms, 1e-300), 0.0)
-    return solutions
+    return steps

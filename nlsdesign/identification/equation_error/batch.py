@@ -66,5 +66,5 @@ class Batch:
             self._trigger()
             if self._chained:
                 given[0][:] = chunk[-1]
-        values: Array = result[:count].T
-        return values
+        columns: Array = result[:count].T
+        return columns

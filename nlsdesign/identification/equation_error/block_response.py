@@ -400,11 +400,15 @@ def _walk_functions(
             zero = ca.SX.zeros(n)
             later = table @ ca.vertcat(inner, at(zero, ends[0]), at(zero, ends[1]))
         elif fast:
-            steps = implicit_steps(at, inner, ends, h)
-            later, guess, guessed = steps.states[-1], guess + steps.guess, guessed + steps.guessed
-            seen, count = _placed(e.output, e, stage.states), len(steps.states)
+            short_steps = implicit_steps(at, inner, ends, h)
+            later, guess, guessed = (
+                short_steps.states[-1],
+                guess + short_steps.guess,
+                guessed + short_steps.guessed,
+            )
+            seen, count = _placed(e.output, e, stage.states), len(short_steps.states)
             corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
-            outputs += [seen(x, v) / count for x, v in zip(steps.states, corners, strict=True)]
+            outputs += [seen(x, v) / count for x, v in zip(short_steps.states, corners, strict=True)]
         else:
             w = None if is_short(rate) else ca.SX.sym("w", n, n)
             matrices += [] if w is None else [w]

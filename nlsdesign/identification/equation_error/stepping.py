@@ -61,12 +61,12 @@ def stages_of(derivative: Expression, state: Expression, moving: Expression) -> 
     order = TopologicalSorter(
         {k: {m for m in acts_on if k in acts_on[m]} for k in range(count)}
     ).static_order()
-    stages = []
+    ordered = []
     for k in order:
         inside = ca.vertcat(*[state[i] for i in groups[k]])
         slope = ca.jacobian(ca.vertcat(*[derivative[i] for i in groups[k]]), inside)
-        stages.append(Stage(groups[k], not depends(slope, ca.vertcat(state, moving))))
-    return stages
+        ordered.append(Stage(groups[k], not depends(slope, ca.vertcat(state, moving))))
+    return ordered
 
 
 def exact_step(matrix: Expression, length: Expression) -> Expression:

@@ -35,7 +35,7 @@ def prior_rows(parameters: Sequence[Parameter], known: Sequence[Fit] = ()) -> tu
         places = [(i, names.index(p.name)) for i, p in enumerate(fit.parameters) if p.name in names]
         if not places:
             continue
-        earlier, present = (list(side) for side in zip(*places, strict=True))
+        own, columns = (list(side) for side in zip(*places, strict=True))
         # From the scale of the earlier fit to that of this one, at the value found.
         ratio = np.array(
             [
@@ -43,11 +43,11 @@ def prior_rows(parameters: Sequence[Parameter], known: Sequence[Fit] = ()) -> tu
                 for i, j in places
             ]
         )
-        covariance = fit.covariance[np.ix_(earlier, earlier)] * np.outer(ratio, ratio)
+        covariance = fit.covariance[np.ix_(own, own)] * np.outer(ratio, ratio)
         strength, axes = np.linalg.eigh(covariance)
         whitened = (axes / np.sqrt(np.maximum(strength, _LEAST * strength.max()))).T
-        wide = np.zeros((len(earlier), len(names)))
-        wide[:, present] = whitened
+        wide = np.zeros((len(own), len(names)))
+        wide[:, columns] = whitened
         rows.append(wide)
-        centres.append(whitened @ np.array([parameters[j].inward(fit.values[names[j]]) for j in present]))
+        centres.append(whitened @ np.array([parameters[j].inward(fit.values[names[j]]) for j in columns]))
     return np.vstack(rows), np.concatenate(centres)

@@ -87,7 +87,7 @@ def fit_by_cma(
     low, high, first = box(parameters)
     options = {"bounds": [list(low), list(high)], "seed": seed, "maxfevals": simulations, "verbose": -9}
     best, strategy = cma.fmin2(cost, first, _STEP, options)
-    cost_reached = float(strategy.result.fbest)
-    if not cost_reached < _FAILED:
+    least = float(strategy.result.fbest)
+    if not least < _FAILED:
         raise ConvergenceError("a fit by CMA-ES", "no simulation was finite", next_step="narrow the bounds")
-    return Evolved(problem.values(np.asarray(best)), cost_reached, int(strategy.result.evaluations))
+    return Evolved(problem.values(np.asarray(best)), least, int(strategy.result.evaluations))

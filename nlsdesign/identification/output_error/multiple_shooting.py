@@ -198,8 +198,8 @@ def _bounded(residual: Array, slope: Array, damping: float, room: tuple[Array, A
     rows = np.vstack([r, np.sqrt(damping) * np.eye(n)])
     target = np.concatenate([-rotated, np.zeros(n)])
     low, high = room[0] * size - 1e-300, room[1] * size + 1e-300
-    step: Array = lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n).x
-    return step / size
+    solution: Array = lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n).x
+    return solution / size
 
 
 def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:

@@ -171,7 +171,8 @@ def load_records(
         raise MeasurementError(
             str(folder), "no file has a column of time", next_step="name it 't_s' or 'time [s]'"
         )
-    first = next(iter(runs))
+    # Where files differ in the order of their columns, their names must not choose among them.
+    first = min(runs, key=lambda file: tuple(runs[file].heads))
     chosen = given or default_mapping(runs[first].heads, model, first.name)
     check_signals(first.name, chosen.columns, model)
     records: list[Record] = []

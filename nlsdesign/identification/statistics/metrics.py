@@ -62,10 +62,10 @@ def agreement(measured: Array, predicted: Array, *, noise: float = 0.0) -> Agree
     size = np.abs(measured)
     large = size > 0.1 * size.max()
     spread = float(np.std(measured))
-    root_mean_square = rmse(error)
+    size_of_error = rmse(error)
     return Agreement(
-        root_mean_square,
+        size_of_error,
         float(100.0 * np.mean(np.abs(error[large]) / size[large])) if np.any(large) else float("nan"),
-        100.0 * root_mean_square / spread if spread > 0.0 else float("inf"),
-        root_mean_square / noise if noise > 0.0 else float("inf"),
+        100.0 * size_of_error / spread if spread > 0.0 else float("inf"),
+        size_of_error / noise if noise > 0.0 else float("inf"),
     )

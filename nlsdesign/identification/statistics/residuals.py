@@ -168,14 +168,14 @@ def shapes(
     step
         Time between samples in s.
     """
-    curves = {f"over {name}": binned(residual, values) for name, values in signals.items()}
-    curves["over frequency"] = spectrum(residual, step)
-    curves["over time"] = binned(residual, np.arange(len(residual), dtype=np.float64) * np.float64(step))
+    result = {f"over {name}": binned(residual, values) for name, values in signals.items()}
+    result["over frequency"] = spectrum(residual, step)
+    result["over time"] = binned(residual, np.arange(len(residual), dtype=np.float64) * np.float64(step))
     if speed is not None:
-        curves["over speed"] = binned(residual, speed)
+        result["over speed"] = binned(residual, speed)
         for direction, mask in (("forward", speed > 0.0), ("backward", speed < 0.0)):
             if mask.sum() > 100:
-                curves |= {
+                result |= {
                     f"over {n}, {direction}": binned(residual[mask], v[mask]) for n, v in signals.items()
                 }
-    return curves
+    return result
