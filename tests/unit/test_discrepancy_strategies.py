@@ -23,9 +23,9 @@ from nlsdesign.discrepancy.fitting.strategies import (
     LONG_STEP,
     MOST_STARTS,
     Continuation,
+    FitProblem,
     Limits,
     Plain,
-    Problem,
     RobustOverFreeFlight,
     Smooth,
     Start,
@@ -89,11 +89,11 @@ def evidence(name: str, role: str, rate: float, *, stiff: bool = False, size: in
     )
 
 
-def problem(*, stiff: bool = False, size: int = 100, **changes: Any) -> Problem:
+def problem(*, stiff: bool = False, size: int = 100, **changes: Any) -> FitProblem:
     """Four fitted records of which "d" is the quickest, one held out; 100 rows each."""
     rates = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 40.0}
     seen = [evidence(n, "fit", rate, stiff=stiff, size=size) for n, rate in rates.items()]
-    whole = Problem(
+    whole = FitProblem(
         cast(Bench, None),
         BLANK,
         ("spring",),
@@ -171,7 +171,7 @@ class Begun(Strategy):
 
     at: tuple[float, ...]
 
-    def beginnings(self, problem: Problem, slow: Sequence[Evidence]) -> list[Start]:
+    def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
         assert [e.record.name for e in slow] == ["a", "b", "c"]
         return [start(value) for value in self.at]
 

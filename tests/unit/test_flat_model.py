@@ -303,6 +303,16 @@ def test_variable_by_name() -> None:
         model.variable("spring.torqe")
 
 
+def test_units_are_typeset_where_people_read_them() -> None:
+    model = flatten(bench(), outputs=["spring.torque"])
+    text = str(model)
+    assert "N·m·s/rad" in text
+    assert "*" not in text
+    assert "spring.torque [N·m]" in model._repr_html_()
+    with pytest.raises(ValueRangeError, match="bearing.damping = -1 N·m·s/rad: must lie in .* N·m·s/rad"):
+        model.with_values({"bearing.damping": -1.0})
+
+
 # --- tables ---------------------------------------------------------------------------------------
 
 

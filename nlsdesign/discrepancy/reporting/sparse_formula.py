@@ -20,7 +20,7 @@ Part = tuple[Array, Mapping[str, Array], bool]
 
 _MOST_TERMS = 5
 _LEAST = 0.3
-"""Share of the remainder that a formula must explain on other records to be worth telling."""
+"""Share of the remainder that a formula must explain on other records to be reported."""
 _PER_TERM = 0.02
 """Share that a further term must add there."""
 
