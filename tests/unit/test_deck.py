@@ -317,8 +317,8 @@ mass = {value = 1, unit = "kg", source = "sheet"}
 component = "Spring"
 stiffness = {value = 1, unit = "N/m", source = "sheet"}
 """,
-        "holds no other part",
-        "motor.coil",
+        "does not lie between current and torque",
+        "motor",
     ),
     "no body": ("""[deck]\nname = "none"\n""", "has no body", "deck"),
 }

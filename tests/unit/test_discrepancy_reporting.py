@@ -191,6 +191,16 @@ def test_windows_find_the_stiffness_behind_a_free_swing_and_predict_the_held_out
     assert gaps[1].before > 5.0 * gaps[1].after
 
 
+def test_windows_of_held_out_records_are_not_fitted() -> None:
+    records = swings("fit", "fit")
+    upper = records.records[1].trace
+    slower = Trace(0.8 * upper.time, upper.signals, upper.units, "slow")
+    both = RecordSet((records.records[0], Record("slow", slower, "held_out")), records.columns)
+    alone = RecordSet(records.records[:1], records.columns)
+    fitted = [fitted_over_windows(swing(), r, {"spring.stiffness": STIFFNESS}, 0.5)[0] for r in (alone, both)]
+    assert fitted[0] == fitted[1]
+
+
 def test_readings_are_wired_to_what_their_sensors_read() -> None:
     wiring = wiring_of(flatten(swing()), ["encoder.reading", "spring.torque"])
     assert wiring.inputs == {}

@@ -309,7 +309,7 @@ def test_units_are_typeset_where_people_read_them() -> None:
     assert "N·m·s/rad" in text
     assert "*" not in text
     assert "spring.torque [N·m]" in model._repr_html_()
-    with pytest.raises(ValueRangeError, match="bearing.damping = -1 N·m·s/rad: must lie in .* N·m·s/rad"):
+    with pytest.raises(ValueRangeError, match=r"bearing.damping = -1 N·m·s/rad: must lie in .* N·m·s/rad"):
         model.with_values({"bearing.damping": -1.0})
 
 

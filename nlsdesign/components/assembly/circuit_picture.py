@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from html import escape
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..core.part import Part
 from ..core.tie import Tie
@@ -49,6 +49,24 @@ def size_of(circuit: Circuit) -> Size:
     if isinstance(circuit, Row):
         return Size(sum(s.columns for s in sizes), max(s.rows for s in sizes))
     return Size(max(s.columns for s in sizes), sum(s.rows for s in sizes))
+
+
+class NotebookCircuits:
+    """How named parts show themselves in a notebook: the circuits as a picture, and the parts as text."""
+
+    name: str
+    description: str
+    parts: tuple[tuple[str, Part], ...]
+
+    def _repr_html_(self) -> str:
+        """Return the circuits as a picture and the parts with their numbers."""
+        details = f"<details><summary>parts and numbers</summary><pre>{escape(str(self))}</pre></details>"
+        title = f"<p><b>{escape(self.name)}</b> {escape(self.description)}</p>"
+        return f"<div>{title}{assembly_svg(self.name, self.parts)}{details}</div>"
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """Return text and picture; a notebook chooses the richest form that it can show."""
+        return {"text/plain": str(self), "text/html": self._repr_html_()}
 
 
 def assembly_svg(name: str, parts: Sequence[tuple[str, Part]]) -> str:

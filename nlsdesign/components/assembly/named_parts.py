@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import Any
 
 from ...errors import ArrangementError, NlsError, unknown_name
@@ -15,13 +14,13 @@ from ..core.tie import Tie
 from ..mechanics.bodies import Body, Fixed
 from ..mechanics.gear import Gear, gear_problems
 from ..sensing.sensors import Sensor
-from .circuit_picture import assembly_svg
+from .circuit_picture import NotebookCircuits
 from .circuit_text import draw
 from .sensor_chains import chain_problems, sensors_behind
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(NotebookCircuits):
     """Named parts that make one system.
 
     Parameters
@@ -212,16 +211,6 @@ class Assembly:
 
     def __str__(self) -> str:
         return draw(f"{self.name}: {self.description}".rstrip(": "), self.parts)
-
-    def _repr_html_(self) -> str:
-        """Return the circuits as a picture and the parts with their numbers, for notebooks."""
-        details = f"<details><summary>parts and numbers</summary><pre>{escape(str(self))}</pre></details>"
-        title = f"<p><b>{escape(self.name)}</b> {escape(self.description)}</p>"
-        return f"<div>{title}{assembly_svg(self.name, self.parts)}{details}</div>"
-
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
-        """Return text and picture; a notebook chooses the richest form that it can show."""
-        return {"text/plain": str(self), "text/html": self._repr_html_()}
 
 
 def _with_inner(root: Part, path: str, new: Part) -> Part:

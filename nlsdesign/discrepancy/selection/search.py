@@ -6,7 +6,7 @@ What is tried, and in which order; :mod:`.criteria` decides.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ...errors import ConvergenceError
@@ -144,17 +144,20 @@ class _Search:
         first = self._excesses(start)
         steps = self._backward(start, self._forward(start))
         if not steps:
-            return Outcome(base, (), self.ranking, not any(e.open for e in first.values()), self._skipped())
+            return Outcome(
+                base,
+                (),
+                self.ranking,
+                not any(e.open for e in first.values()),
+                tuple(dict.fromkeys(self.skipped)),
+            )
         self.progress("fitting what was named to all samples")
         last = self.comparison.polished(steps[-1].chosen)
         done = is_explained(first, self._excesses(steps[-1].chosen))
-        return Outcome(last, tuple(steps), self.ranking, done, self._skipped())
+        return Outcome(last, tuple(steps), self.ranking, done, tuple(dict.fromkeys(self.skipped)))
 
     def _excesses(self, hypothesis: Hypothesis) -> Excesses:
         return excesses(hypothesis, self.comparison.bench)
-
-    def _skipped(self) -> tuple[Skipped, ...]:
-        return tuple(dict.fromkeys(self.skipped))
 
     def _forward(self, start: Hypothesis) -> list[Step]:
         """Return the effects that help, one after the other."""
@@ -173,7 +176,7 @@ class _Search:
                 if step is not None:
                     break
             before = self._excesses(present)
-            self.ranking = self.ranking or self._ranked(before, tried)
+            self.ranking = self.ranking or _ranked(before, {h: self._excesses(h) for h in tried})
             further = [step] if step else self._pair(tried, first, before, open_blocks[0])
             if not further:
                 break
@@ -207,22 +210,11 @@ class _Search:
         """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
         first, before = self._excesses(start), self._excesses(present)
         if before[block].open:
-            return self._chosen(first, before, {h: self._excesses(h) for h in fresh}, block)
+            return _chosen(first, before, {h: self._excesses(h) for h in fresh}, block)
         full = self.comparison.on_all_samples
         best = sorted(fresh, key=lambda h: sum(self._excesses(h)[block].chi2))[:_PAIRED]
         on_all = {h: self._excesses(full(h)) for h in best}
-        return self._chosen(self._excesses(full(start)), self._excesses(full(present)), on_all, block)
-
-    def _chosen(
-        self, first: Excesses, before: Excesses, tried: dict[Hypothesis, Excesses], block: str
-    ) -> Step | None:
-        """Return the best of some hypotheses, by what each leaves."""
-        rivals = [Rival(h, h.newest.effect, len(h.newest.unknowns), after) for h, after in tried.items()]
-        choice = choose(first, before, rivals, block)
-        if choice is None:
-            return None
-        shares = best_shares(before, choice.taken.excesses)
-        return Step(choice.taken.hypothesis, *shares, tuple(r.hypothesis for r in choice.equals))
+        return _chosen(self._excesses(full(start)), self._excesses(full(present)), on_all, block)
 
     def _candidates(self, present: Hypothesis) -> list[Candidate]:
         return [c for effect in self.catalogue for c in effect(present.assembly)]
@@ -267,7 +259,7 @@ class _Search:
             if (again := self._again(one, other.newest)) is not None
         ]
         pairs = {h: self._excesses(h) for h in self._fits(tasks)}
-        step = self._chosen(first, before, pairs, block)
+        step = _chosen(first, before, pairs, block)
         if step is None:
             return []
         alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)
@@ -300,8 +292,21 @@ class _Search:
             present = later
         return rebuilt
 
-    def _ranked(self, before: Excesses, tried: Sequence[Hypothesis]) -> tuple[tuple[Candidate, float], ...]:
-        """Return how far each effect goes alone, the best first."""
-        whole = max(total_excess(before), 1.0)
-        shares = [(h.newest, 1.0 - total_excess(self._excesses(h)) / whole) for h in tried]
-        return tuple(sorted(shares, key=lambda pair: -pair[1]))
+
+def _chosen(
+    first: Excesses, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str
+) -> Step | None:
+    """Return the best of some hypotheses, by what each leaves."""
+    rivals = [Rival(h, h.newest.effect, len(h.newest.unknowns), after) for h, after in tried.items()]
+    choice = choose(first, before, rivals, block)
+    if choice is None:
+        return None
+    shares = best_shares(before, choice.taken.excesses)
+    return Step(choice.taken.hypothesis, *shares, tuple(r.hypothesis for r in choice.equals))
+
+
+def _ranked(before: Excesses, tried: Mapping[Hypothesis, Excesses]) -> tuple[tuple[Candidate, float], ...]:
+    """Return how far each effect goes alone, the best first."""
+    whole = max(total_excess(before), 1.0)
+    shares = [(h.newest, 1.0 - total_excess(after) / whole) for h, after in tried.items()]
+    return tuple(sorted(shares, key=lambda pair: -pair[1]))

@@ -147,17 +147,13 @@ class DrivenBlock:
                 continue
             signal = record.trace[drive.signal]
             delay = sum({**self._fixed, **values}[name] for name in drive.late_by)
-            if smooth and drive.order == 0 and self._moves(drive.signal):
+            if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
                 signal = without_rounding(signal)
             inputs[i] = derivative(signal, record.step, order=drive.order)
             if drive.late_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
         at = self._digest(inputs.shape[1], [inputs, rates])
         return Samples(at, *self._ends(inputs, rates, at, record.step), record.step)
-
-    def _moves(self, signal: str) -> bool:
-        """Tell whether a signal is a motion, whose rate drives the block too."""
-        return any(d.signal == signal and d.order == 1 for d in self.block.drives.values())
 
     @property
     def needs_new_samples(self) -> bool:
@@ -268,6 +264,11 @@ class DrivenBlock:
                 )
             x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
         return x
+
+
+def _is_motion(block: Block, signal: str) -> bool:
+    """Tell whether the rate of a signal drives the block too."""
+    return any(d.signal == signal and d.order == 1 for d in block.drives.values())
 
 
 def _centred(mean: Array) -> Array:
