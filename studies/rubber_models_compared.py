@@ -132,7 +132,7 @@ def laws() -> dict[str, Element]:
         "Kelvin-Voigt": kelvin_voigt(modulus=3e6, viscosity=3e3),
         "Maxwell": maxwell(modulus=4e6, viscosity=1e6),
         "standard linear solid": nls.standard_linear_solid(3e6, **one_time),
-        "Burgers": burgers(modulus=4e6, flow=1e7, late_modulus=1e7, late_viscosity=1e5),
+        "Burgers": burgers(modulus=4e6, flow=1e7, delayed_modulus=1e7, delayed_viscosity=1e5),
         "stiffening solid (printed)": nls.standard_linear_solid(stiffening, **one_time),
         "stiffening solid, rounded": nls.standard_linear_solid(rounded, **one_time),
         "stiffening, three times": generalised_maxwell(

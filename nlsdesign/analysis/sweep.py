@@ -15,6 +15,7 @@ from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel, Variable
 from ..model.linear import LinearModel, jacobian_function
 from ..model.roles import measured_motion
+from ..quantity import typeset_unit
 from ..writing import write_table
 from .rest import rest_states, typical_sizes
 
@@ -133,7 +134,7 @@ class Chart:
         write_table(path, rows)
 
     def __str__(self) -> str:
-        names = [f"{v.name} [{v.unit}]" for v in (self.argument, *self.columns)]
+        names = [f"{v.name} [{typeset_unit(v.unit) or '1'}]" for v in (self.argument, *self.columns)]
         widths = [max(len(name), 11) for name in names]
         lines = ["  ".join(name.rjust(w) for name, w in zip(names, widths, strict=True))]
         for i, at in enumerate(self.at):

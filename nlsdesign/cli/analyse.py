@@ -56,7 +56,7 @@ def analyse(
     unit = model.variable(measured).unit
     if unit != "rad":
         raise UnitError(
-            f"'{measured}'", f"is in {unit}; analyse goes over an angle",
+            f"'{measured}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
             next_step="name the angle of a body that turns, with --measured",
         )  # fmt: skip
     model = with_outputs(model, list(dict.fromkeys([measured, torque])))

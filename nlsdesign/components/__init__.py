@@ -46,7 +46,7 @@ from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
-from .transmission.cam_error import MisshapenCam
+from .transmission.cam_error import CamWithProfileError
 from .transmission.cam_shapes import AnchoredCam, OneSidedCam
 from .transmission.capstan import CapstanFriction, Guide, WrapProduct
 from .transmission.stretchy_cable import StretchyCable
@@ -63,6 +63,7 @@ __all__ = [
     "Backlash",
     "Body",
     "Cam",
+    "CamWithProfileError",
     "CapstanFriction",
     "ConstantForce",
     "CoulombFriction",
@@ -101,7 +102,6 @@ __all__ = [
     "LuGreFriction",
     "Mass",
     "Material",
-    "MisshapenCam",
     "NeoHooke",
     "Ogden",
     "OgdenRoxburgh",

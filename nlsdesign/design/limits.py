@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..errors import ValueRangeError
-from ..quantity import Quantity, parse_unit
+from ..quantity import Quantity, parse_unit, typeset_unit, with_unit
 from ..symbolic import Expression
 from .design_point import DesignPoint, anchor_of
 from .numbers import in_si, plain
@@ -53,8 +53,7 @@ class Bound:
         value
             In SI.
         """
-        text = f"{value / parse_unit(self.unit).factor:.4g}"
-        return text if self.unit == "1" else f"{text} {self.unit}"
+        return with_unit(f"{value / parse_unit(self.unit).factor:.4g}", self.unit)
 
     def __str__(self) -> str:
         return f"{self.limit}: {self.of} {'<=' if self.upper else '>='} {self.shown(self.value)}"
@@ -271,8 +270,9 @@ class ParameterRange(Limit):
         _store(self, "minimum", unit, lowest, highest)
         _store(self, "maximum", unit, lowest, highest)
         if plain(self.minimum) > plain(self.maximum):
+            bounds = f"{plain(self.minimum):g}, {plain(self.maximum):g}"
             raise ValueRangeError(
-                f"{type(self).__name__}({plain(self.minimum):g}, {plain(self.maximum):g}) in {unit}",
+                f"{type(self).__name__}({bounds}) in {typeset_unit(unit)}",
                 "the minimum exceeds the maximum",
                 next_step="exchange the two",
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import UnitError, ValueRangeError
-from ..quantity import Quantity, degrees, same_dimension
+from ..quantity import Quantity, degrees, same_dimension, with_unit
 
 _SLIPS = {"m": (("mm", 1e-3), ("cm", 1e-2)), "m^2": (("mm^2", 1e-6), ("cm^2", 1e-4)), "Pa": (("MPa", 1e6),)}
 
@@ -49,8 +49,8 @@ def in_si(
         value = float(given)
     if not minimum <= value <= maximum:
         raise ValueRangeError(
-            f"{name} = {value:g} {unit}",
-            f"must lie in [{minimum:g}, {maximum:g}] {unit}",
+            f"{name} = {with_unit(f'{value:g}', unit)}",
+            "must lie in " + with_unit(f"[{minimum:g}, {maximum:g}]", unit),
             next_step=_slip(value, unit, minimum, maximum),
         )
     return value

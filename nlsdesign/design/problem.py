@@ -268,7 +268,7 @@ def _contour_start(contour: ContourVariables, slope: float, size: float) -> dict
 def _lifted(problem: DesignProblem) -> DesignProblem:
     """Return the problem with the torque errors as variables of their own, held by equations.
 
-    The square of an error that nearly vanishes along a curved valley (rubber, pretension and contour can
+    The square of an error that nearly vanishes along a curve (rubber, pretension and contour can
     replace each other) is what Newton's method finds hard; with the errors lifted out the cost is quadratic.
     """
     design = problem.design

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..quantity import Quantity, parse_unit
+from ..quantity import Quantity, parse_unit, with_unit
 from .cam_drawing import fingerprint
 from .geometry import Contour
 from .target import Target
@@ -46,10 +46,9 @@ class LimitState:
 
     def __str__(self) -> str:
         factor = parse_unit(self.unit).factor
-        unit = "" if self.unit == "1" else f" {self.unit}"
         sign = "<=" if self.upper else ">="
         mark = "  ACTIVE" if self.active else ""
-        value, bound = (f"{number / factor:.4g}{unit}" for number in (self.value, self.bound))
+        value, bound = (with_unit(f"{number / factor:.4g}", self.unit) for number in (self.value, self.bound))
         return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
 
 
@@ -198,7 +197,7 @@ class CamDesign:
 
     @property
     def _contour_error(self) -> str:
-        return f", contour held to {1e6 * self.fit_error:.2g} um" if self.fit_error > 0.0 else ""
+        return f", contour held to {1e6 * self.fit_error:.2g} µm" if self.fit_error > 0.0 else ""
 
     @property
     def _end(self) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ..quantity import Quantity, changed_source, same_dimension
+from ..quantity import Quantity, changed_source, same_dimension, with_unit
 from ..symbolic import Expression
 from .notebook_view import model_html
 from .readings import ReadingNames
@@ -328,7 +328,7 @@ class FlatModel:
         for title in ("states", "inputs", "outputs", "parameters"):
             group: tuple[Variable, ...] = getattr(self, title)
             lines.append(f"  {title} ({len(group)})")
-            lines += [f"    {v.name} = {v.start:.6g} {v.unit}  {v.description}" for v in group]
+            lines += [f"    {v.name} = {with_unit(f'{v.start:.6g}', v.unit)}  {v.description}" for v in group]
         return "\n".join(lines)
 
 
@@ -342,12 +342,12 @@ def _with_start(variable: Variable, given: float | Quantity) -> Variable:
         )
     if not variable.minimum <= value <= variable.maximum:
         raise ValueRangeError(
-            f"{variable.name} = {value:g} {variable.unit}",
-            f"must lie in [{variable.minimum:g}, {variable.maximum:g}] {variable.unit}",
+            f"{variable.name} = {with_unit(f'{value:g}', variable.unit)}",
+            "must lie in " + with_unit(f"[{variable.minimum:g}, {variable.maximum:g}]", variable.unit),
         )
     if isinstance(given, Quantity):
         return replace(variable, start=value, source=given.source, spread=given.spread)
     source = variable.source
     if source and value != variable.start:
-        source = changed_source(f"{variable.start:.6g} {variable.unit}", source)
+        source = changed_source(with_unit(f"{variable.start:.6g}", variable.unit), source)
     return replace(variable, start=value, source=source)

@@ -19,6 +19,7 @@ from ..components.core.tie import Tie
 from ..components.mechanics.bodies import Body, Motion
 from ..components.sensing.sensors import Sensor
 from ..errors import ArrangementError, UnitError, nearest, unknown_name
+from ..quantity import typeset_unit
 from ..symbolic import Expression, depends
 from .equation_builder import EquationBuilder, PartScope
 from .flat import FlatModel, Variable
@@ -98,9 +99,10 @@ def _write_sensors(assembly: Assembly, builder: EquationBuilder) -> None:
         unit = _variable_of(builder, part.of).unit
         if not part.sees(unit):
             fitting = [n for n in known if part.sees(_variable_of(builder, n).unit)]
+            readable = " or ".join(map(typeset_unit, part.units))
             raise UnitError(
                 f"sensor '{name}' of '{part.of}'",
-                f"{type(part).__name__} reads {' or '.join(part.units)}, '{part.of}' is in {unit}",
+                f"{type(part).__name__} reads {readable}, '{part.of}' is in {typeset_unit(unit) or '1'}",
                 did_you_mean=nearest(part.of, fitting),
                 next_step=f"read one of: {', '.join(fitting) or 'nothing here has such a unit'}",
             )

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from html import escape
 from typing import Protocol
 
+from ..quantity import typeset_unit
+
 LINE = 18.0
 """Height of a line in pixels."""
 _STYLE = "fill:none;stroke:currentColor;stroke-width:1.5"
@@ -81,7 +83,7 @@ def block_svg(name: str, inputs: Sequence[Named], states: Sequence[Named], outpu
 
 
 def _label(variable: Named) -> str:
-    return f"{variable.name} [{variable.unit}]"
+    return f"{variable.name} [{typeset_unit(variable.unit) or '1'}]"
 
 
 def _text(x: float, y: float, words: str, anchor: str) -> str:

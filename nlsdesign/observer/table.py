@@ -28,7 +28,7 @@ CHECKS = 4
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A function of the angle and what it is worth.
+    """A function of the angle and the weight of its error.
 
     Parameters
     ----------

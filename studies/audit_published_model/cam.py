@@ -118,7 +118,7 @@ def _contour() -> list[Finding]:
             statement="The torque of Fig. 8 comes from a convex cam with the cable through its centre",
             verdict=AGAINST_FIGURES if value < 0 else HOLDS,
             why="The measured power is 2.09. So its ideal cam is concave near zero (ρ = h + h'' < 0): the "
-            "cable would lift off. The dead zone of the figure is play, slack or a flat of the built "
+            "cable would lift off. The dead zone of the figure is backlash, slack or a flat of the built "
             "cam, not this law.",
             steps=steps,
             numbers={"power_of_fig8": (float(fit[1]), "1"), "curvature_number_of_fig8": (value, "1")},

@@ -1,4 +1,4 @@
-"""One instance of each part that sticks, strikes, or has play."""
+"""One instance of each part that sticks, strikes, or has backlash."""
 
 from __future__ import annotations
 

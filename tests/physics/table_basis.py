@@ -5,7 +5,7 @@ from __future__ import annotations
 from nlsdesign import components as c
 from tests.physics.table import Row
 
-_RUBBER, _PLAY = "test_rubber_laws.py::test_", "test_play_and_friction.py::test_"
+_RUBBER, _BACKLASH = "test_rubber_laws.py::test_", "test_backlash_and_friction.py::test_"
 _POWER, _SENSOR = "test_power_balance.py::test_", "../unit/test_sensors.py::test_"
 
 ROWS: tuple[Row, ...] = (
@@ -124,82 +124,85 @@ ROWS: tuple[Row, ...] = (
         c.Mass,
         "harmonic motion",
         ("simulation", "cos √(k/m)·t"),
-        _PLAY + "a_mass_on_a_spring_swings_at_its_frequency",
+        _BACKLASH + "a_mass_on_a_spring_swings_at_its_frequency",
     ),
     Row(
         c.Fixed,
         "action = reaction",
         ("signal of the wall", "−k·x"),
-        _PLAY + "a_mass_on_a_spring_swings_at_its_frequency",
+        _BACKLASH + "a_mass_on_a_spring_swings_at_its_frequency",
     ),
     Row(
         c.Inertia,
         "momentum and reduced inertia",
         ("simulation", "closed form"),
-        _PLAY + "two_wheels_on_a_spring_keep_their_momentum_and_swing_at_the_reduced_inertia",
+        _BACKLASH + "two_wheels_on_a_spring_keep_their_momentum_and_swing_at_the_reduced_inertia",
     ),
     Row(
         c.Backlash,
         "virtual work",
         ("torque", "slope of the stored energy"),
-        _PLAY + "torque_behind_a_backlash_is_the_slope_of_its_energy",
+        _BACKLASH + "torque_behind_a_backlash_is_the_slope_of_its_energy",
     ),
     Row(
         c.Backlash,
         "momentum",
         ("simulation of an impact", "common speed of two wheels that stay together"),
-        _PLAY + "what_meets_the_far_side_of_a_play_takes_it_along",
+        _BACKLASH + "what_meets_the_far_side_of_a_backlash_takes_it_along",
     ),
     Row(
         c.Slack,
         "rigid limit",
         ("smooth law", "max(e − s, 0)"),
-        _PLAY + "slack_shifts_the_law_of_what_is_behind",
+        _BACKLASH + "slack_shifts_the_law_of_what_is_behind",
     ),
     Row(
         c.Turned,
         "change of zero",
         ("wrapped law", "law at the turned angle"),
-        _PLAY + "a_turned_cam_is_the_cam_at_the_turned_angle",
+        _BACKLASH + "a_turned_cam_is_the_cam_at_the_turned_angle",
     ),
     Row(
         c.StretchyCable,
         "series of springs, rigid limit",
         ("Newton root", "1/(1/C + 1/k)"),
-        _PLAY + "a_stretchy_cable_is_a_spring_in_series",
+        _BACKLASH + "a_stretchy_cable_is_a_spring_in_series",
     ),
     Row(
         c.InextensibleCable,
         "free recovery",
         ("simulation while slack", "closed-form recovery"),
-        _PLAY + "a_slack_cable_meets_the_rubber_where_it_has_recovered_to",
+        _BACKLASH + "a_slack_cable_meets_the_rubber_where_it_has_recovered_to",
     ),
     Row(
         c.StribeckFriction,
         "dissipation, published form",
         ("law", "Gaussian fall by hand"),
-        _PLAY + "stribeck_lies_between_breakaway_and_sliding",
+        _BACKLASH + "stribeck_lies_between_breakaway_and_sliding",
     ),
     Row(
         c.QuadraticDrag,
         "slowing down",
         ("simulation", "ω₀/(1 + c·ω₀·t/J)"),
-        _PLAY + "drag_stops_a_wheel_as_one_over_one_plus_time",
+        _BACKLASH + "drag_stops_a_wheel_as_one_over_one_plus_time",
     ),
     Row(
-        c.TorqueRipple, "work over a turn", ("mean torque", "zero"), _PLAY + "ripple_does_no_work_over_a_turn"
+        c.TorqueRipple,
+        "work over a turn",
+        ("mean torque", "zero"),
+        _BACKLASH + "ripple_does_no_work_over_a_turn",
     ),
     Row(
         c.LoadFriction,
         "dissipation",
         ("law", "efficiency by hand"),
-        _PLAY + "load_friction_takes_its_share_of_the_load_and_only_takes",
+        _BACKLASH + "load_friction_takes_its_share_of_the_load_and_only_takes",
     ),
     Row(
         c.SlidingFillers,
         "independence of the rate",
         ("slow loop", "fast loop, area above zero"),
-        _PLAY + "sliding_fillers_do_not_know_the_rate_and_only_lose",
+        _BACKLASH + "sliding_fillers_do_not_know_the_rate_and_only_lose",
     ),
     Row(
         c.Encoder,

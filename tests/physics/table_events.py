@@ -1,4 +1,4 @@
-"""Two roads for each part that sticks, strikes, or has play."""
+"""Two roads for each part that sticks, strikes, or has backlash."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ ROWS: tuple[Row, ...] = (
     Row(RigidStop, "v⁺ = −e·v⁻", ("simulated impacts", "free fall between them"),
         _CONTACT + "test_a_bouncing_body_strikes_at_the_moments_of_free_fall"),
     Row(Backlash, "momentum and energy through the gap", ("simulation", "half sine of the reduced inertia"),
-        _CONTACT + "test_play_between_two_inertias"),
+        _CONTACT + "test_backlash_between_two_inertias"),
     Row(Slack, "free flight, then half a sine", ("simulation", "closed form"),
         _CONTACT + "test_a_loose_cable_catches_a_mass"),
 )  # fmt: skip

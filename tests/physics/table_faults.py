@@ -27,7 +27,7 @@ ROWS: tuple[Row, ...] = (
         _HERE + "an_eccentric_disc_reads_what_geometry_says",
     ),
     Row(
-        c.MisshapenCam,
+        c.CamWithProfileError,
         "virtual work",
         ("extension", "quadrature of scipy's B-spline of the lever arm"),
         _HERE + "extension_of_a_misshapen_cam_is_the_integral_of_its_lever_arm",

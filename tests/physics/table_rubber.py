@@ -17,7 +17,7 @@ ROWS: tuple[Row, ...] = (
         c.FlowingChains,
         "work = stored energy + loss",
         ("simulated law", "elastic part from a quadrature of the flow equation written in the true stress"),
-        "test_flowing_chains.py::test_work_is_stored_or_lost",
+        "test_finite_viscoelasticity.py::test_work_is_stored_or_lost",
     ),
     Row(
         c.Springpot,

@@ -43,7 +43,7 @@ def test_a_hidden_effect_is_named_and_the_gap_closes(
     assert value == pytest.approx(getattr(hidden, field), rel=0.05)
 
 
-def test_play_is_named_although_one_record_goes_another_way(tmp_path: Path) -> None:
+def test_backlash_is_named_although_one_record_goes_another_way(tmp_path: Path) -> None:
     """At 5 Hz the cam side of the arm coasts, and which stop it hits next hangs on a hair."""
     found = verdict_of(tmp_path, "arm", {"backlash": 1.0}, 77)
     assert names(found) == ["backlash"]

@@ -54,7 +54,7 @@ def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> 
     assert left < 0.5 * total_excess(before)
 
 
-def test_a_deck_that_declares_play_is_looked_at_coarsely(tmp_path: Path) -> None:
+def test_a_deck_that_declares_backlash_is_looked_at_coarsely(tmp_path: Path) -> None:
     """As when a deck that a diagnosis has written is diagnosed again: a body coasts, and nothing is new."""
     actuator = ACTUATORS["wrist"]
     write_set(tmp_path, actuator, make_records(actuator, {"backlash": 1.0}, 21, only=RECORDS))

@@ -12,13 +12,13 @@ from scipy.integrate import quad
 from scipy.interpolate import BSpline
 
 from nlsdesign.components import (
+    CamWithProfileError,
     DriveDelay,
     DrivePart,
     DriveSaturation,
     Eccentricity,
     GearedMotor,
     Inertia,
-    MisshapenCam,
     Spring,
     through,
     tie,
@@ -134,7 +134,7 @@ def test_a_disc_on_the_motor_turns_with_the_gear() -> None:
 
 def test_extension_of_a_misshapen_cam_is_the_integral_of_its_lever_arm() -> None:
     drawn, error = (0.016, 0.014, 0.013, 0.013, 0.014, 0.015), (0.0, 4e-4, 9e-4, -2e-4, 1e-4)
-    cam = MisshapenCam(lever_arm=drawn, last_angle=0.9, changeover=1e-6, error=error)
+    cam = CamWithProfileError(lever_arm=drawn, last_angle=0.9, changeover=1e-6, error=error)
     spring = tie(through(cam, cable=Spring(stiffness=1e3)), "wheel")
     model = flatten(assembly("a", wheel=Inertia(inertia=1.0), spring=spring))
 

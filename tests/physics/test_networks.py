@@ -44,7 +44,7 @@ NAMED: dict[str, tuple[Element, Callable[[complex], complex]]] = {
         lambda s: (E0 * E1 + s * ETA * (E0 + E1)) / (E1 + s * ETA),
     ),
     "Burgers": (
-        burgers(modulus=E0, flow=FLOW, late_modulus=E2, late_viscosity=ETA2),
+        burgers(modulus=E0, flow=FLOW, delayed_modulus=E2, delayed_viscosity=ETA2),
         lambda s: 1 / (1 / E0 + 1 / (s * FLOW) + 1 / (E2 + s * ETA2)),
     ),
     "generalised Maxwell": (

@@ -1,4 +1,4 @@
-"""Stops, play and slack with located contact, against closed forms and sums of energy.
+"""Stops, backlash and slack with located contact, against closed forms and sums of energy.
 
 Independent roads: free fall between impacts, half sines of contact, the exact speed after an impact on a
 Hunt–Crossley stop from its energy integral, momentum and energy of two inertias, and scipy phase by phase.
@@ -160,10 +160,10 @@ def test_rebound_from_an_elastic_stop(damping: float) -> None:
     assert -expected / speed == pytest.approx(1 - 2 * damping * speed / 3, abs=0.5 * (damping * speed) ** 2)
 
 
-# --- play between two inertias --------------------------------------------------------------------
+# --- backlash between two inertias ----------------------------------------------------------------
 
 
-def test_play_between_two_inertias() -> None:
+def test_backlash_between_two_inertias() -> None:
     """Free through the gap, then half a sine of the reduced inertia, then free with speeds exchanged."""
     one, other, stiffness, gap, speed = 1e-3, 2e-3, 50.0, 0.02, 0.8
     inside = (("spring", Spring(stiffness=stiffness, domain=ROTATION)),)
@@ -171,7 +171,7 @@ def test_play_between_two_inertias() -> None:
         "gear",
         motor=Inertia(inertia=one),
         load=Inertia(inertia=other),
-        play=tie(Backlash(gap=gap, members=inside), "motor", "load"),
+        backlash=tie(Backlash(gap=gap, members=inside), "motor", "load"),
     )
     run = simulate(flatten(made), np.linspace(0.0, 0.1, 11), start={"motor.speed": speed}, tolerance=1e-11)
     reduced = one * other / (one + other)
@@ -194,11 +194,11 @@ def test_play_between_two_inertias() -> None:
     after = (one - other) / (one + other) * speed
     assert run["motor.speed"][between] == pytest.approx(np.full(between.sum(), after), rel=1e-8)
     energy = one / 2 * run["motor.speed"] ** 2 + other / 2 * run["load.speed"] ** 2
-    energy += run["play.spring.torque"] ** 2 / (2 * stiffness)
+    energy += run["backlash.spring.torque"] ** 2 / (2 * stiffness)
     assert energy == pytest.approx(np.full(11, one / 2 * speed**2), rel=1e-8)
 
 
-def test_play_with_a_damper_balances_and_jumps_where_it_should() -> None:
+def test_backlash_with_a_damper_balances_and_jumps_where_it_should() -> None:
     stiffness, damping = 50.0, 0.01
     inside = (
         ("spring", Spring(stiffness=stiffness, domain=ROTATION)),
@@ -208,7 +208,7 @@ def test_play_with_a_damper_balances_and_jumps_where_it_should() -> None:
         "gear",
         motor=Inertia(inertia=J),
         load=Inertia(inertia=2 * J),
-        play=tie(Backlash(gap=0.02, members=inside), "motor", "load"),
+        backlash=tie(Backlash(gap=0.02, members=inside), "motor", "load"),
     )
     times = np.linspace(0.0, 0.5, 50_001)
     run = simulate(
@@ -219,7 +219,7 @@ def test_play_with_a_damper_balances_and_jumps_where_it_should() -> None:
     beyond = np.maximum(between - 0.01, 0.0) - np.maximum(-between - 0.01, 0.0)
     speed = run["motor.speed"] - run["load.speed"]
     torque = np.where(beyond != 0.0, stiffness * beyond + damping * speed, 0.0)
-    assert run["play.torque"] == pytest.approx(torque, abs=1e-9)
+    assert run["backlash.torque"] == pytest.approx(torque, abs=1e-9)
     work = cumulative_simpson(0.2 * np.sin(30 * times) * run["motor.speed"], x=times, initial=0.0)
     stored = J / 2 * run["motor.speed"] ** 2 + J * run["load.speed"] ** 2 + stiffness / 2 * beyond**2
     # The loss jumps with contact: the trapezoidal rule is as good as any there.
@@ -303,12 +303,12 @@ def test_smooth_friction_tends_to_the_sharp_one() -> None:
     assert min(rates) > 0.9, (errors, rates)
 
 
-@pytest.mark.parametrize("what", ["stop", "play"])
+@pytest.mark.parametrize("what", ["stop", "backlash"])
 def test_rounded_corners_tend_to_the_sharp_ones(what: str) -> None:
     """At second order in the width, ∫(softplus − plus) = π²/6·w², or better where entry and exit cancel."""
     stop = EndStop(lower=-1.0, upper=0.1, stiffness=4.0, damping=0.1)
-    play = Backlash(gap=0.2, members=(("spring", Spring(stiffness=4.0, domain=ROTATION)),))
-    made = assembly("a", wheel=Inertia(inertia=J), it=tie(stop if what == "stop" else play, "wheel"))
+    backlash = Backlash(gap=0.2, members=(("spring", Spring(stiffness=4.0, domain=ROTATION)),))
+    made = assembly("a", wheel=Inertia(inertia=J), it=tie(stop if what == "stop" else backlash, "wheel"))
     sharp = ending(made, {"wheel.speed": 0.9}, "wheel.angle")
     errors = [
         abs(ending(smoothed(made, {"it": w}), {"wheel.speed": 0.9}, "wheel.angle") - sharp)

@@ -2,8 +2,8 @@
 
 The bench turns the cam of a cam–rubber actuator by a servo, with the load side held fast, and records
 angle, current and force.  Its formulations are chosen to differ from those of a smooth symbolic model:
-friction, gear play and cable are set-valued laws advanced by impulses, hysteresis is a set of dry sliders,
-the step is fixed at 20 kHz.  Only numpy and the standard library are used.
+friction, gear backlash and cable are set-valued laws advanced by impulses, hysteresis is a set of dry
+sliders, the step is fixed at 20 kHz.  Only numpy and the standard library are used.
 
 >>> records = make_records(ACTUATORS["arm"], {"coulomb_friction": 1.0}, seed=3)
 """

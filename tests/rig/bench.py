@@ -1,4 +1,4 @@
-"""The bench: servo, motor side, cam side, friction and gear play, by non-smooth time stepping.
+"""The bench: servo, motor side, cam side, friction and gear backlash, by non-smooth time stepping.
 
     Jₘ dωₘ/dt = T I − b ωₘ + disturbance − ripple − friction − contact
     J_c dω_c/dt = contact − h(θ_c) F           I = clip(k_P (θ* − θₘ) + k_D (θ̇* − ωₘ), ±I_max)
@@ -10,7 +10,7 @@ finite freedom dynamics),
 
     ω⁺ = prox(ω_free) = sign(ω_free) max(|ω_free| − level Δt/J, 0)
 
-with the step Δt, so a stuck drive has exactly zero speed.  Without play both sides are one inertia.
+with the step Δt, so a stuck drive has exactly zero speed.  Without backlash both sides are one inertia.
 Positions follow with the new speed (leapfrog).
 """
 
@@ -102,7 +102,7 @@ def _prox(speed: float, threshold: float) -> float:
     return 0.0
 
 
-def _gear_play(drive: Drivetrain, gap: float) -> Callable[..., tuple[float, float]]:
+def _gear_backlash(drive: Drivetrain, gap: float) -> Callable[..., tuple[float, float]]:
     """Step of the speeds of motor side and cam side with a gap between stops at ±gap/2, perfectly plastic.
 
     First free flight; where that would pass a stop, both sides take the speed difference `closing` that ends
@@ -144,7 +144,7 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
     delta, lever = _cam_tables(built.cam, hidden.profile_error)
     pull = pull_of(built.rubber, hidden, STEP)
     level = _friction_level(hidden)
-    play = _gear_play(drive, hidden.gap) if hidden.gap else None
+    backlash = _gear_backlash(drive, hidden.gap) if hidden.gap else None
     ripple, order, phase = hidden.ripple, hidden.ripple_order, hidden.ripple_phase
     act, pass_on, drag, per_grid = acting_current(hidden), capstan(hidden), hidden.drag, 1.0 / CAM_GRID
     motor = cam = speed = cam_speed = friction = 0.0
@@ -173,8 +173,8 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
             push -= ripple * sin(order * motor + phase)
         if level is not None:
             friction = STEP * level(speed, motor, load)
-        if play is not None:
-            speed, cam_speed = play(speed, cam_speed, motor - cam, push, load, friction)
+        if backlash is not None:
+            speed, cam_speed = backlash(speed, cam_speed, motor - cam, push, load, friction)
             motor += STEP * speed
             cam += STEP * cam_speed
         else:

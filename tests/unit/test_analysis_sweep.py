@@ -111,6 +111,7 @@ def test_columns_are_found_by_name(chart: Chart) -> None:
 
 def test_a_chart_prints_and_is_written_with_units(chart: Chart, tmp_path: Path) -> None:
     assert str(chart).splitlines()[0].split("  ")[0].strip() == "motor.angle [rad]"
+    assert "torque [N·m]" in str(chart).splitlines()[0]
     assert len(str(chart).splitlines()) == 1 + len(ANGLES)
     file = tmp_path / "chart.csv"
     chart.write_csv(file)

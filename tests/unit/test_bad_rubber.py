@@ -52,7 +52,8 @@ OUT_OF_RANGE: dict[str, tuple[Callable[[], Element], str]] = {
     "viscosity of zero in series": (lambda: maxwell(modulus=1e6, viscosity=0.0), "viscosity = 0 Pa"),
     "viscosity of zero in parallel": (lambda: kelvin_voigt(modulus=1e6, viscosity=0.0), "viscosity = 0 Pa"),
     "flow without viscosity": (
-        lambda: burgers(modulus=1e6, flow=0.0, late_modulus=1e6, late_viscosity=1e3), "viscosity = 0 Pa",
+        lambda: burgers(modulus=1e6, flow=0.0, delayed_modulus=1e6, delayed_viscosity=1e3),
+        "viscosity = 0 Pa",
     ),
     "relaxation time of zero": (
         lambda: generalised_maxwell(1e6, moduli=(1e5,), times=(0.0,)), "viscosity = 0 Pa",

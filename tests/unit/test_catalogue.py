@@ -126,7 +126,7 @@ HAVE: dict[str, tuple[Assembly, tuple[str, ...]]] = {
         ("backlash",),
     ),
     "backlash inside": (
-        turned(Turned(offset=0.1, members=(("play", Backlash(gap=0.01, members=SPRING)),))),
+        turned(Turned(offset=0.1, members=(("backlash", Backlash(gap=0.01, members=SPRING)),))),
         ("backlash",),
     ),
     "slack, sharp": (drive(inside=Slack(length=1e-3, members=INSIDE)), ("cable_slack",)),

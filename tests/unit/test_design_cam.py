@@ -54,7 +54,7 @@ def test_nothing_else_is_touched(found: CamDesign) -> None:
     before, after = actuator(CONCAVE).quantities(), found.actuator.quantities()
     moved = {name for name in before if before[name].value != after[name].value}
     assert moved == {"spring.pretension", "spring.cam.lever_arm", "spring.cam.last_angle"}
-    assert after["spring.pretension"].source == "designed for ExponentialTorque, 5 N*m"
+    assert after["spring.pretension"].source == "designed for ExponentialTorque, 5 N·m"
     with pytest.raises(FrozenInstanceError):
         found.predicted_rms = 0.0  # type: ignore[misc]
 
@@ -67,7 +67,7 @@ def test_same_question_same_answer(found: CamDesign) -> None:
 
 def test_print_shows_numbers_limits_and_error(found: CamDesign) -> None:
     text = str(found)
-    assert f"{1e3 * found.rms:.3g} mN*m rms" in text
+    assert f"{1e3 * found.rms:.3g} mN·m rms" in text
     assert "spring.pretension" in text
     assert "MaximumStrain: strain of spring.rubber 1 <= 1  ACTIVE" in text
     assert "MaximumCamRadius: cam radius 18.72 mm <= 20 mm\n" in text

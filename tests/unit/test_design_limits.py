@@ -63,10 +63,10 @@ BOUNDED = [
     (MaximumStrain(0.8), "strain of spring.rubber <= 0.8"),
     (MaximumStress(quantity(5.17, "MPa"), safety_factor=2.0), "stress of spring.rubber <= 2.585 MPa"),
     (MaximumCableTension(150.0), "cable tension <= 150 N"),
-    (PositiveStiffness(0.5), "tangent stiffness >= 0.5 N*m/rad"),
-    (MaximumTorqueError(quantity(30.0, "mN*m")), "rms torque error <= 30 mN*m"),
+    (PositiveStiffness(0.5), "tangent stiffness >= 0.5 N·m/rad"),
+    (MaximumTorqueError(quantity(30.0, "mN·m")), "rms torque error <= 30 mN·m"),
     (PretensionRange(1e-3, 5e-3), "spring.pretension >= 1 mm"),
-    (AreaRange(80e-6, 200e-6), "spring.rubber.area >= 80 mm^2"),
+    (AreaRange(80e-6, 200e-6), "spring.rubber.area >= 80 mm²"),
     (RestLengthRange(10e-3, 30e-3), "spring.rubber.rest_length >= 10 mm"),
     (AnchorDistance(20e-3, 30e-3), "spring.cam.anchor_distance >= 20 mm"),
 ]

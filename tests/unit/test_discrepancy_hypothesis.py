@@ -170,7 +170,7 @@ def test_records_are_of_another_rig_if_far_numbers_explain_all_that_no_effect_do
     decides, words = asked(base, base)
     assert decides
     assert "explains 100 % of the excess" in words
-    assert "spring.stiffness is 5.97 N*m/rad, 6 declared spreads away" in words
+    assert "spring.stiffness is 5.97 N·m/rad, 6 declared spreads away" in words
 
 
 def test_numbers_at_their_ends_are_mentioned_where_they_do_not_decide() -> None:

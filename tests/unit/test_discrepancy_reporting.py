@@ -78,6 +78,7 @@ def test_a_single_frequency_in_all_records_is_called_periodic() -> None:
     assert found.size == pytest.approx(np.sqrt(0.5), rel=0.05)
     assert found.floor == pytest.approx(SIGMA)
     assert (found.block, found.quantity, found.unit) == ("motor", "motor.unbalanced", "N*m")
+    assert f"and is {found.size:.3g} N·m rms, the noise floor {found.floor:.3g} N·m." in found.words()
 
 
 def test_the_same_course_over_time_in_all_records_is_called_a_drift() -> None:

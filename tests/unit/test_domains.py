@@ -145,9 +145,9 @@ def test_a_deck_tells_the_reading_by_the_numbers_that_are_there() -> None:
 
 
 def test_numbers_of_two_readings_are_refused_with_both_named() -> None:
-    inner = table("play.s", "Spring", stiffness=number(3.4, "N*m/rad"))
+    inner = table("backlash.s", "Spring", stiffness=number(3.4, "N*m/rad"))
     both = {"width": number(1e-3, "rad"), "inertia": number(1e-4, "kg*m^2")}
-    text = table("play", "Backlash", between="['wheel']", gap=number(0.01, "rad"), **both) + inner
+    text = table("backlash", "Backlash", between="['wheel']", gap=number(0.01, "rad"), **both) + inner
     (problem,) = deck_problems(deck(WHEEL + text))
     assert "width (Rounded); or inertia and contact_time (Inertial), not inertia and width" in str(problem)
 

@@ -59,7 +59,7 @@ def gear() -> FlatModel:
             "gear",
             motor=Inertia(inertia=1e-3),
             load=Inertia(inertia=2e-3),
-            play=tie(Backlash(gap=0.02, members=inside), "motor", "load"),
+            backlash=tie(Backlash(gap=0.02, members=inside), "motor", "load"),
             rub=tie(CoulombFriction(sliding_effort=0.03), "motor"),
         )
     )

@@ -139,7 +139,7 @@ def test_a_bare_number_does_not_keep_the_citation_of_the_old_one() -> None:
     assert changed.quantities()[name].source.startswith(told)
     assert flatten(changed).variable(name).source.startswith(told)
     late = flatten(declared).with_values({name: 2e-4}).variable(name)
-    assert late.source.startswith("not stated; changed from 0.0001 m^2: Austin, Schepelmann, Geyer")
+    assert late.source.startswith("not stated; changed from 0.0001 m²: Austin, Schepelmann, Geyer")
     same = flatten(declared).with_values({name: 1e-4}).variable(name)
     assert same == flatten(declared).variable(name)
     row = declared.with_values({"spring.rubber.stiff.modulus[2]": 0.6e6}).quantities()
@@ -301,6 +301,16 @@ def test_variable_by_name() -> None:
     assert model.variable("spring.torque").unit == "N*m"
     with pytest.raises(UnknownNameError):
         model.variable("spring.torqe")
+
+
+def test_units_are_typeset_where_people_read_them() -> None:
+    model = flatten(bench(), outputs=["spring.torque"])
+    text = str(model)
+    assert "N·m·s/rad" in text
+    assert "*" not in text
+    assert "spring.torque [N·m]" in model._repr_html_()
+    with pytest.raises(ValueRangeError, match=r"bearing.damping = -1 N·m·s/rad: must lie in .* N·m·s/rad"):
+        model.with_values({"bearing.damping": -1.0})
 
 
 # --- tables ---------------------------------------------------------------------------------------

@@ -274,7 +274,7 @@ def test_nothing_moves_below_the_breakaway_torque(actuator: Actuator) -> None:
     assert np.all(history.motor_angle[:breaks] == 0.0)
 
 
-def test_play_stays_within_its_stops_and_both_are_used(actuator: Actuator) -> None:
+def test_backlash_stays_within_its_stops_and_both_are_used(actuator: Actuator) -> None:
     gap = 0.05
     history = run(actuator, swing(25.0, 1.0, 2.0), gap=gap)
     lead = history.motor_angle - history.cam_angle
@@ -283,7 +283,7 @@ def test_play_stays_within_its_stops_and_both_are_used(actuator: Actuator) -> No
         assert np.mean(np.abs(lead - stop * gap) < 1e-9) > 0.1
 
 
-def test_play_of_no_width_is_a_rigid_gear(actuator: Actuator) -> None:
+def test_backlash_of_no_width_is_a_rigid_gear(actuator: Actuator) -> None:
     command = swing(25.0, 2.0, 1.0)
     level = 0.1 * scale_of(actuator).torque
     rigid, tight = run(actuator, command, friction=level), run(actuator, command, friction=level, gap=1e-9)

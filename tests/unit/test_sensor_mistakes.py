@@ -44,8 +44,8 @@ def bench(**sensors: Sensor) -> Assembly:
 
 WRONG = {
     "force of an angle": (ForceSensor(of="motor.angle"), r"'a' of 'motor.angle'.*reads N.*is in rad"),
-    "force of a torque": (ForceSensor(of="spring.torque"), r"reads N, 'spring.torque' is in N\*m"),
-    "torque of an angle": (TorqueSensor(of="motor.angle"), r"reads N\*m.*spring.torque"),
+    "force of a torque": (ForceSensor(of="spring.torque"), r"reads N, 'spring.torque' is in N·m"),
+    "torque of an angle": (TorqueSensor(of="motor.angle"), r"reads N·m.*spring.torque"),
     "angle of a torque": (Encoder(of="spring.torque", quantum=1e-3), r"reads rad.*motor.angle"),
     "current of a speed": (CurrentSensor(of="motor.speed"), r"reads A.*motor.current"),
     "speed of a speed": (

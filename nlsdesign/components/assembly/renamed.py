@@ -17,6 +17,7 @@ COMPONENTS: dict[str, str] = {
     "FixedPoint": 'Fixed with domain=TRANSLATION; in a deck with domain = "translation"',
     "InertialBacklash": "Backlash with contact=Inertial(inertia=...); in a deck with inertia",
     "LooseCable": "Slack, which is sharp unless it has a width",
+    "MisshapenCam": "CamWithProfileError",
     "Play": "Backlash, which is sharp unless it has a width or an inertia",
     "RoundedEndStop": "EndStop with contact=Rounded(width=...); in a deck with width",
     "SampledEncoder": "SampleAndHold of the angle, and an Encoder of its reading",

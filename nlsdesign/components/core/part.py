@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from ...errors import ArrangementError, UnitError, unknown_name
-from ...quantity import Quantity, same_dimension
+from ...quantity import Quantity, same_dimension, typeset_unit
 from .domain import Domain
 from .part_numbers import ParameterInfo as ParameterInfo
 from .part_numbers import Reading, Template, domain_by_units, readings, templates
@@ -156,7 +156,9 @@ def _reading(part: Part, name: str, kinds: tuple[type[Reading], ...]) -> Reading
 
 
 def _short(given: Quantity) -> str:
-    return str(given) if len(given.values) <= 4 else f"<{len(given.values)} numbers in {given.unit}>"
+    if len(given.values) <= 4:
+        return str(given)
+    return f"<{len(given.values)} numbers in {typeset_unit(given.unit) or '1'}>"
 
 
 def check_names(owner: str, names: Sequence[str], taken: Collection[str] = ()) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeAlias
 
 from ...errors import ArrangementError, UnitError, ValueRangeError
-from ...quantity import Quantity, parse_unit, same_dimension
+from ...quantity import Quantity, parse_unit, same_dimension, with_unit
 from .domain import Domain
 
 Given: TypeAlias = Quantity | float | tuple[float, ...] | list[float]
@@ -79,7 +79,8 @@ class ParameterInfo:
             if not self.minimum <= value <= self.maximum:
                 raise ValueRangeError(
                     f"{name} = {result}",
-                    f"{self.description} must lie in [{self.minimum:g}, {self.maximum:g}] {self.unit}",
+                    f"{self.description} must lie in "
+                    + with_unit(f"[{self.minimum:g}, {self.maximum:g}]", self.unit),
                     next_step=self._slip(result, value),
                 )
         return result
@@ -92,7 +93,7 @@ class ParameterInfo:
             except UnitError:
                 continue
             if same_dimension(unit, self.unit) and self.minimum <= number * factor <= self.maximum:
-                return f"was '{unit}' meant? {number:g} {unit} is in the range"
+                return f"was '{unit}' meant? {with_unit(f'{number:g}', unit)} is in the range"
         return None
 
 

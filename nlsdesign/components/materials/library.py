@@ -10,7 +10,7 @@ from typing import Any
 from ...deck import NUMBER_FIELDS, Deck, read_deck
 from ...errors import DeckError, nearest, unknown_name
 from ...locations import folder
-from ...quantity import Quantity, same_dimension
+from ...quantity import Quantity, same_dimension, with_unit
 
 EVIDENCE = ("measured curve", "data sheet", "range")
 """Grades of evidence, best first."""
@@ -64,12 +64,11 @@ class Property:
     def _text(self, quantity: Quantity) -> str:
         shown = quantity.shown
         numbers = [f"{v:.4g}" for v in (shown if isinstance(shown, tuple) else (shown,))]
-        unit = "" if quantity.unit == "1" else f" {quantity.unit}"
         if self.evidence == "range":
-            return " to ".join(numbers) + unit
+            return with_unit(" to ".join(numbers), quantity.unit)
         if len(numbers) > _LONGEST_ROW:
-            return f"{len(numbers)} values from {numbers[0]} to {numbers[-1]}{unit}"
-        return ", ".join(numbers) + unit
+            return with_unit(f"{len(numbers)} values from {numbers[0]} to {numbers[-1]}", quantity.unit)
+        return with_unit(", ".join(numbers), quantity.unit)
 
 
 @dataclass(frozen=True)

@@ -81,11 +81,11 @@ def standard_linear_solid(equilibrium: Element | Number, *, modulus: Number, vis
     return parallel(stiff=_law(equilibrium), relaxing=maxwell(modulus=modulus, viscosity=viscosity))
 
 
-def burgers(*, modulus: Number, flow: Number, late_modulus: Number, late_viscosity: Number) -> Series:
-    """Maxwell and Kelvin–Voigt in series: 1/E* = 1/E + 1/(s·η_f) + 1/(E_l + s·η_l).
+def burgers(*, modulus: Number, flow: Number, delayed_modulus: Number, delayed_viscosity: Number) -> Series:
+    """Maxwell and Kelvin–Voigt in series: 1/E* = 1/E + 1/(s·η_f) + 1/(E_d + s·η_d).
 
-    Creep under constant stress has a jump σ/E, a late part with the time constant η_l/E_l, and a flow σ·t/η_f
-    without end. Source: Burgers 1935.
+    Creep under constant stress has a jump σ/E, a delayed part with the time constant η_d/E_d, and a flow
+    σ·t/η_f without end. Source: Burgers 1935.
 
     Parameters
     ----------
@@ -93,17 +93,17 @@ def burgers(*, modulus: Number, flow: Number, late_modulus: Number, late_viscosi
         E in Pa.
     flow
         Viscosity η_f of the lasting flow in Pa·s.
-    late_modulus, late_viscosity
-        E_l in Pa and η_l in Pa·s of the part that comes back.
+    delayed_modulus, delayed_viscosity
+        E_d in Pa and η_d in Pa·s of the part that comes back.
 
     Examples
     --------
-    >>> made = burgers(modulus=1e6, flow=1e9, late_modulus=2e6, late_viscosity=1e5)
+    >>> made = burgers(modulus=1e6, flow=1e9, delayed_modulus=2e6, delayed_viscosity=1e5)
     >>> [name for name, _ in made.members]
-    ['spring', 'flow', 'late']
+    ['spring', 'flow', 'delayed']
     """
-    late = kelvin_voigt(modulus=late_modulus, viscosity=late_viscosity)
-    return series(spring=_elastic(modulus), flow=_viscous(flow), late=late)
+    delayed = kelvin_voigt(modulus=delayed_modulus, viscosity=delayed_viscosity)
+    return series(spring=_elastic(modulus), flow=_viscous(flow), delayed=delayed)
 
 
 def generalised_maxwell(

@@ -36,7 +36,7 @@ class Shifting(Combination):
 
 @dataclass(frozen=True)
 class Inertial(Reading):
-    """Contact of backlash before a driven side with an inertia of its own, so that it coasts through the gap.
+    """Contact of backlash before a driven side with an inertia of its own, which flies through the gap.
 
     J·φ̈ = T − Σ(efforts at φ),  T = ⟨c·(p₊ + 2τ·ṗ₊)⟩ − ⟨c·(p₋ + 2τ·ṗ₋)⟩,  p± = ±(θ − φ) − g/2,  c = J/τ²
 
@@ -89,7 +89,7 @@ class Backlash(WithCorners, Shifting):
     φ = ⟨θ − g/2⟩ − ⟨−θ − g/2⟩. With a sharp contact, ⟨v⟩ = max(v, 0), for what acts between two inertias:
     inside the gap the two sides are free and contact is located in simulation; with a damper inside, the
     torque jumps on contact, and pulls for a moment before contact ends. With a rounded contact C∞, a dead
-    angle. With ``contact=Inertial(inertia=...)`` the driven side coasts through the gap. Source: Nordin
+    angle. With ``contact=Inertial(inertia=...)`` the driven side moves freely through the gap. Source: Nordin
     and Gutman 2002.
 
     Examples

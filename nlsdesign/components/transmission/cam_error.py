@@ -1,4 +1,4 @@
-"""A cam that was not cut as it was drawn."""
+"""A cam whose profile deviates from its drawing."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .cam import TwoSidedCam
 
 
 @dataclass(frozen=True, kw_only=True)
-class MisshapenCam(TwoSidedCam):
+class CamWithProfileError(TwoSidedCam):
     """Two-sided cam with an error of its contour: h(θ) = (H(q) + E(q))·dq/dθ, δ(θ) = ∫₀^q (H + E).
 
-    E is a uniform cubic B-spline with few control values on [0, ``last_angle``], so the error is smooth, the
-    same on both sides, and h ≡ dδ/dθ holds with it: lever arm and extension are wrong together. Beyond the
-    contour's end E stays what it was there. Valid while H + E > 0. Source: virtual work, as for the cam.
+    E is a uniform cubic B-spline on [0, ``last_angle``], so the error is smooth, the same on both sides, and
+    h ≡ dδ/dθ holds with it: lever arm and extension are wrong together. Beyond the contour's end E stays what
+    it was there. Valid while H + E > 0. Source: virtual work, as for the cam.
 
     Raises
     ------

@@ -45,6 +45,6 @@ def shown_values(model: FlatModel, record: Record, signal: str) -> Array:
     symbol = ca.SX.sym("reading")
     behind = ca.Function("behind", [symbol], [reading.inferred(symbol, numbers)])
     shown: Array = behind.map(len(values))(values[None, :]).full().ravel()
-    late = sum(model.values[name] for name in reading.delays)
+    delay = sum(model.values[name] for name in reading.delays)
     time = record.trace.time
-    return np.interp(time + late, time, shown) if late else shown
+    return np.interp(time + delay, time, shown) if delay else shown

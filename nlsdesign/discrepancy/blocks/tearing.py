@@ -98,8 +98,8 @@ def _reading_block(model: FlatModel, effort: _Measured, given: Sequence[_Measure
     s, inputs = model.symbols(), [v.name for v in model.inputs]
     led = {name for each in given for name in each.given}
     own = ca.vertcat(*[s.derivative[i] for i, v in enumerate(model.states) if v.name not in led])
-    cuts = {v.name for v in model.signals} & set(inputs)
-    used = [m for m in given if m.shown not in cuts or depends(own, s.input[inputs.index(m.shown)])]
+    torn = {v.name for v in model.signals} & set(inputs)
+    used = [m for m in given if m.shown not in torn or depends(own, s.input[inputs.index(m.shown)])]
     signal = effort.reading.signal
     place = next(i for i, v in enumerate(model.signals) if v.name == signal)
     tearing = _Tearing(model, s, used, signal)

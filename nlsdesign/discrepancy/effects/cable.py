@@ -1,4 +1,4 @@
-"""Effects of cam and cable: compliance, slack, friction on a guide, a turned cam, a cam cut wrongly."""
+"""Effects of cam and cable: compliance, slack, friction on a guide, cam turned or with a profile error."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from ...components import (
     Assembly,
+    CamWithProfileError,
     CapstanFriction,
     Element,
     InextensibleCable,
-    MisshapenCam,
     PullOnly,
     Slack,
     Specimen,
@@ -116,9 +116,9 @@ def _contours(assembly: Assembly) -> list[str]:
     return [path for path, part in assembly.walk() if isinstance(part, TwoSidedCam)]
 
 
-def _misshapen(assembly: Assembly, path: str) -> Iterator[Edit]:
+def _with_profile_error(assembly: Assembly, path: str) -> Iterator[Edit]:
     error = Quantity((0.0,) * _CONTROL_VALUES, "m", SOURCE)
-    cam = MisshapenCam(**numbers_of(assembly[path]), error=error)
+    cam = CamWithProfileError(**numbers_of(assembly[path]), error=error)
     of = f"{path}.lever_arm_now"
     items = range(1, _CONTROL_VALUES + 1)
     unknowns = tuple(Unknown(f"{path}.error[{i}]", (0.0,), -0.5, 0.5, of) for i in items)
@@ -172,12 +172,12 @@ cam_angle_offset = Effect(
 )
 cam_profile_error = Effect(
     "cam_profile_error",
-    "A cam that was not cut as it was drawn; pulleys have no profile.",
+    "A cam whose profile deviates from its drawing; pulleys have no profile.",
     190,
     (
         Form(
             _contours,
-            _misshapen,
+            _with_profile_error,
             "force and torque over the angle that are off together, at any speed and on both sides alike",
             "virtual work",
             "profile error",

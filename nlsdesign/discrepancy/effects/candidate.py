@@ -22,7 +22,7 @@ class Unknown:
     name
         Full name in the edited assembly.
     starts
-        Where fits begin; several where the cost has several valleys.
+        Where fits begin; several where the cost has several minima.
     lower, upper
         Bounds. Where both are positive the number is fitted on a logarithmic scale.
     of

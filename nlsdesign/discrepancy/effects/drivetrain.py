@@ -60,14 +60,14 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     gap = number(0.01, "rad")
     behind = Inertial(inertia=number(0.1 * whole.number, "kg*m^2"))
     inertial = wrapping(Backlash, gap=gap, contact=behind)
-    edited = wrapped(assembly, name, "behind_play", inertial).with_values({f"{driver}.inertia": own})
+    edited = wrapped(assembly, name, "behind_backlash", inertial).with_values({f"{driver}.inertia": own})
     unknowns = (
         Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),
         Unknown(f"{name}.inertia", (0.1 * whole.number,), 1e-3 * whole.number, whole.number),
     )
     # In slow motion the inertia behind the backlash hardly shows.
     rounded = Rounded(width=number(5e-4, "rad"))
-    massless = wrapped(assembly, name, "behind_play", wrapping(Backlash, gap=gap, contact=rounded))
+    massless = wrapped(assembly, name, "behind_backlash", wrapping(Backlash, gap=gap, contact=rounded))
     yield Edit(edited, unknowns, {"strategy": Continuation(through=massless)})
 
 

@@ -1,9 +1,9 @@
 """Strategies of fitting: where the fits of an effect begin, and how a group of blocks is fitted from there.
 
 Most effects are fitted plainly, from the starts that their unknowns name. Backlash is not to be fitted from
-afar: its valley is narrow and, where a body flies freely between contacts, rough at the bottom. It brings a
-:class:`Continuation`: a simpler form of itself is fitted first. And wherever a model contains contact,
-declared or added, its blocks are fitted :class:`RobustOverFreeFlight`.
+far away: its minimum is narrow and, where a body flies freely between contacts, many others lie beside it.
+It brings a :class:`Continuation`: a simpler form of itself is fitted first. And wherever a model contains
+contact, declared or added, its blocks are fitted :class:`RobustOverFreeFlight`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EXPENSIVE_STEP = 100_000
 """Operations per step beyond which a further effect is skipped: its fit would take minutes."""
 MOST_STARTS = 8
 """Starts beyond which a further effect is skipped where a body flies freely, for the same reason."""
-WORTH_FITTING = 0.3
+LEAST_EXPLAINED = 0.3
 """Share of the excess over the noise that a continuation must explain for the whole effect to be fitted: a
 named effect explains at least half."""
 _HELD = 1e-4
@@ -286,7 +286,7 @@ class RobustOverFreeFlight(Smooth):
         if begun := strategy.beginnings(problem, _without(problem.fitted, quick)):
             costs = [fit(slow, start, evaluations=0, known={}).cost for start in begun]
             starts = [begun[costs.index(min(costs))]]
-            if not self._is_worth_fitting(problem.before, slow, min(costs)):
+            if not self._explains_enough(problem.before, slow, min(costs)):
                 limits = replace(limits, evaluations=0)
         least = limits.least
         best = best_fit(slow, starts, replace(limits, least=0.1 * least), known={})
@@ -310,11 +310,11 @@ class RobustOverFreeFlight(Smooth):
         whole = problem.coarse and problem.effects < 2
         return replace(problem.limits, evaluations=LONG_EVALUATIONS if whole else LONG_EVALUATIONS // 3)
 
-    def _is_worth_fitting(self, before: Mapping[Key, Tally], slow: Sequence[Evidence], cost: float) -> bool:
+    def _explains_enough(self, before: Mapping[Key, Tally], slow: Sequence[Evidence], cost: float) -> bool:
         """Tell whether what a continuation has begun takes enough off the excess over the noise."""
         tallies = [before[e.driven.block.name, e.record.name] for e in slow]
         now = 0.5 * sum(t.squares for t in tallies)
-        return now - cost >= WORTH_FITTING * (now - 0.5 * sum(t.rows for t in tallies))
+        return now - cost >= LEAST_EXPLAINED * (now - 0.5 * sum(t.rows for t in tallies))
 
 
 def refusal(problem: FitProblem) -> str:

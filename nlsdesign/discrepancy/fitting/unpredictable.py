@@ -1,6 +1,6 @@
 """Records that free flight makes unpredictable, however right the law.
 
-Behind backlash a body flies freely between contacts. A contact that comes a hair's breadth too late sends it
+Behind backlash a body flies freely between contacts. A contact that comes slightly too late sends it
 on another course, and the prediction of that record stays wrong. Slow motion does not depend on it. So the
 first look is at the slower records, and a quick record that is not predicted is judged by the others.
 """

@@ -35,8 +35,8 @@ _EXPERIMENTS: Mapping[frozenset[str], str] = {
         ),
         (
             ("cable_slack", "backlash"),
-            "hold the cam by hand and turn the motor: play turns without force on both sides, and with the "
-            "angle also measured behind the gear it is seen directly",
+            "hold the cam by hand and turn the motor: backlash turns without force on both sides, and with "
+            "the angle also measured behind the gear it is seen directly",
         ),
         (
             ("force_sensor_bias", "cable_slack"),

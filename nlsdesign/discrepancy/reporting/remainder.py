@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...identification.equation_error.evidence import STRIDE
 from ...identification.records.measurement import RecordSet
 from ...identification.statistics.filters import derivative
+from ...quantity import with_unit
 from ..selection.comparison import Judged
 from .sparse_formula import Formula, sparse_formula
 
@@ -58,7 +59,8 @@ class Remainder:
     def words(self) -> str:
         """Return what is known of it in sentences."""
         text = f"What is left is {self.kind}. It acts at `{self.block}` ({self.quantity}) "
-        text += f"and is {self.size:.3g} {self.unit} rms, the noise floor {self.floor:.3g} {self.unit}."
+        size, floor = (with_unit(f"{number:.3g}", self.unit) for number in (self.size, self.floor))
+        text += f"and is {size} rms, the noise floor {floor}."
         if self.formula is not None:
             text += f" Unnamed regression, no law: {self.formula.text} "
             text += f"explains {100 * self.formula.share:.0f} % of it on records that it was not fitted to."

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...quantity import typeset_unit
+
 Array = NDArray[np.float64]
 Part = tuple[Array, Mapping[str, Array], bool]
 
 _MOST_TERMS = 5
 _LEAST = 0.3
-"""Share of the remainder that a formula must explain on other records to be worth telling."""
+"""Share of the remainder that a formula must explain on other records to be reported."""
 _PER_TERM = 0.02
 """Share that a further term must add there."""
 
@@ -81,7 +83,7 @@ def sparse_formula(
     terms = {n: float(w / s) for n, w, s in zip(used, weights, size[kept], strict=True) if w}
     ordered = dict(sorted(terms.items(), key=lambda pair: -abs(pair[1]) * size[names.index(pair[0])]))
     text = " ".join(f"{value:+.4g}·{name}" for name, value in ordered.items()).lstrip("+")
-    return Formula(ordered, share, f"{text} (in {unit}, signals in SI)")
+    return Formula(ordered, share, f"{text} (in {typeset_unit(unit) or '1'}, signals in SI)")
 
 
 def _library(signals: Mapping[str, Array]) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
-from ...quantity import significant, to_resolution
+from ...quantity import significant, to_resolution, with_unit
 from ..selection.search import Skipped
 from .remainder import Remainder
 
@@ -187,7 +187,7 @@ class Verdict:
             )
         for effect in self.effects:
             numbers = ", ".join(
-                f"{name.rpartition('.')[2]} = {value:.4g} ± {error:.2g} {unit}"
+                f"{name.rpartition('.')[2]} = {with_unit(f'{value:.4g} ± {error:.2g}', unit)}"
                 for name, (value, unit, error) in effect.parameters.items()
             )
             text += f"`{effect.name}` at `{effect.location}`: {numbers}. "
@@ -264,9 +264,9 @@ class Verdict:
                 g.block,
                 g.record,
                 g.role,
-                f"{g.before:.3g} {g.unit}",
-                f"{g.after:.3g} {g.unit}",
-                f"{g.noise_floor:.3g} {g.unit}",
+                with_unit(f"{g.before:.3g}", g.unit),
+                with_unit(f"{g.after:.3g}", g.unit),
+                with_unit(f"{g.noise_floor:.3g}", g.unit),
             )
             for g in self.gaps
         ]

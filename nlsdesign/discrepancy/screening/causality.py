@@ -34,8 +34,8 @@ class LaggingForces(NamedTuple):
     findings
         One for each record over which a piece would give work.
     testable
-        Whether the records are quick and slow enough, side by side, to tell a late sensor by what it does at
-        each speed; if not, it cannot be told from channels that do not belong together.
+        Whether the records are quick and slow enough, side by side, to tell a delayed sensor by what it does
+        at each speed; if not, it cannot be told from channels that do not belong together.
     """
 
     findings: tuple[Finding, ...]

@@ -17,6 +17,7 @@ from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...model import flatten
 from ...model.readings import reading_of
+from ...quantity import with_unit
 from ..selection.comparison import Comparison
 from ..selection.criteria import DECLARED
 from ..selection.excess import excesses
@@ -120,7 +121,8 @@ def _far_numbers(free: Hypothesis, base: Hypothesis) -> list[str]:
             width = math.log1p(_spread(base, p.name))
             moved, error = math.log(value / p.centre), fit.standard_error(p.name) / value
             if abs(moved) - 2.0 * error > _FAR * width:
-                words = f"{p.name} is {value:.3g} {p.unit}, {abs(moved) / width:.0f} declared spreads away"
+                number = with_unit(f"{value:.3g}", p.unit)
+                words = f"{p.name} is {number}, {abs(moved) / width:.0f} declared spreads away"
                 far.append((abs(moved) / width, words))
     return [words for _, words in sorted(far, key=lambda pair: -pair[0])][:3]
 

@@ -146,12 +146,12 @@ class DrivenBlock:
             if drive is None:
                 continue
             signal = record.trace[drive.signal]
-            late = sum({**self._fixed, **values}[name] for name in drive.late_by)
+            delay = sum({**self._fixed, **values}[name] for name in drive.late_by)
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
                 signal = without_rounding(signal)
             inputs[i] = derivative(signal, record.step, order=drive.order)
             if drive.late_by:
-                inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], late)
+                inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
         at = self._digest(inputs.shape[1], [inputs, rates])
         return Samples(at, *self._ends(inputs, rates, at, record.step), record.step)
 
@@ -280,11 +280,11 @@ def _centred(mean: Array) -> Array:
     return result
 
 
-def _advanced(time: Array, signal: Array, late: float) -> tuple[Array, Array]:
+def _advanced(time: Array, signal: Array, delay: float) -> tuple[Array, Array]:
     """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
     slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
-    place = np.clip(np.searchsorted(time, time + late, side="right") - 1, 0, len(time) - 1)
-    return np.interp(time + late, time, signal), slopes[place]
+    place = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
+    return np.interp(time + delay, time, signal), slopes[place]
 
 
 def _late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
@@ -297,7 +297,7 @@ def _free_delay(drive: Drive, free: Sequence[str]) -> str:
     if len(names) > 1:
         raise MeasurementError(
             f"signal '{drive.signal}'",
-            f"is late by {' and by '.join(names)}, both free, which cannot be told apart",
+            f"is delayed by {' and by '.join(names)}, both free, which cannot be told apart",
             next_step="let one of them free, and give the other a number without a spread",
         )
     return names[0]

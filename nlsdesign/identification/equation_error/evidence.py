@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from ...errors import MeasurementError
+from ...quantity import with_unit
 from ...simulation import Trace
 from ..records.canonical_order import in_canonical_order
 from ..records.measurement import Record, RecordSet
@@ -262,9 +263,8 @@ class Bench:
         step = min(r.step for r in self.records.records)
         least = SLOW * self.noise.level[signal] * rate_noise_gain() / step
         unit = self.records.records[0].trace.units[signal]
-        return (
-            f"record a motion in which {signal} changes faster than {least:.3g} {unit}/s, for seconds on end"
-        )
+        rate = with_unit(f"{least:.3g}", f"{unit}/s")
+        return f"record a motion in which {signal} changes faster than {rate}, for seconds on end"
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None

@@ -26,7 +26,7 @@ _LEAST_INFORMATION = 1e-6
 """Information on the fitted scale that is taken for granted, so that a covariance is never infinite."""
 _OUTLYING_SLOPE = 1e3
 """Where a body flies freely, a slope that is steeper than this, in standard deviations of the noise, is that
-of a contact made or missed by a hair's breadth: it holds at this point and nowhere around it."""
+of a contact just made or just missed: it holds at this point and nowhere around it."""
 _HUBER = 3.0
 """Standard deviations beyond which, where a body flies freely, a residual counts as Huber says: noise stays
 within."""

@@ -77,14 +77,14 @@ def minimise(
         if gain < max(ENOUGH, share * cost, least) * (1.0 if damping <= 1.0 else 1e-2):
             return Minimum(x, cost, True)
         try:
-            trial, trial_slope = rows(x + step)
+            new_residual, new_slope = rows(x + step)
         except ConvergenceError:
             damping *= 10.0
             continue
-        new = 0.5 * float(trial @ trial)
+        new = 0.5 * float(new_residual @ new_residual)
         if np.isfinite(new) and new < cost:
             good = (cost - new) / gain
-            x, residual, slope, cost = x + step, trial, trial_slope, new
+            x, residual, slope, cost = x + step, new_residual, new_slope, new
             damping = max(damping * (0.1 if good > 0.5 else 1.0 if good > 0.1 else 4.0), _LEAST_DAMPING)
         else:
             damping *= 10.0

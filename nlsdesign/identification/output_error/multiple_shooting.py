@@ -110,7 +110,7 @@ def fit_by_simulation(
     wiring
         Of measured signals to inputs and outputs; by name where ``None``.
     loss
-        :class:`Squares` by default; :class:`Huber` where some samples are wild.
+        :class:`Squares` by default; :class:`Huber` where some samples are outliers.
     weights
         What counts how much, among it what earlier fits have found; see :class:`Weights`.
 

@@ -75,12 +75,12 @@ def loop_of(extension: Array, force: Array, step: float, *, noise: float = 0.0) 
     work = float(parts.sum() - np.mean(pull[[0, -1]]) * (path[-1] - path[0]))
     # A force that comes late by τ takes τ·∫ (dF/dt) dδ from the work, to first order.
     per_second = float(np.sum(np.diff(pull) * steps)) / step
-    late = -work / per_second if work < 0.0 < per_second else 0.0
+    delay = -work / per_second if work < 0.0 < per_second else 0.0
     return Loop(
         work,
         work / max(float(np.abs(parts).sum()), 1e-300),
         noise * float(np.linalg.norm(steps)),
         0,
         last,
-        late,
+        delay,
     )

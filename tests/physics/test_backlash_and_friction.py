@@ -57,7 +57,7 @@ def torque(element: Element, angle: float, speed: float = 0.0) -> float:
     return on_shaft(element).evaluate([], [angle, speed])["e.torque"]
 
 
-# --- play -----------------------------------------------------------------------------------------
+# --- backlash -------------------------------------------------------------------------------------
 
 
 @given(st.floats(-0.3, 0.3))
@@ -68,23 +68,23 @@ def test_backlash_is_a_dead_zone_within_its_rounding(angle: float) -> None:
     assert abs(found - sharp) <= 3.4 * width * (2 * math.log(2.0) + 1.0)
 
 
-def test_what_meets_the_far_side_of_a_play_takes_it_along() -> None:
+def test_what_meets_the_far_side_of_a_backlash_takes_it_along() -> None:
     """Nothing touches for g/2 over the speed; then both turn with J₁·ω/(J₁ + J₂): a plastic impact."""
-    play = Backlash(
+    backlash = Backlash(
         members=(("s", Spring(stiffness=1e-9, domain=ROTATION)),), gap=0.1, contact=Inertial(inertia=2e-3)
     )
-    model = flatten(assembly("a", wheel=Inertia(inertia=6e-3), play=tie(play, "wheel")))
+    model = flatten(assembly("a", wheel=Inertia(inertia=6e-3), backlash=tie(backlash, "wheel")))
     run = simulate(model, np.linspace(0.0, 0.2, 401), start={"wheel.speed": 2.0})
     early = run.time < 0.05 / 2.0 - 5e-3
-    assert np.allclose(run["play.inner_speed"][early], 0.0, atol=1e-6)
-    for name in ("wheel.speed", "play.inner_speed"):
+    assert np.allclose(run["backlash.inner_speed"][early], 0.0, atol=1e-6)
+    for name in ("wheel.speed", "backlash.inner_speed"):
         assert run[name][-1] == pytest.approx(2.0 * 6.0 / 8.0, rel=1e-3)
-    assert run["wheel.angle"][-1] - run["play.inner_angle"][-1] == pytest.approx(0.05, abs=1e-3)
+    assert run["wheel.angle"][-1] - run["backlash.inner_angle"][-1] == pytest.approx(0.05, abs=1e-3)
 
 
-def test_a_load_lags_by_half_the_gap_behind_a_play() -> None:
-    play = Backlash(members=(("s", SPRING),), gap=0.05, contact=Inertial(inertia=1e-3, contact_time=1e-4))
-    model = flatten(assembly("a", shaft=Driven(), e=tie(play, "shaft")), outputs=["e.torque"])
+def test_a_load_lags_by_half_the_gap_behind_a_backlash() -> None:
+    backlash = Backlash(members=(("s", SPRING),), gap=0.05, contact=Inertial(inertia=1e-3, contact_time=1e-4))
+    model = flatten(assembly("a", shaft=Driven(), e=tie(backlash, "shaft")), outputs=["e.torque"])
     # At rest the contact is a spring of stiffness J/τ², a hundred thousand N·m/rad, in series.
     lag = 0.025 + 3.4 * (0.3 - 0.025) / (3.4 + 1e5)
     angle = 0.3 - lag
@@ -93,8 +93,8 @@ def test_a_load_lags_by_half_the_gap_behind_a_play() -> None:
 
 def test_torque_behind_a_backlash_is_the_slope_of_its_energy() -> None:
     """½k·φ(θ)² is stored; its numerical derivative over θ must be the torque: virtual work."""
-    play = Backlash(members=(("s", SPRING),), gap=0.05, contact=Rounded(width=2e-3))
-    model, step = on_shaft(play), 1e-5
+    backlash = Backlash(members=(("s", SPRING),), gap=0.05, contact=Rounded(width=2e-3))
+    model, step = on_shaft(backlash), 1e-5
     for angle in np.linspace(-0.06, 0.06, 41):
         inner = [
             model.evaluate([], [angle + d, 0.0])["e.s.torque"] / 3.4
