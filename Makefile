@@ -5,6 +5,11 @@ BIN := .venv/bin
 STUDY := austin2015
 OUT := out/$(STUDY)
 WORKERS := 2
+# Kernels of OpenBLAS that x86-64 processors with AVX2 can run.
+KERNELS := Haswell Prescott Zen
+PLACES := nlsdesign/model nlsdesign/observer nlsdesign/discrepancy nlsdesign/export
+MUTANTS := 200
+SEED := 1
 UV := uv==0.13.8
 
 # One thread for each worker: two workers on two cores are slower, not faster, when BLAS starts four threads.
@@ -12,12 +17,15 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help study test lint bench environment lock clean distclean
+.PHONY: help study test thorough kernels mutation lint bench environment lock clean distclean
 
 help:
 	@echo 'make study      run the study of the published actuator; the report goes to $(OUT)/report.html'
 	@echo '                (another one: make study STUDY=name; another folder: make study OUT=folder)'
-	@echo 'make test       style, types and all tests'
+	@echo 'make test       style, types and all tests but the slow ones'
+	@echo 'make thorough   the slow tests too, before a release'
+	@echo 'make kernels    the tests under several kernels of linear algebra: same results on every processor'
+	@echo 'make mutation   break the package in places drawn by chance and list what no test notices'
 	@echo 'make lint       style and types only'
 	@echo 'make bench      the benchmarks: ratios against named peers'
 	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'
@@ -38,7 +46,20 @@ lint: environment
 	$(BIN)/mypy --strict nlsdesign models studies
 
 test: lint
+	$(BIN)/python -m pytest -n $(WORKERS) -m 'not slow'
+
+thorough: lint
 	$(BIN)/python -m pytest -n $(WORKERS)
+
+kernels: environment
+	@for kernel in $(KERNELS); do \
+		echo "OpenBLAS kernel $$kernel"; \
+		OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q -n $(WORKERS) -m 'not slow' || exit 1; \
+	done
+
+mutation: environment
+	$(BIN)/python -m pip install --quiet 'cosmic-ray>=8.4' 'coverage>=7.6'
+	$(BIN)/python -m tests.mutation $(PLACES) --count $(MUTANTS) --seed $(SEED)
 
 bench: environment
 	$(BIN)/python -m benchmarks

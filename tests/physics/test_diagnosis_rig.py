@@ -21,13 +21,22 @@ from tests.rig import ACTUATORS, truth
 
 SINGLE = [
     ("arm", "coulomb_friction", "dry_friction.sliding_effort", "friction"),
-    ("wrist", "second_relaxation", "second_relaxing.spring.modulus", "branch_modulus"),
-    ("wrist", "cable_compliance", "elastic.stiffness", "cable_stiffness"),
+    pytest.param(
+        *("wrist", "second_relaxation", "second_relaxing.spring.modulus", "branch_modulus"),
+        marks=pytest.mark.slow,
+    ),
+    pytest.param(
+        *("wrist", "cable_compliance", "elastic.stiffness", "cable_stiffness"), marks=pytest.mark.slow
+    ),
     ("arm", "force_sensor_delay", "force_sensor_delay.delay", "force_delay"),
 ]
 
 
-@pytest.mark.parametrize(("actuator", "effect", "number", "field"), SINGLE, ids=[row[1] for row in SINGLE])
+@pytest.mark.parametrize(
+    ("actuator", "effect", "number", "field"),
+    SINGLE,
+    ids=["coulomb_friction", "second_relaxation", "cable_compliance", "force_sensor_delay"],
+)
 def test_a_hidden_effect_is_named_and_the_gap_closes(
     tmp_path: Path, actuator: str, effect: str, number: str, field: str
 ) -> None:
@@ -43,6 +52,7 @@ def test_a_hidden_effect_is_named_and_the_gap_closes(
     assert value == pytest.approx(getattr(hidden, field), rel=0.05)
 
 
+@pytest.mark.slow
 def test_backlash_is_named_although_one_record_goes_another_way(tmp_path: Path) -> None:
     """At 5 Hz the cam side of the arm coasts, and which stop it hits next hangs on a hair."""
     found = verdict_of(tmp_path, "arm", {"backlash": 1.0}, 77)
@@ -55,6 +65,7 @@ def test_backlash_is_named_although_one_record_goes_another_way(tmp_path: Path) 
     assert gap == pytest.approx(hidden.gap, rel=0.15)
 
 
+@pytest.mark.slow
 def test_stiffening_rubber_is_not_taken_for_another_rig(tmp_path: Path) -> None:
     """All moduli let go would explain more of it, but one effect within declared numbers explains enough."""
     found = verdict_of(tmp_path, "arm", {"strain_stiffening": 1.0}, 109)
@@ -69,6 +80,7 @@ def test_nothing_is_invented_on_a_clean_set(tmp_path: Path) -> None:
     assert 0.7 < found.held_out_ratio < 1.2
 
 
+@pytest.mark.slow
 def test_what_no_catalogue_knows_is_not_named(tmp_path: Path) -> None:
     found = verdict_of(tmp_path, "arm", {"periodic_disturbance": 1.0}, 79)
     assert found.verdict == "unknown"
@@ -80,11 +92,11 @@ def test_what_no_catalogue_knows_is_not_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "expected", "reached"),
     [
-        ("p02", ["backlash"], 2.2),
-        ("p05", ["rate_independent_hysteresis"], 3.0),
+        pytest.param(*("p02", ["backlash"], 2.2), marks=pytest.mark.slow),
+        pytest.param(*("p05", ["rate_independent_hysteresis"], 3.0), marks=pytest.mark.slow),
         ("p06", ["force_sensor_delay"], 1.3),
         ("p07", [], 1.3),
-        ("p08", ["coulomb_friction", "second_relaxation"], 1.3),
+        pytest.param(*("p08", ["coulomb_friction", "second_relaxation"], 1.3), marks=pytest.mark.slow),
     ],
 )
 def test_practice_records_get_the_right_verdict(
