@@ -28,16 +28,23 @@ ROOMS = (
 
 DIALECT = frozenset(
     {
+        "astray",
         "bent",
         "crew",
         "dear",
         "few",
         "found",
         "gone",
+        "grain",
         "mine",
+        "play",
+        "rough",
         "said",
         "sketch",
+        "suspicion",
         "told",
+        "trial",
+        "valley",
         "wild",
         "word",
         "worth",
