@@ -33,6 +33,7 @@ from nlsdesign.discrepancy.effects import (
     coulomb_friction,
     second_relaxation,
 )
+from nlsdesign.discrepancy.selection.comparison import moved_numbers
 from nlsdesign.model import flatten
 
 
@@ -100,3 +101,12 @@ def test_a_strip_that_buckles_is_read_outside() -> None:
         flatten(strip(NeoHooke(shear_modulus=3e4))).evaluate([], [0.02, 0.0])["load_cell.reading"], abs=1e-6
     )
     assert cable_slack(found.assembly) == []
+
+
+def test_two_branches_of_one_law_keep_their_numbers_when_they_move() -> None:
+    """Both branches hold the very same numbers; inside a wrapper each keeps its own."""
+    (two,) = [c for c in second_relaxation(strip(NeoHooke(shear_modulus=3e4))) if len(c.unknowns) == 4]
+    (buckling,) = cable_slack(two.assembly)
+    moved = moved_numbers(two.assembly, buckling.assembly)
+    for unknown in two.unknowns:
+        assert moved[unknown.name] == unknown.name.replace("strip.", "strip.piece.")

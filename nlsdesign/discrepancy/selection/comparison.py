@@ -21,6 +21,7 @@ from ...identification.records.measurement import Record
 from ...identification.statistics.residuals import effective_size
 from ...model import Variable, flatten
 from ...processes import parallel_map
+from ...quantity import Quantity
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from ..fitting.unpredictable import Tally
@@ -299,12 +300,22 @@ def moved_numbers(before: Assembly, after: Assembly) -> dict[str, str]:
         Made from it by an edit.
     """
     old, new = before.quantities(), after.quantities()
+    gone = _by_identity({name: quantity for name, quantity in old.items() if name not in new})
+    come = _by_identity({name: quantity for name, quantity in new.items() if name not in old})
+    # One object may stand at several places, as where one law makes two branches: they keep their order.
+    moved: dict[str, str] = {}
+    for key, names in gone.items():
+        others = come.get(key, [])
+        if len(names) == len(others):
+            moved |= dict(zip(names, others, strict=True))
+    return moved
+
+
+def _by_identity(quantities: Mapping[str, Quantity]) -> dict[int, list[str]]:
     places: dict[int, list[str]] = {}
-    for name, quantity in new.items():
-        if name not in old:
-            places.setdefault(id(quantity), []).append(name)
-    moved = {name: places.get(id(quantity), []) for name, quantity in old.items() if name not in new}
-    return {name: names[0] for name, names in moved.items() if len(names) == 1}
+    for name, quantity in quantities.items():
+        places.setdefault(id(quantity), []).append(name)
+    return places
 
 
 def _with_unknowns(added: Sequence[Candidate], unknowns: Sequence[Unknown]) -> tuple[Candidate, ...]:
