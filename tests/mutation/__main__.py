@@ -5,7 +5,9 @@
 The first step runs the quick tests once with coverage, to know which tests reach which line; the second
 breaks one spot after the other in a copy of the project and runs those tests until one fails. What was tried
 stands in ``tried.jsonl`` and is not tried again, so a run can be stopped and goes on where it was. Survivors
-are listed at the end; each is to be killed by a test, or argued. Needs ``pip install .[mutation]``.
+are listed at the end, apart from those that no test reaches; each is to be killed by a test, or argued. All
+work is done on one core, so that no line is reached unseen, in another process. Needs
+``pip install .[mutation]``.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ LONGEST = 300.0
 
 
 def main() -> int:
-    """Run, and return the number of survivors."""
+    """Run, and return how many changes no test noticed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("places", nargs="+", help="files or folders of the package")
     parser.add_argument("--count", type=int, default=0, help="so many mutants, drawn by chance; 0: all")
@@ -40,6 +42,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/mutation"))
     parser.add_argument("--tests", nargs="*", default=["tests/unit", "tests/physics"])
     given = parser.parse_args()
+    _on_one_core()
     out = given.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     copy = _copied(out / "copy")
@@ -47,11 +50,17 @@ def main() -> int:
     mutants = [m for place in given.places for file in _files(place) for m in mutants_of(ROOT, file)]
     if given.count:
         mutants = random.Random(given.seed).sample(mutants, min(given.count, len(mutants)))
-    survivors = [m for m in mutants if _outcome(copy, out / "tried.jsonl", m, reach) == "survived"]
-    print(f"{len(mutants)} mutants, {len(survivors)} not noticed")
-    for mutant in survivors:
-        print(mutant)
-    return len(survivors)
+    outcomes = {m: _outcome(copy, out / "tried.jsonl", m, reach) for m in mutants}
+    missed = [(outcome, m) for m, outcome in outcomes.items() if outcome != "noticed"]
+    print(f"{len(mutants)} mutants, {len(missed)} not noticed")
+    for outcome, mutant in sorted(missed, key=lambda pair: (pair[0], pair[1].file, pair[1].line)):
+        print(f"{outcome}: {mutant}")
+    return len(missed)
+
+
+def _on_one_core() -> None:
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {random.choice(sorted(os.sched_getaffinity(0)))})
 
 
 def _copied(copy: Path) -> Path:
@@ -98,9 +107,10 @@ def _read_reach(copy: Path) -> dict[str, dict[int, list[str]]]:
     size: dict[str, int] = defaultdict(int)
     for file in data.measured_files():
         name = Path(file).relative_to(copy).as_posix()
-        lines[name] = {
-            line: [c for c in contexts if c] for line, contexts in data.contexts_by_lineno(file).items()
-        }
+        reached = data.contexts_by_lineno(file)
+        every = sorted({c for contexts in reached.values() for c in contexts if c})
+        # What runs at import, or in the set-up of tests, is seen by any test of the file.
+        lines[name] = {line: [c for c in contexts if c] or every for line, contexts in reached.items()}
         for contexts in lines[name].values():
             for context in contexts:
                 size[context] += 1
@@ -121,13 +131,15 @@ def _node(context: str, copy: Path) -> str:
 
 
 def _outcome(copy: Path, tried: Path, mutant: Mutant, reach: dict[str, dict[int, list[str]]]) -> str:
-    """Return ``noticed`` or ``survived``, from the file of what was tried where it stands there."""
+    """Return ``noticed``, ``survived`` or ``unreached``, from the file of what was tried if it is there."""
     known = [json.loads(line) for line in tried.read_text().splitlines()] if tried.exists() else []
     for each in known:
         if {k: each[k] for k in asdict(mutant)} == asdict(mutant):
             return str(each["outcome"])
-    tests = [n for c in reach.get(mutant.file, {}).get(mutant.line, []) if (n := _node(c, copy))]
-    outcome = _judged(copy, mutant, tests) if tests else "survived"
+    lines = reach.get(mutant.file, {})
+    contexts = [c for k in range(mutant.first, mutant.last + 1) for c in lines.get(k, [])]
+    tests = [n for c in dict.fromkeys(contexts) if (n := _node(c, copy))]
+    outcome = _judged(copy, mutant, tests) if tests else "unreached"
     print(f"{outcome}: {mutant}", flush=True)
     with tried.open("a", encoding="utf8") as stream:
         stream.write(json.dumps(asdict(mutant) | {"outcome": outcome, "tests": len(tests)}) + "\n")

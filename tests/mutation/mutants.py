@@ -42,12 +42,16 @@ class Mutant:
         Which of the places that it fits, counted from zero.
     line
         Line of the file.
+    first, last
+        Lines of the statement, or of the head of a block: a test that reaches one of them reaches the change.
     """
 
     file: str
     operator: str
     occurrence: int
     line: int
+    first: int
+    last: int
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line} {self.operator} #{self.occurrence}"
@@ -67,11 +71,17 @@ def mutants_of(root: Path, file: str) -> Iterator[Mutant]:
     from cosmic_ray.util import read_python_source
 
     tree = get_ast(read_python_source(root / file))
+    leaves = {
+        node.start_pos: node for node in ast_nodes(tree) if not hasattr(node, "children") and node.value
+    }
     for name, operator in _operators().items():
         occurrence = 0
         for node in ast_nodes(tree):
-            for (line, _), _ in operator.mutation_positions(node):
-                yield Mutant(file, name, occurrence, line)
+            for start, _ in operator.mutation_positions(node):
+                leaf = leaves[start]
+                if _does_something(leaf):
+                    whole = _statement(leaf)
+                    yield Mutant(file, name, occurrence, start[0], whole.start_pos[0], whole.end_pos[0])
                 occurrence += 1
 
 
@@ -117,6 +127,37 @@ def _operators() -> dict[str, Any]:
 
     provider = OperatorProvider()
     return {name: provider[name]() for name in OPERATORS} | {"SwapMinMax": SwapMinMax()}
+
+
+_SIGNATURE = ("parameters", "lambdef", "arglist", "trailer")
+"""Where a star marks arguments and multiplies nothing."""
+_BODIES = ("suite", "file_input", "simple_stmt", "if_stmt", "while_stmt", "for_stmt", "with_stmt")
+
+
+def _does_something(leaf: Any) -> bool:
+    """Tell whether a leaf matters at run time: not in annotations, nor as a mark of arguments."""
+    if leaf.value in ("*", "/") and leaf.parent.type in _SIGNATURE:
+        return False
+    if leaf.value == "TYPE_CHECKING":
+        return False
+    child, node = leaf, leaf.parent
+    while node is not None:
+        if node.type == "annassign" and child is node.children[1]:
+            return False
+        if node.type == "tfpdef" and child is node.children[-1]:
+            return False
+        if node.type == "funcdef" and child is node.annotation:
+            return False
+        child, node = node, node.parent
+    return True
+
+
+def _statement(leaf: Any) -> Any:
+    """Return the statement that holds a leaf, or the part of a compound one, without its body."""
+    node = leaf
+    while node.parent is not None and node.parent.type not in _BODIES:
+        node = node.parent
+    return node
 
 
 def _is_called(name: Any) -> bool:

@@ -51,6 +51,32 @@ def test_friction_in_proportion_to_the_angle_is_written_as_one_term() -> None:
     assert found.terms["sign([rate of q])·|[q]|"] == pytest.approx(0.2, rel=0.02)
 
 
+LAWS = {
+    "1": lambda q, v: np.ones_like(q),
+    "[q]": lambda q, v: q,
+    "|[q]|": lambda q, v: np.sqrt(q * q),
+    "[q]²": lambda q, v: q * q,
+    "[q]³": lambda q, v: q * q * q,
+    "sign([q])": lambda q, v: np.where(q > 0.0, 1.0, -1.0),
+    "sign([rate of q])": lambda q, v: np.where(v > 0.0, 1.0, -1.0),
+    "[rate of q]·|[rate of q]|": lambda q, v: np.where(v > 0.0, v * v, -v * v),
+    "sign([rate of q])·|[q]|": lambda q, v: np.where(v * q > 0.0, q, -q),
+    "[rate of q]·[q]": lambda q, v: q * v,
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_each_term_of_the_library_is_what_its_name_says(name: str) -> None:
+    """An error that is nothing but the term, twice over, in three records and in one that is held out."""
+    motions = [motion(seed) for seed in range(4)]
+    errors = [(2.0 * LAWS[name](q, v), {"q": q, "rate of q": v}, k < 3) for k, (q, v) in enumerate(motions)]
+    found = sparse_formula(errors, "N*m")
+    assert found is not None
+    assert found.terms == {name: pytest.approx(2.0)}
+    assert found.share == pytest.approx(1.0)
+    assert found.text == f"2·{name} (in N·m, signals in SI)"
+
+
 def test_no_formula_is_written_for_noise() -> None:
     assert sparse_formula(parts("noise"), "N") is None
 

@@ -81,6 +81,15 @@ def test_a_single_frequency_in_all_records_is_called_periodic() -> None:
     assert f"and is {found.size:.3g} N·m rms, the noise floor {found.floor:.3g} N·m." in found.words()
 
 
+def test_a_line_of_one_phase_is_written_as_a_wave_in_the_formula() -> None:
+    errors = [judged(r, 0.8 * np.sin(2 * np.pi * 7.0 * TIME) + noise(r)) for r in RECORDS.records]
+    found = remainder_of(errors, RECORDS, ["encoder.reading"])
+    assert found.kind.startswith("periodic in time at 7 Hz")
+    assert found.formula is not None
+    # The filter and the grid of frequencies take 2 %.
+    assert found.formula.terms == {"sin(2π·7·t)": pytest.approx(0.8, rel=0.03)}
+
+
 def test_the_same_course_over_time_in_all_records_is_called_a_drift() -> None:
     found = remainder("drift")
     assert found.kind.startswith("a drift")

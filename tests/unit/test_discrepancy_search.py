@@ -195,3 +195,16 @@ def test_the_block_that_lacks_most_is_worked_on_first() -> None:
     found = outcome(Table(table), effect("a"), effect("b"))
     assert names(found) == ["b", "a"]
     assert found.explained
+
+
+def test_what_only_all_samples_show_is_judged_on_all_samples() -> None:
+    """Of every tenth sample nothing stands out; all of them ask for the effect that leaves nothing."""
+    all_samples = Table({(): (1e5,), ("a",): (9e4,), ("b",): (10.0,)})
+
+    class Coarse(Table):
+        def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
+            return all_samples.hypothesis(hypothesis.added)
+
+    found = outcome(Coarse({(): (100.0,), ("a",): (50.0,), ("b",): (60.0,)}), effect("a"), effect("b"))
+    assert names(found) == ["b"]
+    assert found.steps[0].share_fit == pytest.approx(1.0, abs=1e-3)
