@@ -26,13 +26,13 @@ MODEL = assembly(
 )
 
 
-def cycle(frequency: float, late: float = LATE) -> Record:
+def cycle(frequency: float, late: float = LATE, size: float = SIZE) -> Record:
     """One whole cycle."""
     speed = 2.0 * math.pi * frequency
     time = np.linspace(0.0, 1.0 / frequency, 2001)
     signals = {
-        "grip.position": SIZE * np.sin(speed * time),
-        "cell.reading": STIFFNESS * SIZE * np.sin(speed * (time - late)),
+        "grip.position": size * np.sin(speed * time),
+        "cell.reading": STIFFNESS * size * np.sin(speed * (time - late)),
     }
     name = f"{frequency:g}Hz"
     return Record(name, Trace(time, signals, UNITS, name))
@@ -67,4 +67,5 @@ def test_a_delay_can_be_told_only_between_records_of_three_times_the_pace() -> N
     assert not lagging(cycle(2.0)).testable
     assert not lagging(cycle(2.0), cycle(5.8)).testable
     assert lagging(cycle(2.0), cycle(6.2)).testable
+    assert not lagging(cycle(2.0), cycle(4.0, size=0.2 * SIZE)).testable, "pace is no matter of size"
     assert not lagging(cycle(2.0, late=0.0), cycle(6.2, late=0.0)).testable, "nothing lags"

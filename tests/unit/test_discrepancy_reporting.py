@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from nlsdesign.components import Assembly, Dashpot, Encoder, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
+from nlsdesign.discrepancy.reporting.refit import refit
 from nlsdesign.discrepancy.reporting.remainder import Remainder, remainder_of
 from nlsdesign.discrepancy.reporting.window_refit import fitted_over_windows, window_gaps, wiring_of
 from nlsdesign.discrepancy.selection.comparison import Comparison, Judged
@@ -103,6 +104,29 @@ def test_a_curve_over_one_signal_is_said_to_be_bound_to_it() -> None:
     shares = dict(found.shapes)
     assert shares["encoder.reading"] > 0.9
     assert shares["motor.current"] < 0.05
+
+
+def ringing(record: Record) -> Array:
+    """Eight blows, each at a moment and of a sign of its own, that ring at 8 Hz and die away in 0.3 s."""
+    draw = np.random.default_rng(int(record.name[1]))
+    error = noise(record)
+    for blow in np.arange(8) * 1.45 + draw.uniform(0.0, 0.5, 8):
+        since = np.maximum(TIME - blow, 0.0)
+        error += draw.choice([-1.0, 1.0]) * np.exp(-since / 0.3) * np.sin(2 * np.pi * 8.0 * since)
+    return error
+
+
+@pytest.mark.parametrize("loud", [1.0, 30.0])
+def test_ringing_with_a_phase_of_its_own_is_called_a_resonance_however_loud_one_record_is(
+    loud: float,
+) -> None:
+    """In the last record there is nothing but noise, perhaps loud: each record counts alike."""
+    *ring, last = RECORDS.records
+    errors = [judged(r, ringing(r)) for r in ring] + [judged(last, loud * noise(last))]
+    found = remainder_of(errors, RECORDS, ["encoder.reading"])
+    kind, _, rest = found.kind.partition(" near ")
+    assert (kind, rest.partition(" Hz")[2]) == ("a resonance", ", with a phase of its own in every record")
+    assert float(rest.partition(" Hz")[0]) == pytest.approx(8.0, abs=0.5)
 
 
 def test_noise_has_no_shape() -> None:
@@ -198,6 +222,14 @@ def test_windows_find_the_stiffness_behind_a_free_swing_and_predict_the_held_out
     assert gaps[1].block == "encoder.reading over 0.5 s"
     # What is left comes from the speed at which windows begin, a derivative of noisy angles.
     assert gaps[1].before > 5.0 * gaps[1].after
+
+
+def test_the_strain_of_a_refitted_number_is_its_way_in_declared_spreads() -> None:
+    """A tenth more of what was declared up to a factor of 1.3: ln 1.1 of ln 1.3."""
+    (stiffness,) = refit(swing(), swings("fit", "held_out")).numbers
+    assert (stiffness.name, stiffness.declared) == ("spring.stiffness", STIFFNESS)
+    assert stiffness.fitted == pytest.approx(1.1 * STIFFNESS, rel=0.02)
+    assert stiffness.strain == pytest.approx(np.log(stiffness.fitted / STIFFNESS) / np.log(1.3), rel=0.01)
 
 
 def test_windows_of_held_out_records_are_not_fitted() -> None:

@@ -196,7 +196,7 @@ def test_a_further_effect_and_a_polish_have_fewer_evaluations(notebook: Notebook
     assert [(f["evaluations"], f["records"]) for f in notebook.fits] == [(2, ["a", "b", "c", "d"])]
 
 
-@pytest.mark.parametrize(("cost", "evaluations"), [(2200.0, 6), (2400.0, 0)])
+@pytest.mark.parametrize(("cost", "evaluations"), [(2249.0, 6), (2251.0, 0)])
 def test_what_a_continuation_begins_is_fitted_if_it_explains_enough(
     notebook: Notebook, cost: float, evaluations: int
 ) -> None:
@@ -206,6 +206,21 @@ def test_what_a_continuation_begins_is_fitted_if_it_explains_enough(
     looks, fits = notebook.fits[:2], notebook.fits[2:]
     assert [f["evaluations"] for f in looks] == [0, 0]
     assert [(f["start"], f["evaluations"]) for f in fits] == [(0.2, evaluations), (0.2, evaluations // 2)]
+
+
+def test_a_held_number_stands_at_a_multiple_within_its_bounds_and_the_others_where_they_ended() -> None:
+    gap, size = (*start(0.1), *start(0.3, "spring.size"))
+    fitted = Fit((gap, size), {"spring.gap": 2.0, "spring.size": 0.7}, np.eye(2), 1.0, {}, True)
+    held, free = strategies._held(fitted, "spring.gap", 1.2)
+    assert held.start == pytest.approx(2.4)
+    assert held.lower == pytest.approx(2.4, rel=0.01)
+    assert held.upper == pytest.approx(2.4, rel=0.01)
+    assert held.lower < held.start < held.upper
+    assert free == replace(size, start=0.7)
+    top, _ = strategies._held(fitted, "spring.gap", 7.0)
+    assert top.start == 10.0, "the upper bound"
+    bounded = Fit((replace(gap, lower=1.5), size), fitted.values, np.eye(2), 1.0, {}, True)
+    assert strategies._held(bounded, "spring.gap", 0.5)[0].start == 1.5, "the lower bound"
 
 
 def test_a_new_effect_may_leave_the_quickest_record_unpredicted() -> None:
