@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nlsdesign.components import Assembly, Dashpot, Encoder, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.reporting.advice import where_they_differ
 from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
 from nlsdesign.discrepancy.reporting.refit import refit
 from nlsdesign.discrepancy.reporting.remainder import Remainder, remainder_of
@@ -182,6 +183,26 @@ def test_the_course_is_that_of_the_held_out_record_with_the_largest_error() -> N
     assert np.all(balance.measured == 0.0)
     np.testing.assert_allclose(balance.before, -2.0)
     np.testing.assert_allclose(balance.after, -1.0)
+
+
+def apart(floors: float) -> str:
+    """Two hypotheses that agree on the first record and differ on the second, most so at 6 s."""
+    bump = SIGMA * floors * (1.0 + 0.5 * np.exp(-(((TIME - 6.0) / 0.5) ** 2)))
+    pair = RECORDS.records[:2]
+    one = [judged(r, np.zeros(len(TIME))) for r in pair]
+    return where_they_differ(one, [one[0], judged(pair[1], bump)])
+
+
+def test_where_two_hypotheses_differ_is_said_with_record_block_and_moment() -> None:
+    said = apart(3.0)
+    assert said.startswith("here they differ most in record 'r1' at `motor`, by 3")
+    assert said.endswith(" noise floors, around 6 s")
+    assert apart(-3.0) == said, "whichever is above"
+    assert "; repeat that motion" in apart(0.1)
+
+
+def test_hypotheses_that_predict_the_same_are_said_to_agree() -> None:
+    assert apart(0.0) == "their predictions agree on every record"
 
 
 # --- windows --------------------------------------------------------------------------------------

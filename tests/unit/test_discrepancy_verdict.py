@@ -72,13 +72,17 @@ def test_shares_are_said_in_percent() -> None:
         "slack", "spring.cable", {"spring.cable.gap": (1e-3, "m", 2e-5)}, (), 0.9, 0.82, "late", "source"
     )
     formula = Formula({"[q]": 2.0}, 0.64, "2·[q] (in N, signals in SI)")
-    left = Remainder("spring", "force.reading", "N", 4.5, 2.0, "a drift", (), formula)
+    left = Remainder(
+        "spring", "force.reading", "N", 4.5000001, 2.0, "a drift", (("time", 1.0 / 3.0),), formula
+    )
     named = Verdict(
         "named", (effect,), (), GAPS, "spring", (), BLANK, BLANK, cast(Course, None), remainder=left
     )
     assert "gap = 0.001 ± 2e-05 m. It explains 82 % of the excess" in named.words()
     assert "As good an explanation" not in named.words()
     assert "2·[q] (in N, signals in SI) explains 64 % of it on records" in named.words()
+    written = named.to_dict()["remainder"]
+    assert (written["rms"], written["shape"]) == (4.5, [{"over": "time", "share": 0.333333}]), "six digits"
     without = Remainder("spring", "force.reading", "N", 4.5, 2.0, "a drift", (), None)
     assert without.words().endswith("and is 4.5 N rms, the noise floor 2 N.")
 

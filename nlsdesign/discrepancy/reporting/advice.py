@@ -93,7 +93,7 @@ def where_they_differ(one: Sequence[Judged], other: Sequence[Judged]) -> str:
     one, other
         What all records say of both.
     """
-    best, sentence = -1.0, "their predictions agree on every record"
+    best, sentence = 0.0, "their predictions agree on every record"
     for a, b in zip(one, other, strict=True):
         gap = np.abs(a.residual - b.residual)
         most = float(np.sqrt(np.mean(gap**2)))
@@ -104,7 +104,7 @@ def where_they_differ(one: Sequence[Judged], other: Sequence[Judged]) -> str:
                 f"here they differ most in record '{a.record.name}' at `{a.block.name}`, "
                 f"by {most:.2g} noise floors, around {at:.3g} s"
             )
-    longer = "; repeat that motion with more periods or larger amplitude" if best < _APART else ""
+    longer = "; repeat that motion with more periods or larger amplitude" if 0.0 < best < _APART else ""
     return sentence + longer
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.equation_error.evidence import STRIDE
 from ...identification.records.measurement import RecordSet
 from ...identification.statistics.filters import derivative
 from ...quantity import with_unit
@@ -198,7 +197,7 @@ def _line(rows: Sequence[_Rows]) -> tuple[float, float]:
 
 def _ringing(rows: Sequence[_Rows]) -> tuple[float, float]:
     """Return the share of the power in the band around the strongest frequency, and that frequency."""
-    highest = 0.5 / (STRIDE * 1e-3 if len(rows[0].time) < 2 else float(np.median(np.diff(rows[0].time))))
+    highest = 0.5 / float(np.median(np.diff(rows[0].time)))
     grid = np.arange(_LOWEST, 0.95 * highest, 0.1)
     power = np.zeros_like(grid)
     for row in rows:
