@@ -83,7 +83,7 @@ def test_an_estimate_far_from_linear_has_no_observer() -> None:
     """Strain s₀ kept while the angle jumps to rest strain s: s₀² is off its tangent there by (s₀ − s)²."""
     model = squared(ob.bench(ob.SLOW))
     names = ScheduledNames("motor.angle", "motor.speed", 50.0, np.linspace(-0.3, 0.9, 13), {})
-    # From zero strain to the largest, which is at 0.9 rad, and the other way round: as far off as it is large.
+    # From zero strain to the largest, at 0.9 rad, and the other way round: as far off as it is large.
     assert AngleForm(model, names).affine_error() == pytest.approx(1.0, rel=1e-6)
     with pytest.raises(ValueRangeError, match="deviates by 100% of its largest value"):
         design_observer(model, estimate="squared", measured="motor.angle", grid=FixedGrid(-0.3, 0.9))
