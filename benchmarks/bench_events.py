@@ -1,6 +1,6 @@
 """Simulation with located events against ``scipy.integrate.solve_ivp`` with events, on the same equations.
 
-The published actuator with dry friction that sticks, backlash with a damped contact between motor and cam shaft,
+The published actuator with dry friction that sticks, backlash with a damped contact between motor and shaft,
 and an encoder, driven by a sine current and seen every millisecond. The peer integrates the same equations,
 called through CasADi, with one terminal event per switch, and starts again after each; what it has just
 computed at one point it does not compute twice. Each peer gets a ladder of tolerances; of the runs that are
@@ -133,7 +133,9 @@ def main() -> None:
     times = np.linspace(0.0, options.seconds, round(1000 * options.seconds) + 1)
     model = bench()
     exact, expected = Peer(model).run(times, "DOP853", 1e-12)
-    print(f"bench with friction, backlash and encoder, {options.seconds:g} s, {expected} events, processor time")
+    print(
+        f"bench with friction, backlash and encoder, {options.seconds:g} s, {expected} events, processor time"
+    )
 
     def error(angle: Array) -> float:
         return float(np.max(np.abs(angle - exact)) / np.max(np.abs(exact)))

@@ -72,6 +72,11 @@ def _advice(name: str) -> str:
     for room in dict.fromkeys(home or one for one, home in homes.items() if home != "models"):
         if name in _public(importlib.import_module(f".{room}", __name__)):
             return f"{text}; it is nlsdesign.{room}.{name}"
+    from .components.assembly.renamed import renamed  # here, as components take time to load
+
+    old = renamed(name)
+    if old is not None:
+        return f"{text}; {old}"
     near = nearest(name, homes)
     return f"{text}; did you mean '{near}'?" if near else f"{text}; dir(nlsdesign) lists the public names"
 

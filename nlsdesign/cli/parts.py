@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 def parts(name: str | None, as_json: bool) -> None:
     """List the parts that a deck can name, or show one: its law, source and numbers."""
     from ..components.assembly.deck_reader import component_classes
+    from ..components.assembly.renamed import renamed
 
     known = component_classes()
     if name is None:
@@ -34,7 +35,7 @@ def parts(name: str | None, as_json: bool) -> None:
             show_table("Parts", ("kind", "part", "law"), rows)
         return
     if name not in known:
-        raise unknown_name("part", name, known)
+        raise renamed(name) or unknown_name("part", name, known)
     infos, law = known[name].parameter_infos(), inspect.getdoc(known[name]) or ""
     publications = [str(reference) for reference in cited(law)]
     if as_json:

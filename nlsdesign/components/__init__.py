@@ -1,7 +1,8 @@
 """Parts that can be declared; they never learn what they are used for."""
 
-from typing import NoReturn
+from typing import TYPE_CHECKING
 
+from .assembly.deck_reader import component_classes
 from .assembly.named_parts import Assembly, assembly
 from .assembly.renamed import renamed
 from .assembly.smooth_form import smoothed
@@ -164,8 +165,15 @@ __all__ = [
     "tie",
 ]
 
+if not TYPE_CHECKING:  # a type checker would take any misspelt name for a part
 
-def __getattr__(name: str) -> NoReturn:
-    """Say the new name of a component that had another one."""
-    error = renamed(name)
-    raise error or AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    def __getattr__(name: str) -> type[Part]:
+        """Return a component that is in no list; of one that had another name, say the new one."""
+        error = renamed(name)
+        if error is not None:
+            raise error
+        # A law is found by standing in a file of a room; the list above is for type checkers and readers.
+        law = None if name.startswith("_") else component_classes().get(name)
+        if law is None:
+            raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+        return law

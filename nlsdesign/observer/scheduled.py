@@ -10,9 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError
+from ..errors import ArrangementError, ValueRangeError
 from ..model import FlatModel, Table, Variable
 from ..model.roles import measured_motion, spring_torque
+from ..quantity import typeset_unit
 from ..symbolic import Expression
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, GainRule
@@ -102,12 +103,20 @@ def design_observer_with_details(
     ------
     ValueRangeError
         If the sample time is not between 0 and 1 s, or the model is discrete.
+    ArrangementError
+        If what is measured is not an angle.
     """
     if not 0.0 < sample_time < 1.0:
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
     if model.sample_time is not None:
         raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
+    if model.variable(measured).unit != "rad":
+        raise ArrangementError(
+            f"measured: '{measured}'",
+            f"is in {typeset_unit(model.variable(measured).unit)}; an observer is scheduled over an angle",
+            next_step="export the plant alone, or observe a machine whose motor turns",
+        )
     rule, over = gain or CascadeGain(), grid or whole_contour(model)
     reference = np.linspace(over.lower, over.upper, 65)
     plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)

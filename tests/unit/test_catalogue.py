@@ -299,6 +299,7 @@ def test_a_law_is_one_file(written: Path, monkeypatch: pytest.MonkeyPatch) -> No
             'between = ["wheel"]\nstiffness = {value = 2.0, unit = "N*m/rad^3", source = "x"}\n'
         )
         made = declare(read_deck(text, Path("a.toml")))
+        assert type(made.element("it")) is components.CubicSpring
     finally:
         deck_reader._modules.cache_clear()
     assert made.element("it").domain == ROTATION

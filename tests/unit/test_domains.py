@@ -224,3 +224,10 @@ def test_an_old_name_of_a_number_says_the_new_one(old: str) -> None:
 def test_a_name_that_never_was_is_an_ordinary_mistake() -> None:
     with pytest.raises(AttributeError, match="Sprung"):
         components.Sprung  # noqa: B018
+
+
+def test_a_reading_that_is_none_is_refused_by_its_name() -> None:
+    with pytest.raises(
+        ArrangementError, match=r"contact = .sharp.*must be one of Sharp"
+    ):
+        CoulombFriction(sliding_effort=1.0, contact="sharp")

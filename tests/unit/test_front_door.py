@@ -112,3 +112,8 @@ def test_the_reference_page_says_what_the_docstrings_say(root: Path) -> None:
     old = [name for name, said in rows if said != summary(getattr(nls, name))]
     wanted = "\n".join(f"| `nls.{name}` | {summary(getattr(nls, name))} |" for name in old)
     assert not old, f"docs/reference.md should say:\n{wanted}"
+
+
+def test_an_old_component_name_is_answered_with_the_new_one() -> None:
+    with pytest.raises(AttributeError, match=r"'TorsionSpring'.*write Spring"):
+        _ = nls.TorsionSpring

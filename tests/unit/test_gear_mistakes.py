@@ -88,13 +88,13 @@ NUMBERS = {
     "negative resistance": (
         lambda: VoltageDrivenMotor(**{**WINDING, "resistance": -0.3}, inductance=1e-4),
         ValueRangeError,
-        "resistance = -0.3 Ohm",
+        "resistance = -0.3 Ω",
     ),
     "no inductance": (lambda: VoltageDrivenMotor(**WINDING, inductance=0.0), ValueRangeError, "inductance"),
     "ohms for henries": (
         lambda: VoltageDrivenMotor(**WINDING, inductance=quantity(0.1, "mOhm")),
         UnitError,
-        r"inductance = 0\.1 mOhm.*like 'H'",
+        r"inductance = 0\.1 mΩ.*like 'H'",
     ),
     "volts for amperes": (
         lambda: CurrentDrivenMotor(**{**WINDING, "current_limit": quantity(24.0, "V")}),

@@ -9,6 +9,9 @@ import pytest
 
 from nlsdesign.components import (
     ROTATION,
+    TRANSLATION,
+    Fixed,
+    LinearDrive,
     LinearElastic,
     SlidingFillers,
     Spring,
@@ -20,7 +23,13 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import ConvergenceError, MeasurementError, UnknownNameError, ValueRangeError
+from nlsdesign.errors import (
+    ArrangementError,
+    ConvergenceError,
+    MeasurementError,
+    UnknownNameError,
+    ValueRangeError,
+)
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import (
     CascadeGain,
@@ -269,3 +278,15 @@ def test_a_record_must_fit_the_observer(model: FlatModel, design: ObserverDesign
         observe(model, Trace(time, angle, {"motor.angle": "rad"}))
     with pytest.raises(ValueRangeError, match="is not an observer"):
         check_stability(model)
+
+
+def test_an_observer_is_scheduled_over_an_angle_alone() -> None:
+    """A position in metres must not be put into a table of angles."""
+    slide = assembly(
+        "slide",
+        table=LinearDrive(mass=2.0, force_constant=20.0, voltage_limit=10.0),
+        load=Fixed(domain=TRANSLATION),
+        rope=tie(Spring(stiffness=5e3), "table", "load"),
+    )
+    with pytest.raises(ArrangementError, match=r"'table.position'.*is in m; .*over an angle"):
+        design_observer(flatten(slide), estimate="rope.force", measured="table.position")

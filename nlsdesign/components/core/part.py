@@ -28,6 +28,8 @@ class Part(ABC):  # noqa: B024 - a bare part has no law; its kinds do
     """What the part brings into a system, in the terms of the field; the parts inside say their own."""
 
     def __post_init__(self) -> None:
+        for name, kinds in readings(type(self)).items():
+            _reading(self, name, kinds)
         for field in dataclasses.fields(self):
             if "domains" in field.metadata:
                 object.__setattr__(self, "domain", _decided(self, field.metadata["domains"]))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ConvergenceError
+from ...errors import ConvergenceError, unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
@@ -128,7 +128,16 @@ class Comparison:
             Made from ``hypothesis.assembly``.
         wanted
             Names of blocks; ``None`` is returned for an effect that touches none of them.
+
+        Raises
+        ------
+        UnknownNameError
+            If the effect leaves a number open that its assembly does not have.
         """
+        known = candidate.assembly.quantities()
+        for unknown in candidate.unknowns:
+            if unknown.name.partition("[")[0] not in known:
+                raise unknown_name(f"effect '{candidate.effect}': number", unknown.name, known)
         before = _edited(hypothesis, candidate)
         names = {u.name for u in candidate.unknowns}
         groups = [g for g in self._groups(before) if any(names & set(each.free) for each in g)]
@@ -300,12 +309,12 @@ def moved_numbers(before: Assembly, after: Assembly) -> dict[str, str]:
         Made from it by an edit.
     """
     old, new = before.quantities(), after.quantities()
-    gone = _by_identity({name: quantity for name, quantity in old.items() if name not in new})
-    come = _by_identity({name: quantity for name, quantity in new.items() if name not in old})
+    departed = _by_identity({name: quantity for name, quantity in old.items() if name not in new})
+    arrived = _by_identity({name: quantity for name, quantity in new.items() if name not in old})
     # One object may stand at several places, as where one law makes two branches: they keep their order.
     moved: dict[str, str] = {}
-    for key, names in gone.items():
-        others = come.get(key, [])
+    for key, names in departed.items():
+        others = arrived.get(key, [])
         if len(names) == len(others):
             moved |= dict(zip(names, others, strict=True))
     return moved
