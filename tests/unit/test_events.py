@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from nlsdesign.components import ROTATION, Backlash, CoulombFriction, Inertia, Spring, tie
+from nlsdesign.components import ROTATION, Backlash, CoulombFriction, EndStop, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ExportError
 from nlsdesign.export import natively
@@ -122,3 +122,14 @@ def test_equations_at_rest_are_those_of_sticking() -> None:
     assert model.evaluate([0.0, 0.0], [-0.05])["rub.torque"] == -0.03
     assert model.evaluate([0.0, 1e-9], [0.02])["rub.torque"] == 0.03
     assert model.evaluate([0.0, -1e-9], [0.02])["der(wheel.speed)"] == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("angle", [-1.3, 0.04, 0.3])
+def test_a_corner_lasts_as_long_as_its_distance_is_positive(angle: float) -> None:
+    """What locates it is the distance itself, which has a slope there: not its inverse, which has a pole."""
+    stop = tie(EndStop(lower=-1.0, upper=0.1, stiffness=400.0, damping=0.0), "wheel")
+    model = flatten(assembly("a", wheel=Inertia(inertia=1e-3), stop=stop))
+    given = (0.0, [angle, 0.0], [0.0], model.start(model.parameters))
+    modes = model.switching.natural(*given)
+    lasts = np.array(model.switching.branch(*given, modes)[1]).ravel()
+    assert sorted(lasts) == pytest.approx(sorted([abs(0.1 - angle), abs(angle + 1.0)]))
