@@ -221,6 +221,23 @@ def test_two_frictions_on_one_shaft_share_the_load() -> None:
     assert run["more.torque"] == pytest.approx(3 * run["rub.torque"], rel=1e-12)
 
 
+def test_two_frictions_on_one_shaft_let_go_backward_too() -> None:
+    """Pulled backward by a weight they slip backward at their sum, then slow it down with both torques."""
+    made = assembly(
+        "two_bearings",
+        wheel=Inertia(inertia=J), bench=Fixed(),
+        rub=tie(CoulombFriction(sliding_effort=T), "wheel"),
+        more=tie(CoulombFriction(sliding_effort=3 * T), "wheel", "bench"),
+    )  # fmt: skip
+    run = simulate(flatten(made), np.linspace(0.0, 1.0, 11), inputs={"wheel.torque": lambda t: -0.4 * t})
+    slip = 4 * T / 0.4
+    assert told(run, "rub+more") == [("slips backward", pytest.approx(slip, rel=1e-11))]
+    sliding = np.maximum(run.time - slip, 0.0)
+    assert run["wheel.speed"] == pytest.approx(-0.4 / J * sliding**2 / 2, rel=1e-9)
+    assert run["rub.torque"][-1] == pytest.approx(-T)
+    assert run["more.torque"][-1] == pytest.approx(-3 * T)
+
+
 def test_a_stack_of_sticking_inertias() -> None:
     """Three inertias and two frictions in a row: found together, and the outer one slips first."""
     made = assembly(

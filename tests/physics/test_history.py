@@ -253,6 +253,14 @@ def shaken(law: Element, seconds: float, per_second: int = 500, frequency: float
     )
 
 
+@pytest.mark.parametrize(("softening", "highest"), [(0.02, 25.0), (0.0, math.inf), (-1 / 293.15, math.inf)])
+def test_the_range_of_the_warming_is_noted_on_the_state(softening: float, highest: float) -> None:
+    """Valid while T' < 1/(2·b); a law that stiffens has no limit."""
+    model = pulled(law=hot(softening))
+    warming = next(v for v in model.states if v.name == "rubber.law.warming")
+    assert (warming.minimum, warming.maximum) == (-math.inf, pytest.approx(highest))
+
+
 @pytest.mark.parametrize("softening", [0.0, 0.02, -1 / 293.15])
 def test_the_first_law_holds_at_every_moment(softening: float) -> None:
     """Work = C·T' + (1 + b·T₀)·(elastic energy at T₀) + heat given off; the capacity is small."""

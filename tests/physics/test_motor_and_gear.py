@@ -271,6 +271,18 @@ def test_a_lossy_gear_between_two_inertias_against_trying_both_directions() -> N
         assert found["gear.loss"] >= 0.0
 
 
+@pytest.mark.parametrize("size", [1.0, 1e9])
+def test_the_residual_of_a_lossy_gear_is_relative_to_its_torques(size: float) -> None:
+    """At torques of 10⁹ N·m rounding alone leaves more than 10⁻⁹ N·m, which is nothing."""
+    made = assembly("a", motor=by_current(voltage_limit=1e4), wheel=Inertia(inertia=2e-3), gear=lossy())
+    model = flatten(made)
+    for load in np.linspace(-1.7, 1.3, 31):
+        inputs = [{"wheel.torque": load * size}.get(v.name, 0.0) for v in model.inputs]
+        residual = model.equations(0.0, [0.0, 3.0], inputs, model.start(model.parameters), [])[3]
+        assert residual.numel() == 1
+        assert abs(float(residual)) < 1e-12
+
+
 def test_a_swing_through_a_lossy_gear_against_another_integrator_and_its_power_balance() -> None:
     sizes, stiffness = (ROTOR, 2e-3, 8.0), 3.0
     made = assembly("a", motor=by_current(voltage_limit=1e4), wheel=Inertia(inertia=2e-3), gear=lossy(),

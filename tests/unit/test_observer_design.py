@@ -149,6 +149,29 @@ def test_the_published_form_has_the_same_interface(model: FlatModel) -> None:
     assert [v.name for v in observer.states][-2:] == [f"{ob.EXTENSION}.previous", f"{ob.EXTENSION}.rate"]
 
 
+def test_the_filter_on_the_rate_forgets_at_its_bandwidth(model: FlatModel) -> None:
+    """At the same extension as before the rate decays by e^(−2πfT); of a new rate the rest comes in."""
+    observer = design_observer(
+        model, form=PaperForm(rate_bandwidth=30.0), grid=FixedGrid(-1.0, 1.0, points=101)
+    )
+    names = [v.name for v in observer.states]
+    rate, previous = names.index(f"{ob.EXTENSION}.rate"), names.index(f"{ob.EXTENSION}.previous")
+    angle = 0.4
+    keep = np.exp(-2.0 * np.pi * 30.0 * observer.sample_time)
+
+    def following(state: np.ndarray) -> np.ndarray:
+        table = observer.look_up(list(state), [angle, 0.0])
+        return np.array(observer.equations(0.0, state, [angle, 0.0], [], table)[0]).ravel()
+
+    state = observer.start(observer.states)
+    state[previous] = following(state)[previous]
+    state[rate] = 0.05
+    assert following(state)[rate] == pytest.approx(keep * 0.05)
+    state[rate] = 0.0
+    state[previous] -= 2e-5
+    assert following(state)[rate] == pytest.approx((1.0 - keep) * 2e-5 / observer.sample_time)
+
+
 def test_a_linear_spring_needs_no_inner_state() -> None:
     parts = dict(ob.actuator().parts) | {
         "spring": tie(Spring(stiffness=1.7, domain=ROTATION), "motor", "load")

@@ -7,7 +7,7 @@ import pytest
 
 from nlsdesign.errors import ConvergenceError, ValueRangeError
 from nlsdesign.observer import FixedGrid, GridByTolerance
-from nlsdesign.observer.table import ColumnPlace, Compact, Entry, Grid
+from nlsdesign.observer.table import ColumnPlace, Compact, Entry, Grid, compacted
 
 
 def entry(key: str, values: np.ndarray, *, row: str = "sum", weight: float = 1.0) -> Entry:
@@ -95,3 +95,24 @@ def test_what_is_not_finite_makes_no_table() -> None:
 def test_settings_out_of_range(make: object) -> None:
     with pytest.raises(ValueRangeError):
         make()
+
+
+@pytest.mark.parametrize(("share", "columns"), [(0.9, 0), (1.1, 1)])
+def test_a_tenth_of_the_tolerance_may_be_spent_on_a_literal(share: float, columns: int) -> None:
+    def nearly_constant(angles: np.ndarray) -> list[Entry]:
+        return [entry("number", 7.0 + share * 1e-4 * angles)]
+
+    compact = GridByTolerance(-1.0, 1.0, tolerance=1e-3).compact(nearly_constant)
+    assert len(compact.columns) == columns
+
+
+def test_every_angle_within_the_angle_tolerance_is_looked_at() -> None:
+    """Read is a ramp over four cells up to a spike of one: it is exact as soon as the spike is in reach."""
+    angles = np.linspace(-1.0, 1.0, 17)
+    spike = [entry("spike", np.where(np.arange(17) == 8, 1.0, 0.0))]
+    cell = angles[1] - angles[0]
+    errors = [
+        compacted(angles, spike, every=4, tolerance=0.0, angle_error=cells * cell).error["sum"]
+        for cells in (0.0, 1.0, 2.0, 3.5)
+    ]
+    assert errors == pytest.approx([0.75, 0.5, 0.25, 0.0])

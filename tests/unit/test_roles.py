@@ -107,6 +107,11 @@ def test_cam_and_motor_decide() -> None:
     assert is_actuator(model)
 
 
+def test_a_spring_without_a_motor_is_no_actuator() -> None:
+    spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
+    assert not is_actuator(flatten(machine(wheel=Inertia(inertia=1e-3), spring=spring)))
+
+
 def test_a_named_part_is_taken_and_a_wrong_name_has_a_neighbour() -> None:
     model = flatten(two_springs())
     assert series_spring(model, "right").effort == "right.torque"
