@@ -47,7 +47,7 @@ def main() -> int:
     out.mkdir(parents=True, exist_ok=True)
     copy = _copied(out / "copy")
     reach = _reach(copy, out / "reach.json", given.tests)
-    mutants = [m for place in given.places for file in _files(place) for m in mutants_of(ROOT, file)]
+    mutants = [m for place in given.places for file in _files(place) for m in mutants_of(copy, file)]
     if given.count:
         mutants = random.Random(given.seed).sample(mutants, min(given.count, len(mutants)))
     outcomes = {m: _outcome(copy, out / "tried.jsonl", m, reach) for m in mutants}
@@ -149,7 +149,7 @@ def _outcome(copy: Path, tried: Path, mutant: Mutant, reach: dict[str, dict[int,
 def _judged(copy: Path, mutant: Mutant, tests: list[str]) -> str:
     place = copy / mutant.file
     whole = place.read_text(encoding="utf8")
-    place.write_text(broken(ROOT, mutant), encoding="utf8")
+    place.write_text(broken(copy, mutant), encoding="utf8")
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
     try:
         run = subprocess.run(

@@ -67,5 +67,5 @@ def test_a_delay_can_be_told_only_between_records_of_three_times_the_pace() -> N
     assert not lagging(cycle(2.0)).testable
     assert not lagging(cycle(2.0), cycle(5.8)).testable
     assert lagging(cycle(2.0), cycle(6.2)).testable
-    assert not lagging(cycle(2.0), cycle(4.0, size=0.2 * SIZE)).testable, "pace is no matter of size"
+    assert not lagging(cycle(2.0), cycle(4.0, size=0.1 * SIZE)).testable, "pace is no matter of size"
     assert not lagging(cycle(2.0, late=0.0), cycle(6.2, late=0.0)).testable, "nothing lags"

@@ -77,6 +77,15 @@ def test_each_term_of_the_library_is_what_its_name_says(name: str) -> None:
     assert found.text == f"2·{name} (in N·m, signals in SI)"
 
 
+def test_a_second_term_that_resembles_the_first_is_told_from_it() -> None:
+    """A cube beside its line, which looks much the same: what the line leaves of it counts in full."""
+    motions = [motion(seed) for seed in range(4)]
+    errors = [(q + 1.5 * q**3, {"q": q, "rate of q": v}, k < 3) for k, (q, v) in enumerate(motions)]
+    found = sparse_formula(errors, "N")
+    assert found is not None
+    assert found.terms == {"[q]": pytest.approx(1.0), "[q]³": pytest.approx(1.5)}
+
+
 def test_no_formula_is_written_for_noise() -> None:
     assert sparse_formula(parts("noise"), "N") is None
 
