@@ -270,8 +270,8 @@ def _rebuilt(
     moved = states is not None or inputs is not None
     if moved and model.switching is not None and model.switching.jumps:
         raise ArrangementError(
-            model.name, f"'{model.switching.jumps[0]}' is sharp, so the model cannot be written in other variables",
-            next_step="take the smooth form: in a deck a creep_speed or a width, in Python smoothed(assembly)",
+            model.name, f"'{model.switching.jumps[0]}' is sharp, so no other variables can be taken as states",
+            next_step="take its smooth form: in a deck a creep_speed or width, in Python smoothed(assembly)",
         )  # fmt: skip
     rows = [s.derivative, s.output, s.signal, s.residual]
     shared = ca.cse(ca.vertcat(*rows)) if any(r.numel() for r in rows) else ca.SX(0, 1)

@@ -94,7 +94,7 @@ def test_what_no_catalogue_knows_is_not_named(tmp_path: Path) -> None:
     [
         pytest.param(*("p02", ["backlash"], 2.2), marks=pytest.mark.slow),
         pytest.param(*("p05", ["rate_independent_hysteresis"], 3.0), marks=pytest.mark.slow),
-        ("p06", ["force_sensor_delay"], 1.3),
+        pytest.param(*("p06", ["force_sensor_delay"], 1.3), marks=pytest.mark.slow),
         ("p07", [], 1.3),
         pytest.param(*("p08", ["coulomb_friction", "second_relaxation"], 1.3), marks=pytest.mark.slow),
     ],

@@ -29,7 +29,7 @@ NAMED = {
 @pytest.mark.skipif(
     "NLSDESIGN_SHARED" not in os.environ, reason="NLSDESIGN_SHARED does not name the folder of measurements"
 )
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["emps", pytest.param("vhb4910", marks=pytest.mark.slow)])
 def test_the_study_keeps_its_claims(name: str, tmp_path: Path) -> None:
     results = run_study(name, tmp_path, fast=True)
     expected = claims(name)

@@ -163,6 +163,7 @@ def test_records_of_a_rig_with_other_numbers_are_said_to_be_that(tmp_path: Path,
     assert found.effects == ()
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_is_not_taken_for_another_rig_and_is_named_the_same_twice(
     tmp_path: Path, rig: Assembly
 ) -> None:

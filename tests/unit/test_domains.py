@@ -227,7 +227,5 @@ def test_a_name_that_never_was_is_an_ordinary_mistake() -> None:
 
 
 def test_a_reading_that_is_none_is_refused_by_its_name() -> None:
-    with pytest.raises(
-        ArrangementError, match=r"contact = .sharp.*must be one of Sharp"
-    ):
+    with pytest.raises(ArrangementError, match=r"contact = .sharp.*must be one of Sharp"):
         CoulombFriction(sliding_effort=1.0, contact="sharp")
