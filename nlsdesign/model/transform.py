@@ -270,7 +270,7 @@ def _rebuilt(
     moved = states is not None or inputs is not None
     if moved and model.switching is not None and model.switching.jumps:
         raise ArrangementError(
-            model.name, f"'{model.switching.jumps[0]}' is sharp, so no other variables can be taken as states",
+            model.name, f"'{model.switching.jumps[0]}' is sharp, so its states cannot be exchanged",
             next_step="take its smooth form: in a deck a creep_speed or width, in Python smoothed(assembly)",
         )  # fmt: skip
     rows = [s.derivative, s.output, s.signal, s.residual]
