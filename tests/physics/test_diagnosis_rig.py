@@ -28,7 +28,9 @@ SINGLE = [
     pytest.param(
         *("wrist", "cable_compliance", "elastic.stiffness", "cable_stiffness"), marks=pytest.mark.slow
     ),
-    ("arm", "force_sensor_delay", "force_sensor_delay.delay", "force_delay"),
+    pytest.param(
+        *("arm", "force_sensor_delay", "force_sensor_delay.delay", "force_delay"), marks=pytest.mark.slow
+    ),
 ]
 
 

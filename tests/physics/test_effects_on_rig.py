@@ -37,7 +37,14 @@ CASES = {
 RECORDS = ("sine_45deg_0.5Hz", "sine_25deg_2.0Hz", "sine_15deg_5.0Hz")
 
 
-@pytest.mark.parametrize("effect", CASES)
+SLOW = {"drive_delay", "strain_stiffening", "permanent_set", "self_heating", "angle_sensor_eccentricity"}
+"""One of each room stays in the quick run."""
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [pytest.param(effect, marks=pytest.mark.slow) if effect in SLOW else effect for effect in CASES],
+)
 def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> None:
     actuator = with_slack_cable(ACTUATORS[CASES[effect]])
     write_set(tmp_path, actuator, make_records(actuator, {effect: 1.0}, 21, only=RECORDS))

@@ -108,7 +108,7 @@ def test_other_views_keep_switches_or_refuse() -> None:
             rub=tie(CoulombFriction(sliding_effort=0.03), "wheel"),
         )
     )
-    with pytest.raises(ArrangementError, match=r"'rub' is not smooth.*smoothed\(assembly\)"):
+    with pytest.raises(ArrangementError, match=r"'rub' is sharp.*smoothed\(assembly\)"):
         replace_state(spring, "wheel.angle", "s.torque")
 
 
