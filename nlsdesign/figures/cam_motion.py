@@ -12,6 +12,7 @@ from matplotlib.patches import Arc
 from numpy.typing import NDArray
 
 from ..design import Contour, elastic_law
+from ..design.geometry import turn
 from ..errors import ValueRangeError
 from ..model import FlatModel
 from .style import (
@@ -323,18 +324,3 @@ def _lever_arm(axes: Axes, contact: Floats, guide: Floats) -> None:
     along = (guide - contact) / float(np.hypot(*(guide - contact)))
     foot = contact - along * float(contact @ along)
     axes.plot([0.0, foot[0]], [0.0, foot[1]], color=GREEN.light, linewidth=1.4, linestyle=(0, (2, 1)))
-
-
-def turn(points: Floats, angle: float) -> Floats:
-    """Turn points about the centre.
-
-    Parameters
-    ----------
-    points
-        Shape (n, 2).
-    angle
-        In rad, anticlockwise.
-    """
-    cosine, sine = np.cos(angle), np.sin(angle)
-    result: Floats = points @ np.array([[cosine, sine], [-sine, cosine]])
-    return result

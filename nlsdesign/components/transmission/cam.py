@@ -59,6 +59,21 @@ class Pulley(Cam):
         return scope.parameter("radius")
 
 
+def side_of(angle: Expression, width: Expression) -> tuple[Expression, Expression]:
+    """Return the angle on the side of a two-sided cam, q = √(θ² + w²) − w, and its derivative; both C∞.
+
+    Parameters
+    ----------
+    angle
+        θ.
+    width
+        w, over which one side takes over from the other.
+    """
+    root = ca.sqrt(angle * angle + width * width)
+    # Without cancellation near zero.
+    return angle * angle / (root + width), angle / root
+
+
 @dataclass(frozen=True, kw_only=True)
 class TwoSidedCam(Cam):
     """Cam through whose centre the cable passes: it stretches the rubber for both signs of the angle.
@@ -99,18 +114,12 @@ class TwoSidedCam(Cam):
         """Distance of the knots in rad."""
         return self.last_angle.number / (len(self.lever_arm.values) - 3)
 
-    def _side(self, scope: Scope, angle: Expression) -> tuple[Expression, Expression]:
-        width = scope.parameter("changeover")
-        root = ca.sqrt(angle * angle + width * width)
-        # (√(θ² + w²) − w without cancellation, and its derivative)
-        return angle * angle / (root + width), angle / root
-
     def _spacing(self, scope: Scope) -> Expression:
         return scope.parameter("last_angle") / (len(self.lever_arm.values) - 3)
 
     def extension(self, scope: Scope, angle: Expression) -> Expression:
         """Return δ(θ) = ∫₀^q H."""
-        on_side, _ = self._side(scope, angle)
+        on_side, _ = side_of(angle, scope.parameter("changeover"))
         on_contour = ca.fmin(on_side, scope.parameter("last_angle"))
         row, spacing = scope.row("lever_arm"), self._spacing(scope)
         run_out = uniform_spline(row, 0.0, spacing, on_contour) * (on_side - on_contour)
@@ -118,7 +127,7 @@ class TwoSidedCam(Cam):
 
     def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
         """Return h(θ) = dδ/dθ."""
-        on_side, slope = self._side(scope, angle)
+        on_side, slope = side_of(angle, scope.parameter("changeover"))
         on_contour = ca.fmin(on_side, scope.parameter("last_angle"))
         return uniform_spline(scope.row("lever_arm"), 0.0, self._spacing(scope), on_contour) * slope
 

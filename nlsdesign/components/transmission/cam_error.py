@@ -12,7 +12,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import parameter
-from .cam import TwoSidedCam
+from .cam import TwoSidedCam, side_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class CamWithProfileError(TwoSidedCam):
 
     def _error(self, scope: Scope, angle: Expression) -> tuple[Expression, Expression]:
         """Return E at an angle, and its integral from zero."""
-        on_side, _ = self._side(scope, angle)
+        on_side, _ = side_of(angle, scope.parameter("changeover"))
         last = scope.parameter("last_angle")
         on_contour = ca.fmin(on_side, last)
         row, step = scope.row("error"), last / (len(self.error.values) - 3)
@@ -57,5 +57,5 @@ class CamWithProfileError(TwoSidedCam):
 
     def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
         """Return h(θ) = dδ/dθ."""
-        slope = self._side(scope, angle)[1]
+        slope = side_of(angle, scope.parameter("changeover"))[1]
         return super().lever_arm_at(scope, angle) + self._error(scope, angle)[0] * slope

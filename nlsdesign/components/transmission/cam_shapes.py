@@ -13,7 +13,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression, symbol, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import parameter
-from .cam import Cam
+from .cam import Cam, side_of
 from .stretchy_cable import newton_root
 
 
@@ -123,11 +123,6 @@ class AnchoredCam(Cam):
                 next_step="move the anchor out, or take a smaller cam",
             )
 
-    def _side(self, scope: Scope, angle: Expression) -> tuple[Expression, Expression]:
-        width = scope.parameter("changeover")
-        root = ca.sqrt(angle * angle + width * width)
-        return angle * angle / (root + width), angle / root
-
     def _support(self, scope: Scope, direction: Expression) -> Expression:
         return _value(scope.row("support"), scope.parameter("last_direction"), direction)
 
@@ -150,13 +145,13 @@ class AnchoredCam(Cam):
 
     def extension(self, scope: Scope, angle: Expression) -> Expression:
         """Return δ(θ) = P(φ) − P(φ₀) + √(D² − p²(φ)) − √(D² − p²(φ₀))."""
-        on_side, _ = self._side(scope, angle)
+        on_side, _ = side_of(angle, scope.parameter("changeover"))
         first, now = self._direction(scope, ca.SX(0)), self._direction(scope, on_side)
         return self._taken(scope, now) - self._taken(scope, first)
 
     def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
         """Return h(θ) = dδ/dθ."""
-        on_side, slope = self._side(scope, angle)
+        on_side, slope = side_of(angle, scope.parameter("changeover"))
         return self._support(scope, self._direction(scope, on_side)) * slope
 
 
