@@ -45,7 +45,7 @@ def _softening(assembly: Assembly, path: str) -> Iterator[Edit]:
     edited, where = _around(assembly, path, "softening", softer)
     unknowns = (
         Unknown(f"{where}.softening", (0.15,), 1e-3, 0.95),
-        Unknown(f"{where}.exponent", (1.0,), 0.2, 10.0),
+        Unknown(f"{where}.exponent", (1.0,), 0.2, 10.0, null=None),
     )
     yield Edit(edited, unknowns)
 
@@ -64,8 +64,8 @@ def _heating(assembly: Assembly, path: str) -> Iterator[Edit]:
     for heat, (size, starts, low, high) in zip((by_work, by_loss), sizes, strict=True):
         edited, where = _around(assembly, path, "heating", wrapping(SelfHeating, heat=heat))
         unknowns = (
-            Unknown(f"{where}.{size}", starts, low, high),
-            Unknown(f"{where}.cooling_time", (10.0,), 0.5, 500.0),
+            Unknown(f"{where}.{size}", starts, low, high, null=math.inf),
+            Unknown(f"{where}.cooling_time", (10.0,), 0.5, 500.0, null=None),
         )
         yield Edit(edited, unknowns)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from ...components import (
@@ -41,7 +42,7 @@ def _without_rate(assembly: Assembly) -> list[str]:
 def _stretchy(assembly: Assembly, path: str) -> Iterator[Edit]:
     edited = wrapped(assembly, path, "elastic", wrapping(StretchyCable, stiffness=number(1e5, "N/m")))
     name = f"{path.rpartition('.')[0]}.elastic.stiffness"
-    yield Edit(edited, (Unknown(name, (3e4, 3e5), 1e3, 1e7),))
+    yield Edit(edited, (Unknown(name, (3e4, 3e5), 1e3, 1e7, null=math.inf),))
 
 
 def _pulled(assembly: Assembly) -> list[str]:

@@ -28,6 +28,9 @@ class Unknown:
     of
         Name of a signal of the declared model in whose largest value starts and bounds are counted; empty
         where they are in SI.
+    null
+        Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for a
+        number that only shapes the effect, such as a time constant or an order.
     """
 
     name: str
@@ -35,6 +38,7 @@ class Unknown:
     lower: float
     upper: float
     of: str = ""
+    null: float | None = 0.0
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,8 @@ class Candidate:
         Where its fits begin.
     explains_lag
         Whether readings that lag what they read are what it leaves.
+    simpler
+        Identifiers of the effects of which this one is a richer form, so that it must predict better.
     """
 
     effect: str
@@ -69,6 +75,7 @@ class Candidate:
     source: str
     strategy: Strategy = field(default_factory=Plain)
     explains_lag: bool = False
+    simpler: tuple[str, ...] = ()
 
 
 EffectFunction: TypeAlias = Callable[[Assembly], Sequence[Candidate]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ...components import Assembly, DriveDelay, DrivePart, DriveSaturation, GearedMotor
@@ -55,7 +56,16 @@ def torque_constant_saturation(assembly: Assembly) -> Sequence[Candidate]:
             "torque_constant_saturation",
             name,
             assembly.with_part(f"{name}.saturation", saturation),
-            (Unknown(f"{name}.saturation.saturation_current", (1.5,), 0.2, 50.0, f"{name}.current"),),
+            (
+                Unknown(
+                    f"{name}.saturation.saturation_current",
+                    (1.5,),
+                    0.2,
+                    50.0,
+                    f"{name}.current",
+                    null=math.inf,
+                ),
+            ),
             "torque that falls short the more, the larger the current, with either sign",
             "Hanselman 2003 (saturation, Froelich's curve of magnetisation)",
         )

@@ -33,7 +33,7 @@ def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, torque),
         Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, torque),
-        Unknown(f"{part}.order", _ORDERS, 2.0, 150.0),
+        Unknown(f"{part}.order", _ORDERS, 2.0, 150.0, null=None),
     )
     yield Edit(edited, unknowns)
 
@@ -63,7 +63,7 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     edited = wrapped(assembly, name, "behind_backlash", inertial).with_values({f"{driver}.inertia": own})
     unknowns = (
         Unknown(f"{name}.gap", (0.01, 0.05), 5e-4, 0.3),
-        Unknown(f"{name}.inertia", (0.1 * whole.number,), 1e-3 * whole.number, whole.number),
+        Unknown(f"{name}.inertia", (0.1 * whole.number,), 1e-3 * whole.number, whole.number, null=None),
     )
     # In slow motion the inertia behind the backlash hardly shows.
     rounded = Rounded(width=number(5e-4, "rad"))

@@ -94,9 +94,9 @@ def _stribeck(assembly: Assembly, body: str) -> Iterator[Edit]:
     unknowns = (
         Unknown(f"{part}.sliding_effort", (0.05,), 1e-4, 2.0, torque),
         Unknown(f"{part}.breakaway", (0.05,), 1e-4, 2.0, torque),
-        Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0),
+        Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0, null=None),
     )
-    yield Edit(edited, unknowns)
+    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
 
 
 def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:

@@ -54,7 +54,7 @@ def _second_relaxation(assembly: Assembly, path: str) -> Iterator[Edit]:
     inner = f"{path}.second_relaxing"
     unknowns = (
         Unknown(f"{inner}.spring.modulus", (3e5,), 1e3, 1e8),
-        Unknown(f"{inner}.dashpot.viscosity", (3e4, 3e5, 2e6), 1e2, 1e10),
+        Unknown(f"{inner}.dashpot.viscosity", (3e4, 3e5, 2e6), 1e2, 1e10, null=None),
     )
     yield Edit(assembly.with_part(inner, branch), unknowns)
 
@@ -85,7 +85,7 @@ def _branches(assembly: Assembly, names: Sequence[str]) -> Edit:
         assembly = assembly.with_part(name, law)
         unknowns += (
             Unknown(f"{name}.shear_modulus", (3e4,), 1e2, 1e9),
-            Unknown(f"{name}.viscosity", starts, 1e1, 1e12),
+            Unknown(f"{name}.viscosity", starts, 1e1, 1e12, null=None),
         )
     return Edit(assembly, unknowns)
 
@@ -95,7 +95,7 @@ def _fillers(assembly: Assembly, path: str) -> Iterator[Edit]:
     inner = f"{path}.fillers"
     unknowns = (
         Unknown(f"{inner}.modulus", (1e6,), 1e4, 1e9),
-        Unknown(f"{inner}.yield_stress", (1e5,), 1e3, 1e8),
+        Unknown(f"{inner}.yield_stress", (1e5,), 1e3, 1e8, null=None),
     )
     yield Edit(assembly.with_part(inner, law), unknowns)
 
@@ -113,7 +113,7 @@ def _stiffening(assembly: Assembly, path: str) -> Iterator[Edit]:
     inner = f"{path}.stiffening"
     unknowns = (
         Unknown(f"{inner}.modulus[1]", (3e5,), 1e2, 1e9),
-        Unknown(f"{inner}.knots[1]", (0.4, 0.75), 0.01, 0.98, f"{path}.strain"),
+        Unknown(f"{inner}.knots[1]", (0.4, 0.75), 0.01, 0.98, f"{path}.strain", null=None),
     )
     yield Edit(assembly.with_part(inner, law), unknowns)
 

@@ -105,7 +105,7 @@ def force_sensor_gain(assembly: Assembly) -> Sequence[Candidate]:
             "force_sensor_gain",
             name,
             assembly,
-            (Unknown(f"{name}.gain", (1.0,), 0.3, 3.0),),
+            (Unknown(f"{name}.gain", (1.0,), 0.3, 3.0, null=1.0),),
             "all stiffnesses and the torque constant out of their declared range by the same factor",
             "data sheets of load cells",
         )
