@@ -29,8 +29,8 @@ class Unknown:
         Name of a signal of the declared model in whose largest value starts and bounds are counted; empty
         where they are in SI.
     null
-        Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for a
-        number that only shapes the effect, such as a time constant or an order.
+        Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for
+        a number that only shapes the effect, such as a time constant or an order.
     """
 
     name: str
