@@ -20,7 +20,7 @@ from ...identification.estimation.least_squares import Fit, fit, predicted_cost
 from ...identification.estimation.parameters import Parameter
 from ...model import flatten
 from ..blocks.tearing import blocks_of
-from .unpredictable import Key, Tally, quickest, unpredictable
+from .unpredictable import Key, Tally, diverges, quickest, unpredictable
 
 Start: TypeAlias = tuple[Parameter, ...]
 """The free numbers of a group of blocks, each with a value to begin at."""
@@ -246,13 +246,15 @@ class Method(ABC):
         """
 
     @abstractmethod
-    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return which blocks and records are to be judged by the others.
 
         Parameters
         ----------
         problem
             That was fitted.
+        best
+            The fitted numbers.
         after
             What the fit left over.
         """
@@ -265,7 +267,7 @@ class Smooth(Method):
         """Fit to all records that are predictable."""
         return best_fit(problem.predictable, problem.starts, problem.limits)
 
-    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return what was set aside before."""
         return frozenset(key for key in problem.unpredictable if key in after)
 
@@ -300,11 +302,13 @@ class RobustOverFreeFlight(Smooth):
             known=known,
         )
 
-    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
-        """Return the quick records that a new effect leaves unpredicted."""
+    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
+        """Return the quick records that a new effect leaves unpredicted and whose neighbours diverge."""
         if not (problem.coarse and problem.new):
-            return super().set_aside(problem, after)
-        return unpredictable(problem.before, after, quickest(problem.evidence))
+            return super().set_aside(problem, best, after)
+        suspects = unpredictable(problem.before, after, quickest(problem.evidence))
+        by_key = {(e.driven.block.name, e.record.name): e for e in problem.evidence}
+        return frozenset(key for key in suspects if diverges(by_key[key], best))
 
     def _limits(self, problem: FitProblem) -> Limits:
         whole = problem.coarse and problem.effects < 2

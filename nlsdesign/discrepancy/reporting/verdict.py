@@ -14,6 +14,7 @@ from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
 from ...quantity import significant, to_resolution, with_unit
+from ..selection.criteria import Criteria
 from ..selection.search import Skipped
 from .remainder import Remainder
 
@@ -32,20 +33,50 @@ class NamedEffect:
         Value, unit and standard error by full name.
     aliases
         Effects of the catalogue that explain the records as well.
-    share_fit, share_held_out
-        Share of the excess over the noise that it explained when it was added.
+    share
+        Share of the excess over the noise, left when it was added, that it explains in prediction.
     signature, source
         What it leaves in records, and where its law comes from.
+    gain, gain_error
+        What prediction loses without it, in effective squares of the noise, and the standard error.
+    exclusion
+        Standard errors by which its numbers exclude no effect.
     """
 
     name: str
     location: str
     parameters: Mapping[str, tuple[float, str, float]]
     aliases: tuple[str, ...]
-    share_fit: float
-    share_held_out: float
+    share: float
     signature: str
     source: str
+    gain: float = math.nan
+    gain_error: float = math.nan
+    exclusion: float = math.nan
+
+
+@dataclass(frozen=True)
+class Refused:
+    """An effect that was tried and not named.
+
+    Parameters
+    ----------
+    name, location
+        Identifier of the catalogue, and the path of the part.
+    share
+        Share of the whole excess that it explains alone.
+    objections
+        Clauses of the rule that speak against it, in words.
+    """
+
+    name: str
+    location: str
+    share: float
+    objections: tuple[str, ...]
+
+    def __str__(self) -> str:
+        first = f"{self.name} at {self.location} explains {100.0 * max(self.share, 0.0):.0f} % alone"
+        return f"{first}, not named: {'; '.join(self.objections)}"
 
 
 @dataclass(frozen=True)
@@ -126,6 +157,12 @@ class Verdict:
         What to measure next to tell apart what these records cannot.
     skipped
         Effects that were left out of the comparison, and why: too expensive, or not converged.
+    complete
+        Whether nothing is left beyond the noise in any block.
+    criteria
+        Numbers of the decision rule.
+    refused
+        What explains most without being named, and why.
     """
 
     verdict: str
@@ -143,6 +180,9 @@ class Verdict:
     remainder: Remainder | None = None
     next_steps: tuple[str, ...] = ()
     skipped: tuple[Skipped, ...] = ()
+    complete: bool = False
+    criteria: Criteria = field(default_factory=Criteria)
+    refused: tuple[Refused, ...] = ()
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.
@@ -191,8 +231,8 @@ class Verdict:
                 for name, (value, unit, error) in effect.parameters.items()
             )
             text += f"`{effect.name}` at `{effect.location}`: {numbers}. "
-            text += f"It explains {100 * effect.share_held_out:.0f} % "
-            text += "of the excess over the noise on records that no fit has seen. "
+            text += f"It explains {100 * effect.share:.0f} % "
+            text += "of the excess over the noise, as predicted from other records. "
             if effect.aliases:
                 text += f"As good an explanation: {', '.join(effect.aliases)}. "
         if self.remainder is not None:
@@ -214,6 +254,8 @@ class Verdict:
         unit = next(g.unit for g in self.gaps if g.block == self.block)
         return {
             "verdict": self.verdict,
+            "complete": self.complete,
+            "criteria": self.criteria.described(),
             "effects": [
                 {
                     "name": e.name,
@@ -229,8 +271,10 @@ class Verdict:
                     ],
                     "aliases": list(e.aliases),
                     "evidence": {
-                        "share_fit": _six_digits(e.share_fit),
-                        "share_held_out": _six_digits(e.share_held_out),
+                        "share": _six_digits(e.share),
+                        "gain": _six_digits(e.gain),
+                        "gain_error": _six_digits(e.gain_error),
+                        "exclusion": _six_digits(e.exclusion),
                         "signature": e.signature,
                     },
                 }
@@ -247,6 +291,15 @@ class Verdict:
                 },
             },
             "runners_up": [{"name": n, "share": _six_digits(s)} for n, s in self.runners_up],
+            "refused": [
+                {
+                    "name": r.name,
+                    "location": r.location,
+                    "share": _six_digits(r.share),
+                    "why": list(r.objections),
+                }
+                for r in self.refused
+            ],
             "skipped": [
                 {"name": s.effect, "location": s.location, "beside": list(s.beside), "reason": s.reason}
                 for s in self.skipped

@@ -17,14 +17,12 @@ from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
 from ...identification.estimation.least_squares import fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
-from ...identification.records.measurement import Record
-from ...identification.statistics.residuals import effective_size
+from ...identification.records.measurement import Record, RecordSet
 from ...model import Variable, flatten
 from ...processes import parallel_map
 from ...quantity import Quantity
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
-from ..fitting.unpredictable import Tally
 from .hypothesis import Hypothesis
 from .hypothesis_fit import FreeBlock, HypothesisFit
 
@@ -75,9 +73,19 @@ class Comparison:
     """
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
-        self.bench = bench
+        self.bench, self._sizes = bench, sizes
         self._fit = HypothesisFit(bench, sizes)
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
+
+    def with_records(self, records: RecordSet) -> Comparison:
+        """Return a comparison on more records, with the noise that was estimated before.
+
+        Parameters
+        ----------
+        records
+            All of them, with those that were held out.
+        """
+        return Comparison(self.bench.with_records(records), self._sizes)
 
     @property
     def keys(self) -> tuple[tuple[str, str], ...]:
@@ -103,7 +111,7 @@ class Comparison:
         assembly
             As declared.
         """
-        return self.on_all_samples(Hypothesis(assembly))
+        return Hypothesis(assembly)
 
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis as the coarse look sees it.
@@ -191,12 +199,9 @@ class Comparison:
         hypothesis
             Fitted.
         """
-        tallies = {
-            (each.block.name, each.record.name): Tally(
-                float(each.residual @ each.residual), len(each.residual), effective_size(each.residual)
-            )
-            for each in self.judged(hypothesis)
-        }
+        groups = self._groups(hypothesis)
+        results = parallel_map(lambda k: self._fit.judged(hypothesis, groups[k]), len(groups))
+        tallies = {key: tally for result in results for key, tally in result.items()}
         return replace(hypothesis.judged_by(tallies), coarse=False)
 
     def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:

@@ -215,6 +215,8 @@ class Bench:
         All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
     blocks
         Of the declared model; they fix rows and noise floor.
+    noise
+        Of the measured signals, where it is known from other records of the same bench.
 
     Raises
     ------
@@ -222,10 +224,11 @@ class Bench:
         If no record moves enough to say anything about a block.
     """
 
-    def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
+    def __init__(self, records: RecordSet, blocks: Sequence[Block], *, noise: Noise | None = None) -> None:
+        self._blocks = tuple(blocks)
         self.records = in_canonical_order(records)
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
-        self.noise = estimate_noise(self.records)
+        self.noise = estimate_noise(self.records) if noise is None else noise
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
@@ -241,6 +244,16 @@ class Bench:
                     "no record moves enough to say anything about it",
                     next_step=self._what_would(block),
                 )
+
+    def with_records(self, records: RecordSet) -> Bench:
+        """Return other records of the same bench as they are seen with the same noise.
+
+        Parameters
+        ----------
+        records
+            All records.
+        """
+        return Bench(records, self._blocks, noise=self.noise)
 
     def _check_alive(self, block: Block) -> None:
         if block.target is None or self.noise.level[block.target] > 0.0:
