@@ -2,7 +2,7 @@
 
 Each hypothesis is fitted to the same records in the same way; what decides is how well it predicts records
 that its numbers were not fitted to, in units of the noise, by one rule (``docs/decision.md``). Records with
-the role ``held_out`` take no part: they are read once, when the verdict stands, for the error that is reported.
+the role ``held_out`` take no part: they are read once, when the verdict stands, for the error it reports.
 
 To understand why an effect was named, read on in ``selection/search.py``, what is tried and in which order,
 and in ``selection/criteria.py``, which decides.

@@ -1,8 +1,8 @@
 """How well numbers predict records that they were not fitted to: cross-validation at the price of a step.
 
 Each record in turn is left out; the numbers that the others would give follow from the optimum by one
-Gauss–Newton step without that record, inside the bounds (the approximate leave-one-out of Beirami et al. 2017,
-with a record in place of a sample); the record is then evaluated with those numbers, exactly. With fewer than
+Gauss–Newton step without that record, inside the bounds (approximate leave-one-out, Beirami et al. 2017, with
+a record in place of a sample); the record is then evaluated with those numbers, exactly. With fewer than
 three records, thirds of each record in time are left out instead, all records together.
 """
 
