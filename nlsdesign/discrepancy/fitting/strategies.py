@@ -31,12 +31,13 @@ EVALUATIONS, COARSE_EVALUATIONS = 40, 20
 """Bounds of evaluations; fits of laws that suit the records end well below them by themselves."""
 LONG_EVALUATIONS = 6
 """The same where a step takes so many operations that each evaluation lasts seconds."""
-COARSE_TOLERANCE = 3e-4
+COARSE_TOLERANCE = 1e-3
 """A coarse fit ends where it promises to gain less than this share of the cost: enough to compare."""
 POLISHED_TOLERANCE = 2e-5
 """The same for a fit to all samples of a hypothesis with effects; the declared model is fitted to the end."""
 LEAST_GAIN = 1e-3
-"""A coarse fit ends too where it promises to gain less than this share of the cost without the effect."""
+"""Where a body flies freely, a coarse fit ends too where it promises to gain less than this share of the cost
+without the effect: more is not known there."""
 LONG_STEP = 30_000
 """Operations per step beyond which evaluations are few."""
 EXPENSIVE_STEP = 100_000
@@ -133,15 +134,18 @@ class FitProblem:
         return max((e.driven.instructions for e in self.fitted), default=0)
 
     @property
+    def cost_before(self) -> float:
+        """Half the sum of squares without the newest effect, on the records that fits may see."""
+        names = {e.record.name for e in self.fitted}
+        return 0.5 * sum(t.squares for (b, r), t in self.before.items() if b in self.blocks and r in names)
+
+    @property
     def limits(self) -> Limits:
         """Where a plain fit may stop."""
-        names = {e.record.name for e in self.fitted}
-        now = 0.5 * sum(t.squares for (b, r), t in self.before.items() if b in self.blocks and r in names)
-        least = LEAST_GAIN * now if self.coarse and self.new else 0.0
         if self.coarse:
-            limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE, least)
+            limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE)
         else:
-            limits = Limits(EVALUATIONS, POLISHED_TOLERANCE if self.effects else 0.0, least)
+            limits = Limits(EVALUATIONS, POLISHED_TOLERANCE if self.effects else 0.0)
         if self.effects and self.instructions > LONG_STEP:
             limits = replace(limits, evaluations=LONG_EVALUATIONS)
         return limits
@@ -290,7 +294,7 @@ class RobustOverFreeFlight(Smooth):
             starts = [begun[costs.index(min(costs))]]
             if not self._explains_enough(problem.before, slow, min(costs)):
                 limits = replace(limits, evaluations=0)
-        least = limits.least
+        least = LEAST_GAIN * problem.cost_before if problem.new else 0.0
         best = best_fit(slow, starts, replace(limits, least=0.1 * least), known={})
         known = {key: tally.squares for key, tally in problem.before.items()}
         return fit(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -15,7 +15,7 @@ from ...errors import ConvergenceError, unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import fit
+from ...identification.estimation.least_squares import Fit, fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
 from ...identification.records.measurement import Record, RecordSet
 from ...model import Variable, flatten
@@ -283,7 +283,14 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
         if then[name].value != now[name].value:
             values[name] *= now[name].number / then[name].number
     added = (*_with_unknowns(hypothesis.added, old), candidate)
-    return replace(hypothesis, assembly=candidate.assembly, added=added, values=values)
+    fits = {blocks: _renamed(fit, renamed) for blocks, fit in hypothesis.fits.items()}
+    return replace(hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits)
+
+
+def _renamed(fit: Fit, renamed: Callable[[str], str]) -> Fit:
+    """Return a fit under the names that its numbers have after an edit."""
+    parameters = tuple(replace(p, name=renamed(p.name)) for p in fit.parameters)
+    return replace(fit, parameters=parameters, values={renamed(n): v for n, v in fit.values.items()})
 
 
 def _refittable(parameters: Sequence[Variable]) -> list[Variable]:

@@ -218,10 +218,15 @@ class _Search:
                 if step is not None:
                     break
             self.tried = self.tried or self._account(present, tried)
-            further = [step] if step else self._pair(tried, present, open_blocks[0])
-            if not further:
+            if step is not None:
+                steps.append(step)
+            elif not steps:
+                # Beside an effect whose form is not exact, any two others would help a little.
+                steps += self._pair(tried, present, open_blocks[0])
+            else:
                 break
-            steps += further
+            if not steps:
+                break
             present = steps[-1].chosen
         return steps
 
