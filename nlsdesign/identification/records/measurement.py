@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -24,6 +24,7 @@ from .quality import Finding
 from .table_files import RecordTable, read_table, table_files
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Role = Literal["fit", "selection", "held_out"]
 
 
@@ -44,6 +45,9 @@ class Record:
         File, and the changes made to its samples.
     resolution
         Noise and count of signals that were interpolated or filtered; their samples no longer show it.
+    masked
+        Samples of a signal that are faulty, shape (n,), by signal: they stand interpolated in the trace, and a
+        residual that depends on one of them does not count.
     """
 
     name: str
@@ -51,6 +55,7 @@ class Record:
     role: Role = "fit"
     source: str = ""
     resolution: Mapping[str, Resolution] = field(default_factory=dict)
+    masked: Mapping[str, Mask] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
@@ -72,7 +77,22 @@ class Record:
         """
         if signal in self.resolution:
             return self.resolution[signal]
-        return Resolution(noise_of(self.trace[signal]), quantum_of(self.trace[signal]))
+        # What was interpolated has another noise, and no counts.
+        values = self.trace[signal][~self.masked_in([signal])]
+        return Resolution(noise_of(values), quantum_of(values))
+
+    def masked_in(self, signals: Iterable[str]) -> Mask:
+        """Return the samples that are masked in at least one of these signals, shape (n,).
+
+        Parameters
+        ----------
+        signals
+            Full names.
+        """
+        result = np.zeros(len(self.trace), dtype=bool)
+        for name in signals:
+            result |= self.masked.get(name, False)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,7 +342,9 @@ def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
 def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
     trace, name = record.trace, f"{record.name} ({label})"
     signals = {n: v[rows] for n, v in trace.signals.items()}
-    return replace(record, name=name, role=role, trace=Trace(trace.time[rows], signals, trace.units, name))
+    part = Trace(trace.time[rows], signals, trace.units, name)
+    masked = {n: m[rows] for n, m in record.masked.items()}
+    return replace(record, name=name, role=role, trace=part, masked=masked)
 
 
 def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> tuple[Record, tuple[Finding, ...]]:
