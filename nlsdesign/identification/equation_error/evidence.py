@@ -108,6 +108,8 @@ def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
     """
     n = len(record.trace)
     matrix = smoothing(n, block.width, STRIDE)
+    masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
+    matrix = matrix[np.flatnonzero((matrix != 0.0) @ masked.astype(float) == 0.0)]
     inputs = measured_inputs(block, record)
     if block.moving is not None:
         speed = np.abs(inputs[[v.name for v in block.model.inputs].index(block.moving)])
@@ -343,14 +345,17 @@ class Bench:
         if key not in self._thin:
             k = self._skip(record)
             trace = record.trace
-            raw = self.floors[block, record.name].raw_sigma[::k]
+            counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
+            raw = self.floors[block, record.name].raw_sigma[::k][counted]
             one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr")[::k])
+            masked = record.masked
             if not whole:
                 trace = Trace(
                     trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
                 )
-                one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace)))
-            self._thin[key] = replace(record, trace=trace), Floor(one, raw, raw)
+                one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr"))
+                masked = {n: m[::k] for n, m in masked.items()}
+            self._thin[key] = replace(record, trace=trace, masked=masked), Floor(one[counted], raw, raw)
         return self._thin[key]
 
     def _skip(self, record: Record) -> int:
