@@ -28,7 +28,7 @@ from ...symbolic import Expression, depends
 _NEAR_ZERO = 1e-9
 """Drive, in SI, below which the slope at zero stands for the straight line to the measured point."""
 _LEAST_SLOPE = 0.1
-"""Of that line, the least slope that is taken for a tangent: no error of a drive counts more than ten times."""
+"""Of that line, the least slope that is taken for a tangent: no error counts more than ten times."""
 
 
 class BalanceTerms(NamedTuple):
