@@ -34,12 +34,20 @@ from .materials.stress_softening import LargestMotion, OgdenRoxburgh, StressSoft
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
-from .mechanics.carriage import ConstantForce, LinearDrive
-from .mechanics.drive_chain import DriveDelay, DrivePart, DriveSaturation
-from .mechanics.friction import CoulombFriction, LoadFriction, QuadraticDrag, StribeckFriction
+from .mechanics.carriage import LinearDrive
+from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
+from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
+from .mechanics.friction import (
+    AsymmetricFriction,
+    CoulombFriction,
+    LoadFriction,
+    QuadraticDrag,
+    StribeckFriction,
+)
 from .mechanics.gear import Gear, LossyGear
+from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
-from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
+from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
@@ -61,12 +69,14 @@ __all__ = [
     "ArrheniusShift",
     "ArrudaBoyce",
     "Assembly",
+    "AsymmetricFriction",
     "Backlash",
     "Body",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
-    "ConstantForce",
+    "ConstantLoad",
+    "Controller",
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
@@ -74,6 +84,7 @@ __all__ = [
     "Domain",
     "Drift",
     "DriveDelay",
+    "DriveLag",
     "DrivePart",
     "DriveSaturation",
     "Driven",
@@ -89,12 +100,15 @@ __all__ = [
     "ForceSensor",
     "Gear",
     "GearedMotor",
+    "GravityLoad",
     "Guide",
     "HeatBalance",
+    "HorizontalTorque",
     "Hyperelastic",
     "Inertia",
     "Inertial",
     "InextensibleCable",
+    "Integral",
     "LargestMotion",
     "LinearDrive",
     "LinearElastic",
@@ -102,6 +116,7 @@ __all__ = [
     "LossyGear",
     "LuGreFriction",
     "Mass",
+    "MassOnArm",
     "Material",
     "NeoHooke",
     "Ogden",
@@ -110,11 +125,14 @@ __all__ = [
     "Parallel",
     "Part",
     "PermanentSet",
+    "PositionLoop",
     "Property",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "RateFeedback",
     "Regularised",
+    "ResistiveMotor",
     "RigidStop",
     "Rising",
     "Rounded",
@@ -126,6 +144,7 @@ __all__ = [
     "Slack",
     "SlidingFillers",
     "Specimen",
+    "SpeedLoop",
     "Spring",
     "Springpot",
     "StrainStiffening",

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...components import (
     Assembly,
     Backlash,
-    ConstantForce,
+    ConstantLoad,
     GearedMotor,
     Inertia,
     Inertial,
@@ -72,7 +72,7 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
 
 
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
-    edited, part = tied(assembly, "offset", body, ConstantForce(load=number(0.0, "N")))
+    edited, part = tied(assembly, "offset", body, ConstantLoad(load=number(0.0, "N")))
     yield Edit(edited, (Unknown(f"{part}.load", (0.0,), -1e3, 1e3),))
 
 
@@ -113,7 +113,7 @@ constant_force = Effect(
             _constant,
             "a force that is the same forward and backward, at any speed and place",
             "Janot et al. 2019",
-            "constant force",
+            "constant load",
         ),
     ),
 )
