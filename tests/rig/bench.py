@@ -75,7 +75,7 @@ def _cam_tables(cam: Cam, bump: float) -> tuple[list[float], list[float]]:
     return np.concatenate([[0.0], np.cumsum(steps)]).tolist(), lever_arm.tolist()
 
 
-def _friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | None:
+def friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | None:
     """Level of dry friction (N·m) from speed, angle and spring torque; None where there is none."""
     usual = hidden.friction or hidden.breakaway or hidden.load_friction or hidden.spot_friction
     if not (usual or hidden.place_friction):
@@ -97,7 +97,7 @@ def _friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | 
     return level
 
 
-def _prox(speed: float, threshold: float) -> float:
+def prox(speed: float, threshold: float) -> float:
     """Speed after dry friction that can change it by at most the threshold."""
     if speed > threshold:
         return speed - threshold
@@ -119,13 +119,13 @@ def _gear_backlash(drive: Drivetrain, gap: float) -> Callable[..., tuple[float, 
     def advance(
         speed: float, cam_speed: float, lead: float, push: float, load: float, friction: float
     ) -> tuple[float, float]:
-        free = _prox(speed + STEP * push / motor_inertia, friction / motor_inertia)
+        free = prox(speed + STEP * push / motor_inertia, friction / motor_inertia)
         flight = cam_speed - STEP * load / cam_inertia
         closing = min(max(free - flight, (-half - lead) / STEP), (half - lead) / STEP)
         if closing == free - flight:
             return free, flight
         momentum = motor_inertia * speed + STEP * push + cam_inertia * (flight + closing)
-        together = _prox(momentum / drive.inertia, friction / drive.inertia)
+        together = prox(momentum / drive.inertia, friction / drive.inertia)
         return together, together - closing
 
     return advance
@@ -151,7 +151,7 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
     k_p, k_d, limit = servo.stiffness, servo.damping, servo.limit
     delta, lever = _cam_tables(built.cam, hidden.profile_error)
     pull = pull_of(built.rubber, hidden, STEP, round(hidden.cold_place * command.time.size))
-    level = _friction_level(hidden)
+    level = friction_level(hidden)
     backlash = _gear_backlash(drive, hidden.gap) if hidden.gap else None
     ripple, order, phase = hidden.ripple, hidden.ripple_order, hidden.ripple_phase
     stop, stop_place, weight = hidden.stop, hidden.stop_place, hidden.weight
@@ -192,6 +192,6 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
             motor += STEP * speed
             cam += STEP * cam_speed
         else:
-            speed = _prox(speed + STEP * (push - load) / inertia, friction / inertia)
+            speed = prox(speed + STEP * (push - load) / inertia, friction / inertia)
             cam = motor = motor + STEP * speed
     return History(command.time, *np.array(rows).T)

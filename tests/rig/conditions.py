@@ -1,8 +1,8 @@
 """What makes records hard to read although nothing is hidden: colour of the noise, spikes, coarse counts.
 
-``coloured``  force noise of the declared size through x⁺ = q x + √(1 − q²) n, q = exp(−1/(f τ)), one time τ for
-              each record, 5 to 100 ms, beside the white one
-``flicker``   force noise of the declared size, the sum of five such with τ from 4 ms to 4 s: about 1/f
+``coloured``  force noise x⁺ = q x + √(1 − q²) n with q = exp(−1/(f τ)), one time τ for each record, 5 to
+              100 ms, beside the white one; its size is a multiple of the declared noise
+``flicker``   the sum of five such with τ from 4 ms to 4 s: about 1/f
 ``spikes``    single samples of any channel off by 30 to 3000 times the noise, each way
 ``coarse``    an encoder of 512 to 2048 counts per turn, declared as such
 """
@@ -48,9 +48,14 @@ class Conditions:
         if self.flicker:
             parts = [first_order_noise(count, time * rate, draw) for time in _FLICKER_TIMES]
             table[:, 3] += self.flicker * sensors.force_noise * np.sum(parts, axis=0) / len(parts) ** 0.5
+        return self.spiked(table, sensors, draw)
+
+    def spiked(self, table: np.ndarray, sensors: Sensors, draw: np.random.Generator) -> np.ndarray:
+        """A record with its spikes; columns time (s), angle (rad), current (A), and maybe force (N)."""
+        table, count = table.copy(), len(table)
         sizes = np.array([sensors.angle_quantum, sensors.current_noise, sensors.force_noise])
         for row in draw.choice(np.arange(1, count - 1), size=self.spikes, replace=False):
-            column = int(draw.integers(3))
+            column = int(draw.integers(table.shape[1] - 1))
             size = 30.0 * 100.0 ** draw.uniform() * sizes[column]
             table[row, 1 + column] += size if draw.uniform() < 0.5 else -size
         return table

@@ -128,6 +128,8 @@ class Hidden:
     lowpass: float = 0.0  # s, 1/ω of a filter of second order
     constant_torque: float = 0.0  # N·m
     weight: float = 0.0  # N·m, with its arm level
+    weight_phase: float = 0.0  # rad
+    shaft_share: float = 0.0  # of the inertia of a machine, behind a shaft that twists
     place_friction: float = 0.0  # N·m, mean of a level that goes with the angle
     place_phase: float = 0.0  # rad
     constant_drift: float = 0.0  # 1/s
@@ -316,6 +318,7 @@ _SHAPES = (
     "chirp_frequency",
     "chirp_rate",
     "place_phase",
+    "weight_phase",
 )
 
 
@@ -327,7 +330,11 @@ def hidden_effects(actuator: Actuator, effects: Mapping[str, float], draw: np.ra
     ValueError
         If an effect has no such name or a strength is negative or not finite.
     """
-    sizes = _sizes(actuator, draw)
+    return applied(_sizes(actuator, draw), effects)
+
+
+def applied(sizes: Mapping[str, Mapping[str, float]], effects: Mapping[str, float]) -> Hidden:
+    """Sizes of the named effects from the fields that each sets at strength 1; raises as `hidden_effects`."""
     hidden = Hidden()
     for name, strength in effects.items():
         if name not in sizes:

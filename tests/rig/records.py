@@ -14,11 +14,16 @@ from .effects import Hidden, hidden_effects
 
 # Streams of random numbers, one for each purpose: with the same seed the actuator, the commands and the noise
 # are the same whatever is hidden.
-_BUILD, _COMMAND, _EFFECT, _NOISE, _CONDITIONS = range(5)
+_BUILD, _COMMAND, _EFFECT, _NOISE, _CONDITIONS, _MISTAKE = range(6)
 
 
 def _stream(seed: int, purpose: int, record: int = 0) -> np.random.Generator:
     return np.random.default_rng([seed, purpose, record])
+
+
+def stream_of_mistakes(seed: int) -> np.random.Generator:
+    """Random numbers for what the makers declare wrongly."""
+    return _stream(seed, _MISTAKE)
 
 
 def truth(actuator: Actuator, effects: Mapping[str, float], seed: int) -> tuple[Actuator, Hidden]:
