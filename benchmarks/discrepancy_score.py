@@ -19,6 +19,8 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -32,6 +34,7 @@ from benchmarks._score_table import Result, table
 def main() -> None:
     """Run the cases that have no result yet, and write the table."""
     given = _arguments()
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))  # and the pool ends with it
     results = _read(given.out)
     done = {r["case"] for r in results}
     todo = [case for case in _wanted(given) if case.name not in done]

@@ -187,7 +187,7 @@ def _sizes(machine: Machine, draw: np.random.Generator) -> dict[str, dict[str, f
         "torque_constant_saturation": {"saturation": 1.0 / (1.5 * current)},
         "constant_torque": {"constant_torque": 0.06 * torque},
         "current_sensor_bias": {"current_bias": 0.06 * current},
-        "torque_constant_drift": {"constant_drift": 0.012},
+        "torque_constant_drift": {"constant_drift": 0.02},
         "winding_heat": {"winding_heat": 0.08 / current**2},
         "angle_sensor_eccentricity": {"eccentricity": 0.02, "disc_phase": phase[2]},
         "gravity_load": {"weight": 0.20 * torque, "weight_phase": phase[3]},
