@@ -163,20 +163,20 @@ def _of_seed(seed: int) -> Iterator[Case]:
         yield Case("machine clean", machine.name, (), 0.0, seed)
 
 
-def sample(found: Sequence[Case], count: int) -> list[Case]:
+def sample(pool: Sequence[Case], count: int) -> list[Case]:
     """Return so many cases, spread evenly over the tiers, and in each over what is hidden; always the same.
 
     Parameters
     ----------
-    found
+    pool
         To draw from.
     count
         How many; more than there are give all.
     """
     draw = np.random.default_rng(2026)
     queues = []
-    for tier in dict.fromkeys(case.tier for case in found):
-        own = [case for case in found if case.tier == tier]
+    for tier in dict.fromkeys(case.tier for case in pool):
+        own = [case for case in pool if case.tier == tier]
         times: Counter[tuple[str, ...]] = Counter()
         ranked = []
         for i in draw.permutation(len(own)):

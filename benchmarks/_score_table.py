@@ -136,8 +136,8 @@ def _pairs(results: Sequence[Result], tiers: Iterable[str], names: Names) -> lis
     wanted = set(tiers)
     # A diagnosis that failed is one that was wrong; a yardstick that was not asked is not counted.
     absent: list[str] | None = ["failed"] if names is diagnosis else None
-    found = [(r, absent if (given := names(r)) is None else given) for r in results if r["tier"] in wanted]
-    return [(r, n) for r, n in found if n is not None]
+    pairs = [(r, absent if (given := names(r)) is None else given) for r in results if r["tier"] in wanted]
+    return [(r, n) for r, n in pairs if n is not None]
 
 
 def _rate(

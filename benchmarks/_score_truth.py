@@ -80,4 +80,4 @@ def covered(verdict: Verdict, numbers: TrueNumbers) -> dict[str, list[float | bo
 
 
 def _row(value: float, error: float, true: float) -> list[float | bool]:
-    return [value, error, true, bool(abs(value - true) <= INTERVAL * error)]
+    return [float(value), float(error), float(true), bool(abs(value - true) <= INTERVAL * error)]
