@@ -2,9 +2,9 @@
 
     python -m benchmarks.next_record [--seeds 1-3] [--out next_record.jsonl]
 
-For each pair of effects the rig leaves a few records in which both look alike, the experiment is proposed from
-the two fitted hypotheses, the rig runs it with the true effect, and both are fitted again. Counted are the cases
-that were undecided before, and those of them in which the true effect is ahead afterwards.
+For each pair of effects the rig leaves a few gentle records in which both look alike, the experiment is
+proposed from the two fitted hypotheses, the rig runs it with the true effect, and both are fitted again.
+Counted are the cases that were not decided rightly before, and those of them that are afterwards.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from models.test_rig import test_rig_deck
 from nlsdesign.components import Assembly
 from nlsdesign.discrepancy import effects
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.planning.experiment import Experiment, next_experiment
+from nlsdesign.discrepancy.planning.experiment import next_experiment
+from nlsdesign.discrepancy.planning.limits import Limits
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.errors import ConvergenceError
-from nlsdesign.identification import RecordSet, load_records
+from nlsdesign.identification import RecordSet
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from tests.rig import ACTUATORS, write_declaration, write_records
@@ -67,7 +68,7 @@ def _rise(degrees: float, duration: float) -> Command:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two effects that the commands do not tell apart."""
+    """Two effects that the commands hardly tell apart."""
 
     one: str
     other: str
@@ -76,15 +77,24 @@ class Pair:
 
 
 PAIRS = (
-    Pair("force_sensor_delay", "second_relaxation", {"sine": _sine(15.0, 2.0, 3.0)}),
+    Pair("force_sensor_delay", "second_relaxation", {"sine": _sine(5.0, 1.0, 2.0)}),
     Pair("coulomb_friction", "stribeck_friction", {"sine": _sine(25.0, 3.0, 4.0)}, nested=True),
-    Pair("load_dependent_friction", "cable_friction", {"sine": _sine(20.0, 0.5, 6.0)}),
-    Pair("permanent_set", "cable_slack", {"sine": _sine(25.0, 0.5, 6.0)}),
-    Pair("current_sensor_bias", "coulomb_friction", {"rise": _rise(30.0, 3.0)}),
-    Pair("coulomb_friction", "quadratic_drag", {"ramps": _ramps(15.0, 1.0, 4.0)}),
-    Pair("rate_independent_hysteresis", "second_relaxation", {"sine": _sine(15.0, 1.0, 4.0)}),
-    Pair("force_sensor_bias", "cable_slack", {"rise": _rise(30.0, 3.0)}),
+    Pair("load_dependent_friction", "cable_friction", {"sine": _sine(10.0, 0.5, 4.0)}),
+    Pair("permanent_set", "cable_slack", {"sine": _sine(12.0, 0.5, 4.0)}),
+    Pair("current_sensor_bias", "coulomb_friction", {"rise": _rise(20.0, 3.0)}),
+    Pair("coulomb_friction", "quadratic_drag", {"ramps": _ramps(12.0, 1.0, 3.0)}),
+    Pair("rate_independent_hysteresis", "second_relaxation", {"sine": _sine(6.0, 1.0, 2.0)}),
+    Pair("force_sensor_bias", "cable_slack", {"rise": _rise(15.0, 2.0)}),
 )
+STRENGTHS = (1.0, 0.5, 0.25)
+"""Tried in this order until the first records leave a pair undecided."""
+LIMITS = Limits(
+    np.radians(-45.0), np.radians(45.0), speed=8.0, acceleration=300.0,
+    drive=(("current_sensor.reading", 12.0),),
+)  # fmt: skip
+"""Of the machine: its servo clips at 12 A, and turns to 45° in the records of a whole set."""
+DURATION = 8.0
+"""Of the proposed record in s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +154,15 @@ def case(pair: Pair, truth: str, actuator: str, seed: int) -> dict[str, Any]:
     seed
         Of the rig.
     """
-    made, hidden = ACTUATORS[actuator], {truth: 1.0}
+    for strength in STRENGTHS:
+        result = _at(pair, truth, actuator, seed, strength)
+        if result["open"]:
+            break
+    return result
+
+
+def _at(pair: Pair, truth: str, actuator: str, seed: int, strength: float) -> dict[str, Any]:
+    made, hidden = ACTUATORS[actuator], {truth: strength}
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         write_declaration(folder, made)
@@ -156,14 +174,17 @@ def case(pair: Pair, truth: str, actuator: str, seed: int) -> dict[str, Any]:
         declared = test_rig_deck(folder / "rig.toml", folder / "cam.csv")
         model = flatten(declared)
         before = fitted(declared, load_whole(folder, model), pair)
-        begin = clock.perf_counter()
-        proposed = next_experiment(before.hypotheses, before.bench)
-        seconds = clock.perf_counter() - begin
+        ahead = _ahead(before, pair, truth)
         result: dict[str, Any] = {
             "pair": [pair.one, pair.other], "truth": truth, "actuator": actuator, "seed": seed,
-            "before": round(_ahead(before, pair, truth), 2), "undecided": undecided(before, pair, truth),
-            "planning_seconds": round(seconds, 2),
+            "strength": strength, "before": round(ahead, 2), "open": ahead < DECIDED,
         }  # fmt: skip
+        if not result["open"]:
+            return result
+        begin = clock.perf_counter()
+        proposed = next_experiment(before.hypotheses, before.bench, limits=LIMITS, duration=DURATION)
+        seconds = clock.perf_counter() - begin
+        result["planning_seconds"] = round(seconds, 2)
         if proposed is None:
             return {**result, "right": False, "proposed": None}
         command = command_of(proposed.command.time, proposed.command[proposed.signal])
@@ -175,7 +196,7 @@ def case(pair: Pair, truth: str, actuator: str, seed: int) -> dict[str, Any]:
         "proposed": proposed.motion,
         "expected": round(proposed.separations[0].standard_errors, 2),
         "after": round(_ahead(after, pair, truth), 2),
-        "right": not undecided(after, pair, truth) and _ahead(after, pair, truth) > 0.0,
+        "right": _ahead(after, pair, truth) >= DECIDED,
     }
 
 
@@ -194,13 +215,6 @@ def load_record_of(file: Path, model: Any) -> RecordSet:
 
 def _ahead(result: Fitted, pair: Pair, truth: str) -> float:
     return result.lead if truth == pair.one else -result.lead
-
-
-def undecided(result: Fitted, pair: Pair, truth: str) -> bool:
-    """Tell whether the pair is not told apart; of nested effects the simpler one need not be ahead."""
-    if pair.nested and truth == pair.one:
-        return False
-    return abs(result.lead) < DECIDED
 
 
 def cases(seeds: Sequence[int]) -> Iterator[tuple[Pair, str, str, int]]:
@@ -231,9 +245,9 @@ def main() -> None:
         if given.out:
             with given.out.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(result) + "\n")
-    open_before = [r for r in results if r["undecided"] or r["before"] < 0.0]
-    right = sum(r["right"] for r in open_before)
-    print(f"{len(results)} cases, {len(open_before)} undecided or wrong before, {right} of these right after")
+    tried = [r for r in results if r["open"]]
+    right = sum(r["right"] for r in tried)
+    print(f"{len(results)} cases, {len(tried)} not decided rightly before, {right} of these afterwards")
 
 
 if __name__ == "__main__":

@@ -16,13 +16,13 @@ from .limits import Limits
 
 Array = NDArray[np.float64]
 
-_SIZES = (1.0, 0.5, 0.2)
+_SIZES = (1.0, 0.3)
 """Amplitudes, as shares of what the limits allow."""
-_FREQUENCIES, _PERIODS = 4, 2.0
+_FREQUENCIES, _PERIODS = 3, 2.0
 """So many frequencies of each amplitude, from so many periods in the record up to the limit of the speed."""
 _SAMPLES_PER_PERIOD = 40
 """The highest frequency has so many samples a period, so that its filtered acceleration is still true."""
-_SLOWNESS = (0.01, 0.03, 0.1, 0.3)
+_SLOWNESS = (0.01, 0.05, 0.25)
 """Speeds of ramps, as shares of the limit."""
 _RISE = 0.05
 """Share of the record over which a motion grows from rest and comes back to it."""
@@ -115,11 +115,11 @@ class _Family:
         if size <= 0.0:
             return
         for share in _SIZES if not where else _SIZES[:1]:
-            for frequency in self._frequencies(share * size):
+            for frequency in self._frequencies(share * size)[-1 if where else 0 :]:
                 wave = self._wave(frequency, centre != 0.0)
                 words = f"a sine of {self._share(share)}{where} at {frequency:.2g} Hz"
                 yield words, self._window * share * self._placed(centre, size, wave)
-        for slowness in _SLOWNESS:
+        for slowness in _SLOWNESS[1 if where else 0 :]:
             wave = self._triangle(slowness * self._speed / size, centre != 0.0)
             if wave is not None:
                 yield (
@@ -127,8 +127,9 @@ class _Family:
                     self._placed(centre, size, wave),
                 )
         yield from self._growing(centre, size, where)
-        yield f"a multisine{where}", self._multisine(centre, size)
-        yield f"a sweep of frequency{where}", self._sweep(centre, size)
+        if not where:
+            yield "a multisine", self._multisine(centre, size)
+            yield "a sweep of frequency", self._sweep(centre, size)
 
     def _share(self, share: float) -> str:
         return "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"

@@ -254,7 +254,7 @@ class _Plan:
         return made_ready(hypothesis, self._bench, driven, self._noise)
 
     def limits(self) -> Limits:
-        """Return what the records show that the machine has done; a declared limit of a drive stands first."""
+        """Return what the records show that the machine has done; declared limits of drives stand first."""
         seen = limits_seen(
             self._bench.records.records,
             self.commanded,

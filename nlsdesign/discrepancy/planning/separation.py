@@ -35,7 +35,7 @@ Values = Mapping[str, float]
 
 _OPEN = 0.3
 """Standard error in the fitted scale above which a number may be elsewhere: data may come from there, too."""
-_POINTS, _MOST = 16, 6
+_POINTS, _MOST = 16, 3
 """Points that are tried for the numbers that are open, and how many of them are kept."""
 _FURTHEST = 10.0
 """Half width of a number without bounds, in the fitted scale."""
@@ -173,9 +173,9 @@ def _information(fit: Fit) -> Array:
 def _as_good(rival: Rival, bench: Bench, noise: Values, fit: Fit) -> list[Values]:
     """Return numbers elsewhere in their bounds that explain the records so far as well.
 
-    The numbers that an effect has brought and the records leave open are put all over their bounds, all others
-    refitted to that by one linear step. The strongest come first: what is too weak for any record decides
-    nothing.
+    The numbers that an effect has brought and the records leave open are put all over their bounds, all
+    others refitted to that by one linear step. The strongest come first: what is too weak for any record
+    decides nothing.
     """
     own = {u.name for u in rival.hypothesis.unknowns}
     names = [p.name for p in fit.parameters]
