@@ -42,6 +42,7 @@ from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
+from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
 from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
@@ -140,6 +141,8 @@ __all__ = [
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
+    "UnnamedFriction",
+    "UnnamedSpring",
     "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",
