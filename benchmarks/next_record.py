@@ -77,16 +77,16 @@ class Pair:
 
 
 PAIRS = (
-    Pair("force_sensor_delay", "second_relaxation", {"sine": _sine(5.0, 1.0, 2.0)}),
+    Pair("force_sensor_delay", "second_relaxation", {"sine": _sine(3.0, 1.0, 2.0)}),
     Pair("coulomb_friction", "stribeck_friction", {"sine": _sine(25.0, 3.0, 4.0)}, nested=True),
     Pair("load_dependent_friction", "cable_friction", {"sine": _sine(10.0, 0.5, 4.0)}),
-    Pair("permanent_set", "cable_slack", {"sine": _sine(12.0, 0.5, 4.0)}),
+    Pair("permanent_set", "cable_slack", {"rise": _rise(12.0, 3.0)}),
     Pair("current_sensor_bias", "coulomb_friction", {"rise": _rise(20.0, 3.0)}),
-    Pair("coulomb_friction", "quadratic_drag", {"ramps": _ramps(12.0, 1.0, 3.0)}),
-    Pair("rate_independent_hysteresis", "second_relaxation", {"sine": _sine(6.0, 1.0, 2.0)}),
-    Pair("force_sensor_bias", "cable_slack", {"rise": _rise(15.0, 2.0)}),
+    Pair("coulomb_friction", "quadratic_drag", {"ramps": _ramps(8.0, 1.0, 2.0)}),
+    Pair("rate_independent_hysteresis", "second_relaxation", {"rise": _rise(8.0, 1.5)}),
+    Pair("cam_angle_offset", "cable_slack", {"rise": _rise(10.0, 3.0)}),
 )
-STRENGTHS = (1.0, 0.5, 0.25)
+STRENGTHS = (1.0, 0.5, 0.25, 0.125)
 """Tried in this order until the first records leave a pair undecided."""
 LIMITS = Limits(
     np.radians(-45.0), np.radians(45.0), speed=8.0, acceleration=300.0,
