@@ -322,10 +322,15 @@ def _declared_limits(model: FlatModel, measured: MeasuredSignals) -> dict[str, f
 
 
 def _usual(measured: MeasuredSignals) -> str:
-    """Return the signal that benches command: the motion, or else the drive."""
-    named = [*measured.motions, *measured.drives]
+    """Return the signal that benches command: the motion where no other one is measured, or else the drive."""
+    bodies = {body.name for body in measured.motions.values() if not body.prescribed}
+    motions = list(measured.motions) if len(bodies) <= 1 else []
+    free = [s for s in motions if not measured.motions[s].prescribed]
+    named = [*free, *motions, *measured.drives]
     if not named:
-        raise MeasurementError("records", "measure neither a motion nor a drive", next_step="measure one")
+        raise MeasurementError(
+            "records", "measure nothing that can be commanded", next_step="measure a motion or a drive"
+        )
     return named[0]
 
 
