@@ -322,7 +322,7 @@ def _declared_limits(model: FlatModel, measured: MeasuredSignals) -> dict[str, f
 
 
 def _usual(measured: MeasuredSignals) -> str:
-    """Return the signal that benches command: the motion where no other one is measured, or else the drive."""
+    """Return what benches command: the motion where it is the only one measured, or else the drive."""
     bodies = {body.name for body in measured.motions.values() if not body.prescribed}
     motions = list(measured.motions) if len(bodies) <= 1 else []
     free = [s for s in motions if not measured.motions[s].prescribed]
