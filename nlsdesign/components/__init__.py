@@ -50,6 +50,7 @@ from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
+from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
 from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
@@ -159,6 +160,8 @@ __all__ = [
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
+    "UnnamedFriction",
+    "UnnamedSpring",
     "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",

@@ -90,3 +90,17 @@ def commands(draw: np.random.Generator) -> dict[str, Command]:
     made["hold"] = hold(_clock(HOLD_TIME * len(HOLDS)))
     made["multisine"] = multisine(_clock(MULTISINE_TIME), draw)
     return made
+
+
+def command_of(time: np.ndarray, angle: np.ndarray) -> Command:
+    """A command from samples of the wanted angle, with a cubic spline through them."""
+    clock = np.arange(round((time[-1] - time[0]) / STEP)) * STEP
+    slope = np.gradient(angle, time)
+    step = time[1] - time[0]
+    place = np.minimum((clock / step).astype(int), len(time) - 2)
+    x = clock / step - place
+    left, right, into, out = angle[place], angle[place + 1], step * slope[place], step * slope[place + 1]
+    bend, more = 3.0 * (right - left) - 2.0 * into - out, into + out - 2.0 * (right - left)
+    return Command(
+        clock, left + x * (into + x * (bend + x * more)), (into + x * (2.0 * bend + 3.0 * x * more)) / step
+    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from .actuators import Actuator, Sensors, as_built
 from .bench import History, Servo, simulate
-from .commands import RECORDS, STEP, commands
+from .commands import RECORDS, STEP, Command, commands
 from .conditions import PLAIN, Conditions
 from .effects import Hidden, hidden_effects
 
@@ -141,3 +141,15 @@ def make_records(
             table = measure(simulate(built, hidden, servo, wanted[name]), sensors, hidden, draw)
             made[name] = conditions.disturbed(table, sensors, _stream(seed, _CONDITIONS, number))
     return made
+
+
+def make_record(
+    actuator: Actuator, effects: Mapping[str, float], seed: int, command: Command, number: int
+) -> np.ndarray:
+    """One more record of the actuator behind `make_records`, of a command of one's own.
+
+    The number makes its noise another one than that of the other records; the six of a set have 0 to 5.
+    """
+    built, hidden = truth(actuator, effects, seed)
+    history = simulate(built, hidden, Servo.for_actuator(actuator), command)
+    return measure(history, actuator.sensors, hidden, _stream(seed, _NOISE, number))

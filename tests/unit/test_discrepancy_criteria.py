@@ -32,7 +32,7 @@ from nlsdesign.discrepancy.selection.criteria import (
 )
 
 RULE, ROWS, RECORDS, PIECES = Criteria(), 1000, ("slow", "quick"), 5
-SHARES_ONLY = replace(RULE, worse=1e3, least_ratio=0.0)
+SHARES_ONLY = replace(RULE, worse=1e3)
 """The rule without what it asks of single records and pieces."""
 STEADY = tuple(1.0 + 0.1 * k for k in range(-2, 3))
 """Shares of a record's excess in its pieces: they differ a little."""
@@ -140,7 +140,7 @@ def test_an_effect_that_spoils_the_whole_may_not_be_named() -> None:
 
 
 def test_a_gain_that_noise_can_give_names_nothing() -> None:
-    before = {"spring": excess(24.0, is_open=True)}
+    before = {"spring": excess(27.0, is_open=True)}
     after = {"spring": excess(0.0)}
     (words,) = objections(RULE, before, Rival("a", "a", 1, after, standing()))
     assert "squares of the noise" in words
@@ -153,24 +153,25 @@ def test_coloured_residuals_count_for_less() -> None:
     assert objections(RULE, before, Rival("a", "a", 1, after, standing()))
 
 
-# --- clause 2: a gain against its own scatter -----------------------------------------------------
+# --- clause 2: a gain that does not rest on a single piece ----------------------------------------
 
 
 def test_the_standard_error_of_a_gain_is_that_of_a_sum_over_pieces() -> None:
     before, after = {"spring": excess(1e4)}, {"spring": excess(0.0)}
     gains = np.array([s * 0.5e4 / PIECES for s in STEADY * 2])
     by_hand = math.sqrt(len(gains)) * float(np.std(gains, ddof=1))
-    assert gain(before, after) == pytest.approx((1e4, by_hand))
+    assert gain(before, after) == pytest.approx((1e4, by_hand, 1e4 - float(gains.max())))
 
 
-def test_a_gain_in_one_piece_of_all_is_no_effect() -> None:
-    before, after = {"spring": excess(0.0, is_open=True)}, {"spring": excess(0.0)}
-    struck = (before["spring"].pieces["slow"][0] + 1e5, *before["spring"].pieces["slow"][1:])
-    pieces = {**before["spring"].pieces, "slow": struck}
-    before = {"spring": replace(before["spring"], chi2=1e5 + ROWS, pieces=pieces)}
-    assert gain(before, after).ratio == pytest.approx(1.0)
-    (words,) = objections(RULE, before, Rival("a", "a", 1, after, standing()))
-    assert "squares of the noise" in words
+def test_a_gain_in_one_piece_of_all_is_no_effect_and_one_in_a_whole_record_is() -> None:
+    quiet = excess(0.0, is_open=True)
+    after = {"spring": excess(0.0)}
+    first, *others = quiet.pieces["slow"]
+    pieces = {**quiet.pieces, "slow": (first + 1e5, *others)}
+    struck = {"spring": replace(quiet, chi2=1e5 + ROWS, pieces=pieces)}
+    (words,) = objections(RULE, struck, Rival("a", "a", 1, after, standing()))
+    assert words == "without its best piece of a record the prediction gains 0 squares of the noise"
+    assert not objections(RULE, {"spring": excess(1e5, 0.0)}, Rival("a", "a", 1, after, standing()))
 
 
 # --- clause 3: numbers that exclude no effect -----------------------------------------------------

@@ -7,7 +7,7 @@ number of residuals, which is what noise alone would leave. ``docs/decision.md``
 
 An effect may be named if
  1. it explains a share of the excess that is left in some open block, and more than noise explains;
- 2. that gain in prediction is large against its own scatter over the pieces of the records;
+ 2. that gain in prediction does not rest on a single piece of a record;
  3. its numbers exclude "no effect", are known, and stand off the bounds of their search;
  4. no record is predicted worse than without it.
 Of several such effects the one that predicts best is taken, unless a simpler one predicts about as well.
@@ -56,10 +56,7 @@ class Criteria:
         0.5, "share of the excess that is left in an open block which an effect must explain"
     )
     noise_margin: float = _criterion(
-        25.0, "gain in prediction, in effective squares of the noise, that noise or a fit's end can give"
-    )
-    least_ratio: float = _criterion(
-        2.0, "gain in prediction over its standard error from the pieces of the records, at least"
+        25.0, "gain in prediction, in effective squares of the noise, that is more than noise or a fit's end gives"
     )
     exclusion: float = _criterion(
         4.0, "standard errors by which the numbers of an effect must exclude the value without effect"
@@ -259,15 +256,19 @@ def explained(before: Excesses, after: Excesses) -> dict[str, float]:
 
 
 class Gain(NamedTuple):
-    """Gain in prediction, in effective squares of the noise, and its standard error from the pieces."""
+    """Gain in prediction, in effective squares of the noise.
+
+    Parameters
+    ----------
+    value, error
+        Over all pieces of all records, and its standard error from their scatter.
+    rest
+        The same without the piece that gains most.
+    """
 
     value: float
     error: float
-
-    @property
-    def ratio(self) -> float:
-        """Value over error."""
-        return self.value / self.error if self.error > 0.0 else math.copysign(math.inf, self.value)
+    rest: float
 
 
 def gain(before: Excesses, after: Excesses) -> Gain:
@@ -288,7 +289,21 @@ def gain(before: Excesses, after: Excesses) -> Gain:
     )
     count = len(differences)
     scatter = float(np.sum((differences - differences.mean()) ** 2)) if count else 0.0
-    return Gain(float(differences.sum()), math.sqrt(scatter * count / max(count - 1, 1)))
+    total, most = float(differences.sum()), float(differences.max()) if count else 0.0
+    return Gain(total, math.sqrt(scatter * count / max(count - 1, 1)), total - most)
+
+
+def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:
+    """Tell whether a gain in prediction is more than noise gives, and does not rest on a single piece.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    gained
+        From one hypothesis to another.
+    """
+    return gained.rest >= criteria.noise_margin
 
 
 def records_made_worse(criteria: Criteria, before: Excesses, after: Excesses) -> dict[str, float]:
@@ -413,12 +428,9 @@ def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[s
             f"it explains {100.0 * max(best, 0.0):.0f} % of what is left, "
             f"less than {100.0 * criteria.least_share:.0f} %"
         )
-    if not all(name == DECLARED for name in shares) and (
-        gained.value < criteria.noise_margin or gained.ratio < criteria.least_ratio
-    ):
+    if not all(name == DECLARED for name in shares) and not is_more_than_noise(criteria, gained):
         words.append(
-            f"the prediction gains {gained.value:.3g} ± {gained.error:.2g} squares of the noise, "
-            "which noise can give"
+            f"without its best piece of a record the prediction gains {gained.rest:.3g} squares of the noise"
         )
     return (*words, *_objections_of_numbers(criteria, rival.standing), *_worse(criteria, before, after))
 
@@ -454,8 +466,7 @@ def is_superfluous(criteria: Criteria, without: Excesses, with_it: Excesses) -> 
     without, with_it
         Of the two hypotheses.
     """
-    gained = gain(without, with_it)
-    if gained.value < criteria.noise_margin or gained.ratio < criteria.least_ratio:
+    if not is_more_than_noise(criteria, gain(without, with_it)):
         return True
     return total_excess(without) <= criteria.richer * total_excess(with_it)
 
@@ -501,8 +512,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
 
     def is_near(rival: Rival[T]) -> bool:
         """Tell whether a rival predicts about as well as the best: within noise, or in proportion."""
-        worse_by = gain(rival.excesses, best.excesses)
-        within = worse_by.value < criteria.noise_margin or worse_by.ratio < criteria.least_ratio
+        within = not is_more_than_noise(criteria, gain(rival.excesses, best.excesses))
         nested = rival.effect in best.simpler
         return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
 

@@ -41,7 +41,7 @@ _MOST_EFFECTS_IN_FREE_FLIGHT = 2
 """Effects that are looked for where a body flies freely: a third takes minutes, and rests on less."""
 
 
-_UNKNOWN_GAIN = Gain(math.nan, math.nan)
+_UNKNOWN_GAIN = Gain(math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, eq=False)
