@@ -16,6 +16,7 @@ from .core.springs import LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
+from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
 from .materials.named_networks import (
@@ -27,10 +28,11 @@ from .materials.named_networks import (
 )
 from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.rate_independent import SlidingFillers
-from .materials.self_heating import HeatBalance, SelfHeating, ViscousHeat, WorkHeat
+from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
+from .materials.smooth_hysteresis import BoucWen
 from .materials.specimen import Specimen, specimen
 from .materials.springpot import Springpot
-from .materials.stress_softening import LargestMotion, OgdenRoxburgh, StressSoftening
+from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
@@ -40,6 +42,7 @@ from .mechanics.friction import CoulombFriction, LoadFriction, QuadraticDrag, St
 from .mechanics.gear import Gear, LossyGear
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
+from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
@@ -63,6 +66,7 @@ __all__ = [
     "Assembly",
     "Backlash",
     "Body",
+    "BoucWen",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
@@ -70,6 +74,7 @@ __all__ = [
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
+    "DamageByMotion",
     "Dashpot",
     "Domain",
     "Drift",
@@ -90,6 +95,7 @@ __all__ = [
     "Gear",
     "GearedMotor",
     "Guide",
+    "HardeningSpring",
     "HeatBalance",
     "Hyperelastic",
     "Inertia",
@@ -99,6 +105,7 @@ __all__ = [
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
+    "LossHeat",
     "LossyGear",
     "LuGreFriction",
     "Mass",
@@ -126,6 +133,7 @@ __all__ = [
     "Slack",
     "SlidingFillers",
     "Specimen",
+    "SpotFriction",
     "Spring",
     "Springpot",
     "StrainStiffening",
@@ -143,6 +151,7 @@ __all__ = [
     "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",
+    "WavyFriction",
     "WlfShift",
     "WorkHeat",
     "WrapProduct",
