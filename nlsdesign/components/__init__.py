@@ -36,12 +36,21 @@ from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxb
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
-from .mechanics.carriage import ConstantForce, LinearDrive
-from .mechanics.drive_chain import DriveDelay, DrivePart, DriveSaturation
-from .mechanics.friction import CoulombFriction, LoadFriction, QuadraticDrag, StribeckFriction
+from .mechanics.carriage import LinearDrive
+from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
+from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
+from .mechanics.drive_faults import CommandCompression, CommandSaturation, TorqueConstantDrift, WindingHeat
+from .mechanics.friction import (
+    AsymmetricFriction,
+    CoulombFriction,
+    LoadFriction,
+    QuadraticDrag,
+    StribeckFriction,
+)
 from .mechanics.gear import Gear, LossyGear
+from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
-from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
+from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
 from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
@@ -64,13 +73,17 @@ __all__ = [
     "ArrheniusShift",
     "ArrudaBoyce",
     "Assembly",
+    "AsymmetricFriction",
     "Backlash",
     "Body",
     "BoucWen",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
-    "ConstantForce",
+    "CommandCompression",
+    "CommandSaturation",
+    "ConstantLoad",
+    "Controller",
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
@@ -79,6 +92,7 @@ __all__ = [
     "Domain",
     "Drift",
     "DriveDelay",
+    "DriveLag",
     "DrivePart",
     "DriveSaturation",
     "Driven",
@@ -94,13 +108,16 @@ __all__ = [
     "ForceSensor",
     "Gear",
     "GearedMotor",
+    "GravityLoad",
     "Guide",
     "HardeningSpring",
     "HeatBalance",
+    "HorizontalTorque",
     "Hyperelastic",
     "Inertia",
     "Inertial",
     "InextensibleCable",
+    "Integral",
     "LargestMotion",
     "LinearDrive",
     "LinearElastic",
@@ -109,6 +126,7 @@ __all__ = [
     "LossyGear",
     "LuGreFriction",
     "Mass",
+    "MassOnArm",
     "Material",
     "NeoHooke",
     "Ogden",
@@ -117,11 +135,14 @@ __all__ = [
     "Parallel",
     "Part",
     "PermanentSet",
+    "PositionLoop",
     "Property",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "RateFeedback",
     "Regularised",
+    "ResistiveMotor",
     "RigidStop",
     "Rising",
     "Rounded",
@@ -133,6 +154,7 @@ __all__ = [
     "Slack",
     "SlidingFillers",
     "Specimen",
+    "SpeedLoop",
     "SpotFriction",
     "Spring",
     "Springpot",
@@ -143,6 +165,7 @@ __all__ = [
     "Tachometer",
     "Through",
     "Tie",
+    "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
     "TransportDelay",
@@ -152,6 +175,7 @@ __all__ = [
     "ViscousMaterial",
     "VoltageDrivenMotor",
     "WavyFriction",
+    "WindingHeat",
     "WlfShift",
     "WorkHeat",
     "WrapProduct",

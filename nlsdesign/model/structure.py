@@ -283,7 +283,7 @@ def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
 
 def _motor(name: str, part: GearedMotor | ElectricMotor, drives: Iterable[str]) -> MotorNames:
     return MotorNames(
-        command=next(iter(drives), None),
+        command=None if part.loops else next(iter(drives), None),
         inertia=f"{name}.{part.inertia_name}",
         torque_constant=f"{name}.torque_constant",
         current_limit=f"{name}.current_limit",

@@ -10,8 +10,10 @@ from ...components import (
     ROTATION,
     Assembly,
     Backlash,
-    ConstantForce,
+    ConstantLoad,
     Dashpot,
+    GravityLoad,
+    HorizontalTorque,
     Inertia,
     Inertial,
     Rounded,
@@ -94,8 +96,23 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
 
 
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
-    edited, part = tied(assembly, "offset", body, ConstantForce(load=number(0.0, "N")))
+    domain = domain_of(assembly, body)
+    load = ConstantLoad(load=number(0.0, domain.effort_unit), domain=domain)
+    edited, part = tied(assembly, "offset", body, load)
     yield Edit(edited, (Unknown(f"{part}.load", (0.0,), -2.0, 2.0, efforts_on(body)),))
+
+
+def _gravity(assembly: Assembly, body: str) -> Iterator[Edit]:
+    weight = HorizontalTorque(horizontal_torque=number(0.01, "N*m"))
+    load = GravityLoad(weight=weight, hanging_angle=number(0.0, "rad"))
+    edited, part = tied(assembly, "weight", body, load)
+    quarter = math.pi / 2.0
+    unknowns = (
+        Unknown(f"{part}.horizontal_torque", (0.2,), 1e-4, 3.0, efforts_on(body)),
+        # All directions; the bounds overlap, so that none of them stands at a bound.
+        Unknown(f"{part}.hanging_angle", (-2.0 * quarter, -quarter, 0.0, quarter), -5.0, 5.0, null=None),
+    )
+    yield Edit(edited, unknowns)
 
 
 def _reduced(whole: Quantity, share: float, spread: float) -> Quantity:
@@ -213,7 +230,35 @@ constant_force = Effect(
             _constant,
             "a force that is the same forward and backward, at any speed and place",
             "Janot et al. 2019",
-            "constant force",
+            "constant load",
+        ),
+    ),
+)
+constant_torque = Effect(
+    "constant_torque",
+    "A torque that never changes on a freely turning body: an offset of the drive, a preloaded seal.",
+    75,
+    (
+        Form(
+            turning_bodies,
+            _constant,
+            "a torque that is the same forward and backward, at any speed and angle",
+            "Janot et al. 2019",
+            "constant load",
+        ),
+    ),
+)
+gravity_load = Effect(
+    "gravity_load",
+    "The weight of an arm on a body that turns in a vertical plane.",
+    77,
+    (
+        Form(
+            turning_bodies,
+            _gravity,
+            "a torque as the sine of the angle, once per turn, forward and backward alike",
+            "Newton 1687",
+            "gravity",
         ),
     ),
 )

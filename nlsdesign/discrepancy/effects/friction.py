@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 from ...components import (
     Assembly,
+    AsymmetricFriction,
     CoulombFriction,
     Element,
     LoadFriction,
@@ -119,6 +120,19 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
     yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction",)})
 
 
+def _asymmetric(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        level = number(0.01, domain.effort_unit)
+        return AsymmetricFriction(sliding_effort=level, asymmetry=number(0.0, "1"), domain=domain).smooth()
+
+    put = Placed(assembly, place, "dry_friction", law)
+    unknowns = (
+        Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),
+        Unknown(f"{put.path}.asymmetry", (0.0,), -1.0, 1.0),
+    )
+    yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction", "constant_torque", "constant_force")})
+
+
 def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:
     def around(inner: str, element: Element) -> Element:
         return LoadFriction(members=((inner, element),), ratio=number(0.01, "1")).smooth()
@@ -225,6 +239,19 @@ quadratic_drag = Effect(
             "an effort against the motion that grows with the square of the speed",
             "Newton 1687, book II; Batchelor 1967",
             "drag",
+        )
+    ),
+)
+asymmetric_friction = Effect(
+    "asymmetric_friction",
+    "Dry friction that differs between the two directions: the same as even friction beside a constant load.",
+    25,
+    tuple(
+        _forms(
+            _asymmetric,
+            "an effort against the motion that is larger in one direction",
+            "Coulomb 1785; Armstrong-Hélouvry 1991 (levels by direction)",
+            "dry friction",
         )
     ),
 )
