@@ -55,7 +55,7 @@ from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
-from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
+from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -80,6 +80,7 @@ __all__ = [
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
+    "ClockDrift",
     "CommandCompression",
     "CommandSaturation",
     "ConstantLoad",
@@ -122,6 +123,7 @@ __all__ = [
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
+    "LoadNonlinearity",
     "LossHeat",
     "LossyGear",
     "LuGreFriction",

@@ -69,7 +69,7 @@ def _put(assembly: Assembly, name: str, wanted: str, part: DrivePart) -> tuple[A
 
 
 def _commanded(assembly: Assembly, name: str) -> tuple[Domain, str] | None:
-    """Return the kind of a drive's command and the name of its signal; nothing for a command of other kind."""
+    """Return the kind of a drive's command and the name of its signal; nothing for another kind."""
     signal, unit = _drive(assembly, name).command
     kind = command_domain(unit)
     return (kind, f"{name}.{signal}") if kind else None
