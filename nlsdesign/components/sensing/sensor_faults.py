@@ -127,9 +127,9 @@ class LoadNonlinearity(Sensor):
 class ClockDrift(Sensor):
     """An instrument with a clock of its own, late by more and more: reading(t) = value(t − ε·t), t from 0.
 
-    ε < 0 where its clock runs ahead. In the flat model, with a = ε·t and v̇, v̈ from a filter of two equal lags
-    T, to second order: v − a·(v̇ + 2·T·v̈) + a²·v̈/2. Valid where a and T are short against the motion. In
-    records, and where a reading drives a model, the shift is exact. Source: Oppenheim and Schafer 2010
+    ε < 0 where its clock runs ahead. In the flat model, with a = ε·t and v̇, v̈ from a filter of three equal
+    lags T: v − a·(v̇ + 3·T·v̈) + a²·v̈/2, to second order. Valid where a and T are short against the motion.
+    In records, and where a reading drives a model, the shift is exact. Source: Oppenheim and Schafer 2010
     (changing the sampling rate).
 
     Examples
@@ -152,15 +152,15 @@ class ClockDrift(Sensor):
         """Return the value of somewhat earlier or later."""
         lag = scope.parameter("differentiating_time")
         elapsed = scope.state("elapsed", "s", f"time that {scope.path} has run")
-        followed = scope.state("followed", unit, f"value inside the filter of {scope.path}")
-        # In the unit of the value: a unit per second may be none that can be written.
-        change = scope.state("change", unit, f"its change in one lag, in {scope.path}")
-        second = (value - followed - 2 * change) / lag**2
+        lags, inner = [], value
+        for place in ("first", "second", "third"):
+            lags.append(scope.state(place, unit, f"value behind the {place} lag of {scope.path}"))
+            scope.derive(lags[-1], (inner - lags[-1]) / lag)
+            inner = lags[-1]
         scope.derive(elapsed, ca.SX(1))
-        scope.derive(followed, change / lag)
-        scope.derive(change, second * lag)
+        slope, bend = (lags[1] - lags[2]) / lag, (lags[0] - 2 * lags[1] + lags[2]) / lag**2
         late = scope.parameter("rate") * elapsed
-        return value - late * (change / lag + 2 * lag * second) + late**2 / 2 * second
+        return value - late * (slope + 3 * lag * bend) + late**2 / 2 * bend
 
     def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
         """Return what was there ε·t before."""
