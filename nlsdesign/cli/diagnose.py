@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,22 +34,29 @@ def diagnose(
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
+    from ..discrepancy import DiagnosisRun, records_of_run, write_verdict
     from ..discrepancy import diagnose as find_what_is_missing
-    from ..discrepancy import write_verdict
     from ..identification import load_records
+    from ..locations import version
     from ..model import flatten
     from ..progress import Steps
     from ..report import verdict_sections, write_report
 
+    command = shlex.join(["nlsdesign", *sys.argv[1:]])
+    date = datetime.now().astimezone().isoformat(" ", "minutes")
     actuator = declare(load_deck(deck_name))
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
     with steps.step("diagnosis"):
         verdict = find_what_is_missing(actuator, measured, progress=steps.note)
+    read = records_of_run(measured)
+    run = DiagnosisRun(deck_name, str(records), date, command, version(), read)
+    verdict = replace(verdict, run=run)
     out.mkdir(parents=True, exist_ok=True)
     write_verdict(verdict, out)
     title = f"{actuator.name}: what is missing"
-    report = write_report(out / "report.html", *verdict_sections(verdict), title=title)
+    facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
+    report = write_report(out / "report.html", *verdict_sections(verdict), title=title, facts=facts)
     if as_json:
         show_json(verdict.to_dict(str(out / "model.toml")))
         return
