@@ -357,9 +357,8 @@ def _drawn_error(
 
 def _failures(spread: Sequence[float]) -> tuple[str, ...]:
     count = sum(not math.isfinite(error) for error in spread)
-    return (
-        (f"for {count} of {len(spread)} draws of the numbers no observer can be designed",) if count else ()
-    )
+    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
+    return (words,) if count else ()
 
 
 def write_regeneration(result: Regeneration, folder: Path) -> tuple[dict[Path, str], tuple[str, ...]]:

@@ -76,24 +76,17 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     verdict = replace(verdict, run=run)
     out.mkdir(parents=True, exist_ok=True)
     write_verdict(verdict, out)
-    content, text, sections = (
-        verdict.to_dict(str(out / "model.toml")),
-        str(verdict),
-        verdict_sections(verdict),
-    )
+    content, text = verdict.to_dict(str(out / "model.toml")), str(verdict)
+    sections = verdict_sections(verdict)
     facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     title = f"{actuator.name}: what is missing"
     write_report(out / "report.html", *sections, title=title, facts=facts)
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
         with steps.step("observer"):
-            more = _regenerated(flatten(actuator), verdict, measured, out, options)
-        content, text, sections = (
-            {**content, "regeneration": more[0]},
-            f"{text}\n{more[1]}",
-            [*sections, *more[2]],
-        )
-        write_report(out / "report.html", *sections, title=title, facts=facts)
+            data, words, chapter = _regenerated(flatten(actuator), verdict, measured, out, options)
+        content, text = {**content, "regeneration": data}, f"{text}\n{words}"
+        write_report(out / "report.html", *sections, *chapter, title=title, facts=facts)
     if as_json:
         show_json(content)
         return
@@ -104,7 +97,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
 def _regenerated(
     declared: FlatModel, verdict: Verdict, records: RecordSet, out: Path, options: Mapping[str, Any]
 ) -> tuple[dict[str, Any], str, list[Section]]:
-    """Design and write the observer of the better model; return what to say of it as data, text and sections."""
+    """Design and write the observer of the better model; return data, text and sections on it."""
     from ..model import flatten
     from ..regeneration import ObserverChoice, regenerate, write_regeneration
     from ..report import regeneration_sections

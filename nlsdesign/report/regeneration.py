@@ -24,8 +24,8 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
     sections: list[Section] = [
         Chapter(
             "Observer from the better model",
-            "The torque observer, designed from the declared model (before) and from the better model (after); "
-            "both read the measured signals, and are compared with the torque that the records show.",
+            "The torque observer, designed from the declared model (before) and from the better model (after). "
+            "Both read the measured signals and are compared with the torque that the records show.",
         )
     ]
     if result.errors:
@@ -37,8 +37,8 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
         sections.append(
             FigureSection(
                 f"Estimated torque: {name}", held_out_series(series),
-                caption=f"Above: {result.quantity} as measured, and as both observers estimate it. Below: the "
-                "errors, unfiltered.",
+                caption=f"Above: {result.quantity}, as measured and as both observers estimate it. "
+                "Below: the errors, unfiltered.",
                 assumed="The measured torque is what the better model says is behind the readings.",
             )
         )  # fmt: skip
