@@ -11,6 +11,7 @@ and in ``selection/criteria.py``, which decides.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,17 +29,19 @@ from .effects import ALL, EffectFunction
 from .fitting.unpredictable import Key
 from .reporting.advice import advice, more_excitation, where_they_differ
 from .reporting.gap import course_of, gaps_of, shapes_of
+from .reporting.named_effect import EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
-from .reporting.verdict import NamedEffect, Refused, Verdict
+from .reporting.verdict import NamedEffect, Verdict
 from .screening.causality import lagging_forces
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
 from .selection.comparison import Comparison
-from .selection.criteria import DECLARED, Criteria, Excess, Excesses, is_complete
+from .selection.criteria import DECLARED, Criteria, Excess, Excesses, Standing, is_complete
 from .selection.excess import excesses
 from .selection.hypothesis import Hypothesis
 from .selection.search import Outcome, Step, search
+from .selection.standing import standing_of
 
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
@@ -162,7 +165,7 @@ def _verdict(
     return Verdict(
         verdict,
         tuple(_named(better, step, place) for place, step in enumerate(steps)),
-        tuple(_where(before[n], after[n]) for n in before if n != DECLARED or before[n].open)
+        ((_strained(before[DECLARED], after[DECLARED]),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
         gaps_of(base, better, every),
@@ -179,7 +182,6 @@ def _verdict(
         outcome.skipped,
         complete=is_complete(after),
         criteria=case.criteria,
-        refused=_refused(outcome, steps),
     )
 
 
@@ -188,21 +190,13 @@ def _furthest(names: Sequence[str], excesses: Excesses) -> str:
     return max(names, key=lambda name: excesses[name].mean_square)
 
 
-def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[str, float], ...]:
-    """Return what was tried first, with the share that it explains; what was named is always among it."""
+def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[Any, ...], ...]:
+    """Return what was tried first: identifier, share that it explains alone, and why it is not named."""
     named = {step.effect for step in steps}
-    tried = [(each.candidate.effect, each.share) for each in outcome.tried]
-    first = sorted(tried, key=lambda pair: pair[0] not in named)[:_RUNNERS_UP]
-    return tuple(sorted(first, key=lambda pair: -pair[1]))
-
-
-def _refused(outcome: Outcome, steps: Sequence[Step]) -> tuple[Refused, ...]:
-    """Return what explains most without being named, and why it was not."""
-    named = {step.effect for step in steps}
-    tried = [each for each in outcome.tried if each.objections and each.candidate.effect not in named]
+    first = sorted(outcome.tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
     return tuple(
-        Refused(each.candidate.effect, each.candidate.location, each.share, each.objections)
-        for each in tried[:_RUNNERS_UP]
+        (each.candidate.effect, each.share, *(("; ".join(each.objections),) if each.objections else ()))
+        for each in sorted(first, key=lambda each: -each.share)
     )
 
 
@@ -229,16 +223,11 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     return (*sentences, *more_excitation(fits))
 
 
-def _where(before: Excess, after: Excess) -> str:
-    if before.block == DECLARED:
-        return (
-            f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
-            f"{after.fit:.1f} after"
-        )
-    ratio, later = before.predicted / before.floor, after.predicted / after.floor
-    state = "open" if before.open else "closed"
-    times = f"predicted to {ratio:.2f} times the noise floor before, {later:.2f} after"
-    return f"{before.block} ({state}): {times}"
+def _strained(before: Excess, after: Excess) -> str:
+    return (
+        f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
+        f"{after.fit:.1f} after"
+    )
 
 
 def _not_predicted(key: Key) -> str:
@@ -267,9 +256,21 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         step.share,
         candidate.signature,
         candidate.source,
-        step.gain.value,
-        step.gain.error,
-        step.exclusion,
+        evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
+    )
+
+
+def _evidence(step: Step, standing: Standing) -> EffectEvidence:
+    # Half the gain in effective squares of the noise is the gain in predictive log density.
+    deciding = [n.name for n in standing.numbers if n.decides]
+    worst = min(step.gains, key=lambda record: step.gains[record], default="")
+    return EffectEvidence(
+        0.5 * step.gain.value,
+        0.5 * step.gain.error,
+        deciding[0] if deciding else "",
+        standing.exclusion if deciding else math.nan,
+        worst,
+        0.5 * step.gains[worst] if worst else math.nan,
     )
 
 

@@ -56,7 +56,8 @@ class Criteria:
         0.5, "share of the excess that is left in an open block which an effect must explain"
     )
     noise_margin: float = _criterion(
-        25.0, "gain in prediction, in effective squares of the noise, that is more than noise or a fit's end gives"
+        25.0,
+        "gain in prediction, in effective squares of the noise, that is more than noise or a fit's end gives",
     )
     exclusion: float = _criterion(
         4.0, "standard errors by which the numbers of an effect must exclude the value without effect"
@@ -291,6 +292,22 @@ def gain(before: Excesses, after: Excesses) -> Gain:
     scatter = float(np.sum((differences - differences.mean()) ** 2)) if count else 0.0
     total, most = float(differences.sum()), float(differences.max()) if count else 0.0
     return Gain(total, math.sqrt(scatter * count / max(count - 1, 1)), total - most)
+
+
+def gains_by_record(before: Excesses, after: Excesses) -> dict[str, float]:
+    """Return by how much the prediction of each record gains, in effective squares of the noise.
+
+    Parameters
+    ----------
+    before, after
+        Of two hypotheses on the same rows.
+    """
+    gains: dict[str, float] = {}
+    for name, one in before.items():
+        for record, pieces in one.pieces.items():
+            gained = sum(pieces) - sum(after[name].pieces[record])
+            gains[record] = gains.get(record, 0.0) + gained / max(one.colour, after[name].colour)
+    return gains
 
 
 def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:

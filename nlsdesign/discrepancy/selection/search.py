@@ -23,6 +23,7 @@ from .criteria import (
     choose,
     explained,
     gain,
+    gains_by_record,
     is_complete,
     is_explained,
     is_superfluous,
@@ -54,10 +55,8 @@ class Step:
         Hypothesis with the effect in it.
     share
         Share of the excess that was left in a block before, of the block of which it explains most.
-    gain
-        What prediction gains by it.
-    exclusion
-        Standard errors by which its numbers exclude no effect.
+    gain, gains
+        What prediction gains by it, over all records and on each.
     equals
         Hypotheses with another last effect that predict as well with as few numbers.
     """
@@ -65,7 +64,7 @@ class Step:
     chosen: Hypothesis
     share: float
     gain: Gain = _UNKNOWN_GAIN
-    exclusion: float = math.nan
+    gains: Mapping[str, float] = field(default_factory=dict)
     equals: tuple[Hypothesis, ...] = ()
 
     @property
@@ -363,8 +362,8 @@ class _Search:
 
     def _made(self, before: Excesses, rival: Rival[Hypothesis], equals: tuple[Hypothesis, ...] = ()) -> Step:
         share = max(explained(before, rival.excesses).values(), default=0.0)
-        gained = gain(before, rival.excesses)
-        return Step(rival.hypothesis, share, gained, rival.standing.exclusion, equals)
+        gained, gains = gain(before, rival.excesses), gains_by_record(before, rival.excesses)
+        return Step(rival.hypothesis, share, gained, gains, equals)
 
     def _account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
         """Return how far each effect goes alone and what speaks against it, the best first."""

@@ -149,7 +149,9 @@ class _Words:
                 yield Finding(where, f"{text} at {self._at(group)}: {way_out}")
             elif group not in short:
                 length = group.behind - group.first
-                text = f"rests at {self.column.values[group.first]:g} for {length} samples, while others go on"
+                text = (
+                    f"rests at {self.column.values[group.first]:g} for {length} samples, while others go on"
+                )
                 yield Finding(where, f"{text}, from {self._at(group)}: cut the record there")
         count = sum(g.behind - g.first for g in short)
         if count > _MANY * len(self.time):

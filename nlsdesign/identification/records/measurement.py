@@ -426,7 +426,5 @@ def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
 
 def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> RecordSet:
     run = read_run(file.stem, table, mapping)
-    record = Record(
-        file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked
-    )
+    record = Record(file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked)
     return RecordSet((record,), mapping.columns, run.findings, run.remarks)
