@@ -393,9 +393,25 @@ def _equations(block: Block, free: Sequence[str]) -> _Equations:
 
 
 def _sensitivities(e: _Equations) -> tuple[Expression, Expression]:
-    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column."""
+    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column.
+
+    Where a parameter acts on a state neither itself nor through other states, there is no symbol but a
+    structural zero: most states depend on few of the parameters.
+    """
     slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
-    return slope, ca.vertcat(e.state, ca.vec(slope))
+    acting = ca.Sparsity(e.state.numel(), e.parameter.numel())
+    if slope.numel():
+        reach = np.eye(e.state.numel(), dtype=bool) | _pattern(e.derivative, e.state)
+        for _ in range(e.state.numel().bit_length()):
+            reach = reach @ reach
+        acts = reach @ _pattern(e.derivative, e.parameter)
+        acting = ca.sparsify(ca.DM(acts.astype(float))).sparsity()
+    return ca.project(slope, acting), ca.vertcat(e.state, ca.vec(slope))
+
+
+def _pattern(value: Expression, of: Expression) -> NDArray[np.bool_]:
+    """Return which items of a column contain which symbols, shape (items, symbols)."""
+    return np.asarray(ca.DM(ca.jacobian_sparsity(value, of), 1.0).full() > 0.0)
 
 
 def _output_function(e: _Equations) -> ca.Function:
@@ -450,10 +466,13 @@ def _walk_functions(
     prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
     slope, everything = _sensitivities(e)
     along = ca.SX.sym("along", table.numel(), e.parameter.numel())
+    of = ca.vertcat(e.state, e.parameter, symbol)
+    directions = ca.vertcat(
+        slope, ca.SX.eye(e.parameter.numel()), ca.project(along, dependence.sparsity())
+    )
 
     def with_slope(value: Expression) -> Expression:
-        total = ca.jacobian(value, e.state) @ slope + ca.jacobian(value, e.parameter)
-        return ca.SX(ca.vertcat(value, ca.vec(total + ca.jacobian(value, symbol) @ along)))
+        return ca.SX(ca.vertcat(value, ca.vec(ca.jtimes(value, of, directions))))
 
     column = with_slope(new)
     if mean:
