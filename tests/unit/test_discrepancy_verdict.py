@@ -69,7 +69,7 @@ def test_nothing_missing_is_said_with_what_the_records_leave_open() -> None:
 
 def test_shares_are_said_in_percent() -> None:
     effect = NamedEffect(
-        "slack", "spring.cable", {"spring.cable.gap": (1e-3, "m", 2e-5)}, (), 0.9, 0.82, "late", "source"
+        "slack", "spring.cable", {"spring.cable.gap": (1e-3, "m", 2e-5)}, (), 0.82, "late", "source"
     )
     formula = Formula({"[q]": 2.0}, 0.64, "2·[q] (in N, signals in SI)")
     left = Remainder(

@@ -1,4 +1,4 @@
-"""Which records to hold out where nobody says: those that the others surround, whatever the files are called."""
+"""Which records to hold out where nobody says: those most like another one, whatever the files are called."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     """Return the indices of records to hold out: a third, rounded, and at least one of two.
 
     A record is described by its length and, for every signal, by its smallest and largest value, its usual rate,
-    and how unevenly it moves: the root mean square of the rate over its mean size, large where motion alternates
-    with rest.
-    Held out, one after the other, is the record that lies deepest inside the range of those that are left, so that
-    it is predicted by interpolation. Among equals it is the one of the smallest motion.
+    and how unevenly it moves: the root mean square of the rate over its mean size, large where motion
+    alternates with rest. Held out, one after the other, is a record of the pair that is most alike among those
+    that are left, so that fits keep every kind of motion: the one deeper inside the range of all, so that it is
+    predicted by interpolation, and among equals the one of the smaller motion.
 
     Parameters
     ----------
@@ -41,7 +41,9 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     chosen: list[int] = []
     while len(chosen) < (len(traces) + 1) // _SHARE:
         depth = dict(zip(left, _depth(marks[left]), strict=True))
-        best = min(left, key=lambda k: (-depth[k], _extent(marks, k), content_digest(traces[k])))
+        apart = dict(zip(left, _to_nearest(marks[left]), strict=True))
+        alike = [k for k in left if apart[k] == min(apart.values())]
+        best = min(alike, key=lambda k: (-depth[k], _extent(marks, k), content_digest(traces[k])))
         chosen.append(best)
         left.remove(best)
     return tuple(sorted(chosen))
@@ -88,6 +90,15 @@ def _depth(marks: Array) -> list[float]:
     low, high = marks.min(axis=0), marks.max(axis=0)
     share = (marks - low) / np.where(high > low, high - low, 1.0)
     return [round(float(d), _DIGITS) for d in np.mean(np.minimum(share, 1.0 - share), axis=1)]
+
+
+def _to_nearest(marks: Array) -> list[float]:
+    """Return the distance of each record to the one most like it, marks counted in their ranges."""
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    share = (marks - low) / np.where(high > low, high - low, 1.0)
+    apart = np.sqrt(np.mean((share[:, None] - share[None]) ** 2, axis=2))
+    np.fill_diagonal(apart, np.inf)
+    return [round(float(d), _DIGITS) for d in apart.min(axis=1)]
 
 
 def _extent(marks: Array, row: int) -> float:
