@@ -218,7 +218,10 @@ class _Search:
                 if step is not None:
                     break
             self.tried = self.tried or self._account(present, tried)
-            further = [step] if step else self._pair(tried, present, open_blocks[0])
+            further = [step] if step else []
+            if not steps and not further:
+                # Beside an effect that was named, most of what is left over is the inexactness of its form.
+                further = self._pair(tried, present, open_blocks[0])
             if not further:
                 break
             steps += further
