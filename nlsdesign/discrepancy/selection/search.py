@@ -219,15 +219,13 @@ class _Search:
                 if step is not None:
                     break
             self.tried = self.tried or self._account(present, tried)
-            if step is not None:
-                steps.append(step)
-            elif not steps:
-                # Beside an effect whose form is not exact, any two others would help a little.
-                steps += self._pair(tried, present, open_blocks[0])
-            else:
+            further = [step] if step else []
+            if not steps and not further:
+                # Beside an effect that was named, most of what is left over is the inexactness of its form.
+                further = self._pair(tried, present, open_blocks[0])
+            if not further:
                 break
-            if not steps:
-                break
+            steps += further
             present = steps[-1].chosen
         return steps
 
