@@ -17,9 +17,6 @@ from ...model.structure import MovingBody, body_moved_by, top_part
 from ...model.transform import cut, named, without_idle_states
 from ...symbolic import Expression, depends
 
-READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
-"""Filter widths in samples. A balance holds a second derivative, whose noise asks for more."""
-
 
 @dataclass(frozen=True)
 class _Measured:
@@ -88,7 +85,6 @@ class _Result(NamedTuple):
     variable: Variable
     value: Expression
     target: str | None
-    width: float
     moving: str | None
 
 
@@ -103,9 +99,7 @@ def _reading_block(model: FlatModel, effort: _Measured, given: Sequence[_Measure
     signal = effort.reading.signal
     place = next(i for i, v in enumerate(model.signals) if v.name == signal)
     tearing = _Tearing(model, s, used, signal)
-    predicted = _Result(
-        top_part(effort.shown), model.signals[place], s.signal[place], signal, READING_WIDTH, None
-    )
+    predicted = _Result(top_part(effort.shown), model.signals[place], s.signal[place], signal, None)
     return tearing.block(predicted)
 
 
@@ -120,7 +114,7 @@ def _balance_block(model: FlatModel, body: MovingBody, given: Sequence[_Measured
     balance = inertia * tearing.inferred(motion, 2) - efforts
     variable = Variable(output, body.domain.effort_unit, f"sum of all efforts on {body.name}")
     moving = f"{motion.reading.signal}.rate"
-    return tearing.block(_Result(body.name, variable, balance, None, BALANCE_WIDTH, moving), body)
+    return tearing.block(_Result(body.name, variable, balance, None, moving), body)
 
 
 class _Tearing:
@@ -203,7 +197,6 @@ class _Tearing:
             drives=self._drives,
             output=result.variable.name,
             target=result.target,
-            width=result.width,
             moving=result.moving,
         )
 
