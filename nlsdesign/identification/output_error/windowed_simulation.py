@@ -20,7 +20,7 @@ from ...model.structure import body_moved_by
 from ...symbolic import Expression
 from ..equation_error.filter_choice import rate_span
 from ..records.measurement import Record
-from ..statistics.filters import derivative, difference
+from ..statistics.filters import derivative
 from .wiring import Wiring
 
 Array = NDArray[np.float64]
@@ -129,16 +129,10 @@ def _seen(model: FlatModel, wiring: Wiring, record: Record) -> dict[int, Array]:
             seen[names.index(output)] = record.trace[signal]
             body = body_moved_by(model.bodies, output)
             if body and body.rate in names and body.rate not in wiring.outputs.values():
-                seen[names.index(body.rate)] = _speed(record, signal)
+                span = rate_span([record], signal)
+                rate = derivative(record.trace[signal], record.step, order=1, span=span)
+                seen[names.index(body.rate)] = rate
     return seen
-
-
-def _speed(record: Record, signal: str) -> Array:
-    """Return the smoothed rate; beyond the ends the motion goes on as it came, mirrored through the end."""
-    motion, step, span = record.trace[signal], record.step, rate_span([record], signal)
-    beyond = min(len(difference(1, span / step)), len(motion) - 1)
-    longer = np.pad(motion, beyond, mode="reflect", reflect_type="odd")
-    return derivative(longer, step, order=1, span=span)[beyond:-beyond]
 
 
 class Shooter:

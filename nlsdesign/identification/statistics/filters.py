@@ -50,12 +50,18 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
     if order == 0:
         return signal
     weights = difference(order, span / step)
-    result: Array = correlate1d(signal, weights[::-1], mode="nearest") / step**order
+    half = len(weights) // 2
+    if order == 1 and _POINTS < len(weights) <= len(signal):
+        # Near the ends the quartic through the first or last samples goes on.
+        smooth: Array = savgol_filter(signal, len(weights), 4, deriv=1, delta=step, mode="interp")
+        return smooth
+    beyond = min(half, len(signal) - 1)
+    longer = np.pad(signal, beyond, mode="reflect", reflect_type="odd")
+    result: Array = correlate1d(longer, weights[::-1], mode="nearest")[beyond : beyond + len(signal)]
     if order == 2:
-        half = len(weights) // 2
         result[:half] = 0.0
         result[len(result) - half :] = 0.0
-    return result
+    return result / step**order
 
 
 @lru_cache(maxsize=64)
