@@ -94,6 +94,8 @@ class DrivenBlock:
         move faster than the samples and take short implicit steps. Without records none do.
     values
         Free parameters by name at which that is decided; those of the model by default.
+    span
+        Time in s over which rates of measured signals are taken; between neighbours by default.
 
     Raises
     ------
@@ -108,8 +110,10 @@ class DrivenBlock:
         *,
         records: Sequence[Record],
         values: Mapping[str, float] | None = None,
+        span: float = 0.0,
     ) -> None:
         self.block = block
+        self._span = span
         self.free = free_in(block, free)
         self._fixed = block.model.values
         e = _equations(block, self.free)
@@ -148,8 +152,8 @@ class DrivenBlock:
             signal = record.trace[drive.signal]
             delay = sum({**self._fixed, **values}[name] for name in drive.late_by)
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
-                signal = without_rounding(signal)
-            inputs[i] = derivative(signal, record.step, order=drive.order)
+                signal = without_rounding(signal, record.step, self._span)
+            inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
             if drive.late_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
         at = self._digest(inputs.shape[1], [inputs, rates])
