@@ -16,6 +16,7 @@ from .core.springs import LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
+from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
 from .materials.named_networks import (
@@ -27,16 +28,18 @@ from .materials.named_networks import (
 )
 from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.rate_independent import SlidingFillers
-from .materials.self_heating import HeatBalance, SelfHeating, ViscousHeat, WorkHeat
+from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
+from .materials.smooth_hysteresis import BoucWen
 from .materials.specimen import Specimen, specimen
 from .materials.springpot import Springpot
-from .materials.stress_softening import LargestMotion, OgdenRoxburgh, StressSoftening
+from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
 from .mechanics.carriage import LinearDrive
 from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
 from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
+from .mechanics.drive_faults import CommandCompression, CommandSaturation, TorqueConstantDrift, WindingHeat
 from .mechanics.friction import (
     AsymmetricFriction,
     CoulombFriction,
@@ -48,10 +51,11 @@ from .mechanics.gear import Gear, LossyGear
 from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
 from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
+from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
-from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
+from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -72,14 +76,19 @@ __all__ = [
     "AsymmetricFriction",
     "Backlash",
     "Body",
+    "BoucWen",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
+    "ClockDrift",
+    "CommandCompression",
+    "CommandSaturation",
     "ConstantLoad",
     "Controller",
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
+    "DamageByMotion",
     "Dashpot",
     "Domain",
     "Drift",
@@ -102,6 +111,7 @@ __all__ = [
     "GearedMotor",
     "GravityLoad",
     "Guide",
+    "HardeningSpring",
     "HeatBalance",
     "HorizontalTorque",
     "Hyperelastic",
@@ -113,6 +123,8 @@ __all__ = [
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
+    "LoadNonlinearity",
+    "LossHeat",
     "LossyGear",
     "LuGreFriction",
     "Mass",
@@ -145,6 +157,7 @@ __all__ = [
     "SlidingFillers",
     "Specimen",
     "SpeedLoop",
+    "SpotFriction",
     "Spring",
     "Springpot",
     "StrainStiffening",
@@ -154,6 +167,7 @@ __all__ = [
     "Tachometer",
     "Through",
     "Tie",
+    "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
     "TransportDelay",
@@ -162,6 +176,8 @@ __all__ = [
     "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",
+    "WavyFriction",
+    "WindingHeat",
     "WlfShift",
     "WorkHeat",
     "WrapProduct",

@@ -255,7 +255,7 @@ class _Tearing:
         label = signal + ("", ".rate", ".acceleration")[order]
         label += ".measured" if label == self._output else ""
         if label not in self._inputs:
-            self._drives[label] = Drive(signal, order, measured.reading.delays)
+            self._drives[label] = Drive(signal, order, measured.reading.delays, measured.reading.stretches)
             self._inputs[label] = Variable(label, "", f"measured {signal}"), ca.SX.sym(label)
         return self._inputs[label][1]
 

@@ -22,11 +22,19 @@ class Drive(NamedTuple):
         0 for its value, 1 for its rate, 2 for the derivative of that.
     late_by
         Names of the parameters whose sum says by how much the signal comes late.
+    stretched_by
+        Names of the parameters whose sum says by how much per time it becomes late.
     """
 
     signal: str
     order: int = 0
     late_by: tuple[str, ...] = ()
+    stretched_by: tuple[str, ...] = ()
+
+    @property
+    def shifted_by(self) -> tuple[str, ...]:
+        """Names of all parameters that shift the signal in time."""
+        return self.late_by + self.stretched_by
 
 
 @dataclass(frozen=True, eq=False)

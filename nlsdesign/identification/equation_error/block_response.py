@@ -150,12 +150,15 @@ class DrivenBlock:
             if drive is None:
                 continue
             signal = record.trace[drive.signal]
-            delay = sum({**self._fixed, **values}[name] for name in drive.late_by)
+            now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
+            delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
                 signal = without_rounding(signal, record.step, self._span)
             inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
-            if drive.late_by:
+            if drive.shifted_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
+            if set(drive.stretched_by) & set(self._late):
+                rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
         at = self._digest(inputs.shape[1], [inputs, rates])
         return Samples(at, *self._ends(inputs, rates, at, record.step), record.step)
 
@@ -284,7 +287,7 @@ def _centred(mean: Array) -> Array:
     return result
 
 
-def _advanced(time: Array, signal: Array, delay: float) -> tuple[Array, Array]:
+def _advanced(time: Array, signal: Array, delay: Array) -> tuple[Array, Array]:
     """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
     slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
     place = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
@@ -292,12 +295,12 @@ def _advanced(time: Array, signal: Array, delay: float) -> tuple[Array, Array]:
 
 
 def _late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
-    return [d for d in block.drives.values() if set(d.late_by) & set(free)]
+    return [d for d in block.drives.values() if set(d.shifted_by) & set(free)]
 
 
 def _free_delay(drive: Drive, free: Sequence[str]) -> str:
     """Return the one delay of a signal that is free; of several, records show the sum alone."""
-    names = [name for name in drive.late_by if name in free]
+    names = [name for name in drive.shifted_by if name in free]
     if len(names) > 1:
         raise MeasurementError(
             f"signal '{drive.signal}'",
@@ -328,7 +331,7 @@ def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
         if name not in names:
             raise unknown_name("parameter", name, names)
     together = ca.vertcat(s.output, s.derivative) if s.state.numel() else s.output
-    late = {name for d in block.drives.values() for name in d.late_by}
+    late = {name for d in block.drives.values() for name in d.shifted_by}
     return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
 
 
