@@ -181,7 +181,7 @@ class Bench:
     def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
         self.records = in_canonical_order(records)
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
-        self.noise = estimate_noise(self.records)
+        self.noise = estimate_noise(self.records, {b.target for b in blocks if b.target})
         self.filters: dict[str, Filters] = {}
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
@@ -207,7 +207,7 @@ class Bench:
         return self.records.of("fit", "selection") or self.records.records
 
     def _check_alive(self, block: Block) -> None:
-        if block.target is None or self.noise.level[block.target] > 0.0:
+        if block.target is None or self.noise.deviation(block.target) > 0.0:
             return
         head = self.records.column(block.target).name
         reasons = [

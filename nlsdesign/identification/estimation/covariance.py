@@ -3,7 +3,8 @@
 Residuals are coloured by filters, noise and what a model lacks. Rows are therefore grouped into segments of
 the records, longer than the residuals remember, and the gradients of the segments tell how far the numbers
 scatter (Liang and Zeger 1986), each as it would be if its segment had not been fitted (Bell and McCaffrey
-2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, that of the priors P, and g = (1 − HₛH⁻¹)⁻¹Jₛᵀr.
+2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, the part P of the priors in it, and for each
+segment s the gradient g = (1 − Hₛ·H⁻¹)⁻¹·Jₛᵀ·r.
 Nothing is taken as better known than residuals of that size and colour allow where they are independent of
 the slopes.
 """
