@@ -68,9 +68,7 @@ def record(history: tuple[Array, Array, Array], name: str, rate: float, counts: 
 
 def declared() -> Assembly:
     """Numbers a third too large, known to a factor of four."""
-    rubbing = CoulombFriction(
-        sliding_effort=0.08, domain=ROTATION, contact=Regularised(creep_speed=1e-3)
-    )
+    rubbing = CoulombFriction(sliding_effort=0.08, domain=ROTATION, contact=Regularised(creep_speed=1e-3))
     body = assembly(
         "body",
         stage=Inertia(inertia=0.067),
@@ -140,8 +138,27 @@ def test_filters_are_widths_in_time_and_held_out_records_do_not_move_them() -> N
     assert filters_of(200.0, fast=True) == coarse
 
 
+def swung(rate: float) -> RecordSet:
+    """A swing of 5 Hz and the torque that it takes."""
+    time = np.arange(0.0, 20.0, 1.0 / rate)
+    turn = 2.0 * np.pi * 5.0
+    inertia, damping, friction = TRUE.values()
+    angle, speed = np.sin(turn * time + 0.3), turn * np.cos(turn * time + 0.3)
+    torque = damping * speed + friction * np.sign(speed) - inertia * turn**2 * angle
+    noisy = torque + TORQUE_NOISE * np.random.default_rng(1).standard_normal(len(time))
+    signals = {"stage.angle": np.round(angle / 1e-4) * 1e-4, "stage.torque": noisy}
+    run = Record("r0", Trace(time, signals, UNITS, "r0"))
+    return RecordSet((run, replace(run, name="held", role="held_out")), COLUMNS)
+
+
 def test_a_motion_that_is_sampled_too_coarsely_says_how_often_it_would_need() -> None:
-    history = motion(1, fastest=10.0)
-    runs = [record(history, "r0", 25.0, 100_000, 1)]
-    with pytest.raises(MeasurementError, match=r"sampled too coarsely at 25 Hz -> sample at \d+ Hz or more"):
-        refit(declared(), RecordSet((*runs, replace(runs[0], name="h", role="held_out")), COLUMNS))
+    with pytest.raises(MeasurementError, match=r"sampled too coarsely at 25 Hz -> sample at 60 Hz or more"):
+        refit(declared(), swung(25.0))
+
+
+def test_ten_samples_a_period_are_enough_for_an_inertia() -> None:
+    history = motion(1, fastest=2.5)
+    runs = [record(history, "r0", 25.0, 8192, 1)]
+    found = refit(declared(), RecordSet((*runs, replace(runs[0], name="h", role="held_out")), COLUMNS))
+    numbers = {n.name: n.fitted for n in found.numbers}
+    assert numbers["stage.inertia"] == pytest.approx(0.05, rel=0.05)
