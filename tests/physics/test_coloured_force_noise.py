@@ -1,4 +1,4 @@
-"""Records of the rig with force noise that remembers: a clean set stays at its floor, an effect stays above."""
+"""Records of the rig with force noise that remembers: a clean set is at its floor, an effect stays above."""
 
 from __future__ import annotations
 
