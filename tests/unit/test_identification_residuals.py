@@ -40,6 +40,11 @@ def test_noise_is_found_under_a_signal_a_thousand_times_larger() -> None:
     assert noise_of(signal) == pytest.approx(0.6, rel=0.05)
 
 
+def test_noise_is_found_under_a_motion_of_ten_samples_a_period() -> None:
+    signal = np.sin(2 * np.pi * 0.1 * np.arange(6000)) + 1e-4 * WHITE
+    assert noise_of(signal) == pytest.approx(1e-4, rel=0.1)
+
+
 def test_quantum_is_the_smallest_step() -> None:
     assert quantum_of(np.round(10.0 * np.sin(np.arange(500) * 0.01) / 0.25) * 0.25) == pytest.approx(0.25)
     assert quantum_of(np.full(10, 3.0)) == 0.0

@@ -17,7 +17,7 @@ from ..records.canonical_order import in_canonical_order
 from ..records.measurement import Record, RecordSet
 from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
 from ..statistics.metrics import rmse
-from .block import Block
+from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
 from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces
 from .noise import Noise as Noise
@@ -80,23 +80,22 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
     stride = max(1, round(filters.spacing / step))
     margin = max(len(difference(d.order, span / step)) // 2 for d in block.drives.values())
     matrix = smoothing(n, filters.width / step, stride, margin=margin)
+    masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
+    matrix = matrix[~matrix.touched_by(masked)]
     inputs = measured_inputs(block, record, span)
     if block.moving is not None:
         speed = np.abs(inputs[[v.name for v in block.model.inputs].index(block.moving)])
+        noisy = _NOISY * _rate_noise(block.drives[block.moving], noise, record.step, span)
         # The filter smears what happens at a reversal; so its whole reach must be in motion.
-        least = math.hypot(_rate_noise(block, block.moving, record, noise, span), _SMEARED * rmse(speed))
-        slow = (speed < least).astype(float)
+        slow = (speed < math.hypot(noisy, _SMEARED * rmse(speed))).astype(float)
         matrix = matrix[np.flatnonzero(matrix @ slow < _SLOW_SHARE)]
     variance, raw = _variances(block, record, noise, filters, inputs)
     return Floor(matrix, np.sqrt(variance[matrix.places]), np.sqrt(raw))
 
 
-def _rate_noise(block: Block, moving: str, record: Record, noise: Noise, span: float) -> float:
-    """Return the rate above which a motion shows beyond the noise of its rate."""
-    drive = block.drives[moving]
-    # The rate is measured itself, or is the derivative of a motion.
-    weights = filter_weights(0.0, drive.order, record.step, span)
-    return _NOISY * noise.behind(drive.signal, weights, record.step)
+def _rate_noise(drive: Drive, noise: Noise, step: float, span: float) -> float:
+    """Return the noise of a rate, measured itself or the derivative of a motion."""
+    return noise.behind(drive.signal, filter_weights(0.0, drive.order, step, span), step)
 
 
 def _variances(
@@ -173,6 +172,10 @@ class Bench:
         All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
     blocks
         Of the declared model; they fix rows and noise floor.
+    noise
+        Of the measured signals, where it is known from other records of the same bench.
+    filters
+        By name of the block, where they were chosen for other records of the same bench.
 
     Raises
     ------
@@ -180,21 +183,31 @@ class Bench:
         If no record moves enough to say anything about a block.
     """
 
-    def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
+    def __init__(
+        self,
+        records: RecordSet,
+        blocks: Sequence[Block],
+        *,
+        noise: Noise | None = None,
+        filters: Mapping[str, Filters] | None = None,
+    ) -> None:
+        self._blocks = tuple(blocks)
         self.records = in_canonical_order(records)
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
-        self.noise = estimate_noise(self.records)
-        self.filters: dict[str, Filters] = {}
+        self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
+        self.filters: dict[str, Filters] = dict(filters or {})
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
         self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
-        pace = paces(blocks, self._seen, self.noise)
+        new = [block for block in blocks if block.name not in self.filters]
+        pace = paces(new, self._seen, self.noise)
         for block in blocks:
             self._check_alive(block)
-            filters = self.filters[block.name] = chosen_filters(block, self._seen, self.noise, pace)
+            if block.name not in self.filters:
+                self.filters[block.name] = chosen_filters(block, self._seen, self.noise, pace)
             for record in self.records.records:
-                floor = noise_floor(block, record, self.noise, filters)
+                floor = noise_floor(block, record, self.noise, self.filters[block.name])
                 if len(floor.sigma) >= _LEAST_ROWS:
                     self.floors[block.name, record.name] = floor
             if not any(name == block.name for name, _ in self.floors):
@@ -209,8 +222,18 @@ class Bench:
         """Records that may decide on filters: those held out only where there are no others."""
         return self.records.of("fit", "selection") or self.records.records
 
+    def with_records(self, records: RecordSet) -> Bench:
+        """Return other records of the same bench as they are seen with the same noise and filters.
+
+        Parameters
+        ----------
+        records
+            All records.
+        """
+        return Bench(records, self._blocks, noise=self.noise, filters=self.filters)
+
     def _check_alive(self, block: Block) -> None:
-        if block.target is None or self.noise.level[block.target] > 0.0:
+        if block.target is None or self.noise.deviation(block.target) > 0.0:
             return
         head = self.records.column(block.target).name
         reasons = [
@@ -228,7 +251,7 @@ class Bench:
             least = _LEAST_ROWS * self.filters[block.name].spacing
             return f"records need at least {least:.2g} s; record for longer"
         drive, span = block.drives[block.moving], self.filters[block.name].span
-        least = min(_rate_noise(block, block.moving, r, self.noise, span) for r in self.records.records)
+        least = min(_NOISY * _rate_noise(drive, self.noise, r.step, span) for r in self.records.records)
         unit = self.records.records[0].trace.units[drive.signal]
         rate = with_unit(f"{least:.3g}", f"{unit}/s" if drive.order else unit)
         moves = "changes faster" if drive.order else "is larger"
@@ -301,14 +324,17 @@ class Bench:
         if key not in self._thin:
             k = self._skip(record)
             trace = record.trace
-            raw = self.floors[block, record.name].raw_sigma[::k]
+            counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
+            raw = self.floors[block, record.name].raw_sigma[::k][counted]
             one = every(len(trace), k)
+            masked = record.masked
             if not whole:
                 trace = Trace(
                     trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
                 )
                 one = every(len(trace), 1)
-            self._thin[key] = replace(record, trace=trace), Floor(one, raw, raw)
+                masked = {n: m[::k] for n, m in masked.items()}
+            self._thin[key] = replace(record, trace=trace, masked=masked), Floor(one[counted], raw, raw)
         return self._thin[key]
 
     def _skip(self, record: Record) -> int:

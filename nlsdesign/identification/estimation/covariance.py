@@ -1,9 +1,10 @@
 """How well fitted numbers are known: what the residuals scatter, not what the noise was taken to be.
 
-Residuals are coloured by filters, noise and what a model lacks. Rows are therefore grouped into segments of
+Residuals are coloured by filters, noise and what a model lacks. Piece are therefore grouped into segments of
 the records, longer than the residuals remember, and the gradients of the segments tell how far the numbers
 scatter (Liang and Zeger 1986), each as it would be if its segment had not been fitted (Bell and McCaffrey
-2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, that of the priors P, and g = (1 − HₛH⁻¹)⁻¹Jₛᵀr.
+2002): H⁻¹·(Σ g·gᵀ + P)·H⁻¹, with the information H = JᵀJ + P, the part P of the priors in it, and for each
+segment s the gradient g = (1 − Hₛ·H⁻¹)⁻¹·Jₛᵀ·r.
 Nothing is taken as better known than residuals of that size and colour allow where they are independent of
 the slopes.
 """
@@ -31,7 +32,7 @@ _OWN_SHARE = 0.98
 be known."""
 
 
-class Rows(NamedTuple):
+class Piece(NamedTuple):
     """Residuals of one block on one record.
 
     Parameters
@@ -53,7 +54,7 @@ class Rows(NamedTuple):
     slope: Array
 
 
-def robust_covariance(rows: Sequence[Rows], prior: Array) -> Array:
+def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
     """Return the covariance of fitted numbers.
 
     Parameters
@@ -76,7 +77,7 @@ def robust_covariance(rows: Sequence[Rows], prior: Array) -> Array:
     return _at_least(root @ scatter @ root, independent_covariance(rows, prior))
 
 
-def independent_covariance(rows: Sequence[Rows], prior: Array) -> Array:
+def independent_covariance(rows: Sequence[Piece], prior: Array) -> Array:
     """Return the covariance if residuals are coloured noise that has nothing to do with the slopes.
 
     Parameters
@@ -111,7 +112,7 @@ def _colour(residuals: Sequence[Array]) -> float:
     return max(1.0, 1.0 + 2.0 * float(np.sum(rho[: quiet[0]] if len(quiet) else rho)))
 
 
-def _segments(rows: Sequence[Rows]) -> list[tuple[Array, Array]]:
+def _segments(rows: Sequence[Piece]) -> list[tuple[Array, Array]]:
     """Return slopes and residuals of each segment, all blocks of a record together."""
     spans: dict[str, float] = {}
     for each in rows:

@@ -200,6 +200,18 @@ class Smoothing:
         picked: Array = rows[(self.places - self.places[0]) // self.stride]
         return picked
 
+    def touched_by(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Tell for each row whether a sample of a mask is among those that it is made of.
+
+        Parameters
+        ----------
+        mask
+            Shape (n,).
+        """
+        reach, count = len(self.weights) // 2, np.concatenate([[0], np.cumsum(mask)])
+        touched: NDArray[np.bool_] = count[self.places + reach + 1] > count[self.places - reach]
+        return touched
+
     def __getitem__(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Smoothing:
         """Return the filter with some of its rows."""
         return replace(self, places=self.places[rows])
