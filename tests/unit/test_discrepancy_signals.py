@@ -135,7 +135,7 @@ def left(block: Block, record: Record) -> tuple[float, float]:
     output = driven.respond(driven.samples(record, {}), {}).output
     error = (record.trace[block.target] if block.target else 0.0) - output
     kept = slice(200, -200)
-    rest = (smoothing(len(TIME), block.width, 1) @ error)[kept]
+    rest = (smoothing(len(TIME), 4.0, 1) @ error)[kept]
     return float(np.sqrt(np.mean(rest**2))), float(np.std(record.trace[block.target or record_drive(record)]))
 
 

@@ -18,9 +18,6 @@ from ...symbolic import Expression, depends
 from .balance_scale import BalanceTerms, scaled_balance
 from .measured import ACCELERATION, MOTION, RATE, Measured, behind_ratio, measured_signals
 
-READING_WIDTH, BALANCE_WIDTH = 2.0, 4.0
-"""Filter widths in samples. A balance holds a second derivative, whose noise asks for more."""
-
 
 def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
     """Cut a model at measured signals.
@@ -195,7 +192,6 @@ class _Result(NamedTuple):
     variable: Variable
     value: Expression
     target: str | None
-    width: float
     moving: str | None
 
 
@@ -214,7 +210,7 @@ def _reading_block(model: FlatModel, target: Measured, given: Sequence[Measured]
     values = named(model, s) | {v.name: s.signal[i] for i, v in enumerate(model.signals)}
     tearing = _Tearing(model, s, used, signal)
     part = top_part(target.shown)
-    return tearing.block(_Result(part, model.variable(signal), values[signal], signal, READING_WIDTH, None))
+    return tearing.block(_Result(part, model.variable(signal), values[signal], signal, None))
 
 
 def _given(measured: Measured) -> tuple[str, ...]:
@@ -239,7 +235,7 @@ def _balance_block(
     balance = inertia * seen - efforts
     variable = Variable(output, body.domain.effort_unit, f"sum of all efforts on {body.name}")
     moving = lead.signal if lead.order == RATE else f"{lead.signal}.rate"
-    return tearing.block(_Result(body.name, variable, balance, None, BALANCE_WIDTH, moving), body)
+    return tearing.block(_Result(body.name, variable, balance, None, moving), body)
 
 
 class _Tearing:
@@ -325,7 +321,6 @@ class _Tearing:
             drives=self._drives,
             output=result.variable.name,
             target=result.target,
-            width=result.width,
             moving=result.moving,
             effort_per_drive=per_drive,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identification.equation_error.evidence import STRIDE
+from ...identification.equation_error.filter_choice import rate_span
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.residuals import Binned, shapes
 from ...model import flatten
@@ -91,11 +91,13 @@ def _shapes(hypothesis: Hypothesis, comparison: Comparison, block: str) -> dict[
     error = np.concatenate([e.error for e in judged])
 
     def gathered(signal: str, order: int) -> NDArray[np.float64]:
+        span = rate_span(bench.records.records, signal) if order else 0.0
         rows = [
-            derivative(e.record.trace[signal], e.record.step, order=order)[e.floor.places] for e in judged
+            derivative(e.record.trace[signal], e.record.step, order=order, span=span)[e.floor.places]
+            for e in judged
         ]
         return np.concatenate(rows)
 
     signals = {s: gathered(s, 0) for s in bench.records.signals}
     motion = next((s for s in bench.records.signals if bench.noise.rounded[s]), bench.records.signals[0])
-    return shapes(error, signals, gathered(motion, 1), STRIDE * judged[0].record.step)
+    return shapes(error, signals, gathered(motion, 1), bench.filters[block].spacing)

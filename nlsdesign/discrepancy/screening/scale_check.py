@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...identification.equation_error.filter_choice import rate_span
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...identification.statistics.filters import derivative
@@ -42,12 +43,16 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
     model = flatten(actuator)
     sizes = {LONGEST: max(float(r.trace.time[-1] - r.trace.time[0]) for r in records.records)}
     quickest: dict[str, float] = {}
+    signal_of = {r.measured: r.signal for r in _shown(model, records)}
+    spans = {name: rate_span(records.records, signal) for name, signal in signal_of.items()}
     for record in records.records:
         known = {s: np.asarray(record.trace[s], float) for s in records.signals}
         shown = {r.measured: shown_values(model, record, r.signal) for r in _shown(model, records)}
         moving = [b for b in model.bodies if b.motion in shown]
         shown |= {
-            b.rate: derivative(shown[b.motion], record.step, order=1) for b in moving if b.rate not in shown
+            b.rate: derivative(shown[b.motion], record.step, order=1, span=spans[b.motion])
+            for b in moving
+            if b.rate not in shown
         }
         for body in moving:
             time = _rms(shown[body.motion] - np.mean(shown[body.motion])) / max(

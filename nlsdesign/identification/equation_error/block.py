@@ -53,8 +53,6 @@ class Block:
         Name of the model's only output.
     target
         Full name of the measured signal that the output must equal; ``None`` if it must vanish.
-    width
-        Standard deviation, in samples, of the zero-phase Gaussian filter that every term passes.
     moving
         Name of the input that must be well away from zero for the block to say anything (dry friction at
         rest can be anything); ``None`` if there is no such input.
@@ -67,7 +65,6 @@ class Block:
     drives: Mapping[str, Drive]
     output: str
     target: str | None
-    width: float
     moving: str | None = None
     effort_per_drive: float = 1.0
 

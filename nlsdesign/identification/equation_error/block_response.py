@@ -94,6 +94,8 @@ class DrivenBlock:
         move faster than the samples and take short implicit steps. Without records none do.
     values
         Free parameters by name at which that is decided; those of the model by default.
+    span
+        Time in s over which rates of measured signals are taken; between neighbours by default.
 
     Raises
     ------
@@ -108,8 +110,10 @@ class DrivenBlock:
         *,
         records: Sequence[Record],
         values: Mapping[str, float] | None = None,
+        span: float = 0.0,
     ) -> None:
         self.block = block
+        self._span = span
         self.free = free_in(block, free)
         self._fixed = block.model.values
         e = _equations(block, self.free)
@@ -163,8 +167,8 @@ class DrivenBlock:
             now, since = {**self._fixed, **values}, record.trace.time - record.trace.time[0]
             delay = sum(now[n] for n in drive.late_by) + sum(now[n] for n in drive.stretched_by) * since
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
-                signal = without_rounding(signal)
-            inputs[i] = derivative(signal, record.step, order=drive.order)
+                signal = without_rounding(signal, record.step, self._span)
+            inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
             if drive.shifted_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
             if set(drive.stretched_by) & set(self._late):
@@ -467,9 +471,7 @@ def _walk_functions(
     slope, everything = _sensitivities(e)
     along = ca.SX.sym("along", table.numel(), e.parameter.numel())
     of = ca.vertcat(e.state, e.parameter, symbol)
-    directions = ca.vertcat(
-        slope, ca.SX.eye(e.parameter.numel()), ca.project(along, dependence.sparsity())
-    )
+    directions = ca.vertcat(slope, ca.SX.eye(e.parameter.numel()), ca.project(along, dependence.sparsity()))
 
     def with_slope(value: Expression) -> Expression:
         return ca.SX(ca.vertcat(value, ca.vec(ca.jtimes(value, of, directions))))

@@ -13,6 +13,7 @@ from ...errors import ConvergenceError
 from ..equation_error.evidence import Evidence
 from ..statistics.losses import bounded_total, huber_rows
 from ..statistics.residuals import autocorrelation
+from .covariance import Piece, robust_covariance
 from .levenberg_marquardt import Minimum, minimise
 from .parameters import Parameter as Parameter
 from .parameters import box
@@ -45,7 +46,8 @@ class Fit:
     values
         In SI by name.
     covariance
-        In the fitted scale; allows for coloured residuals.
+        In the fitted scale, ordered as the parameters; from the scatter of the residuals as they are, see
+        :func:`~.covariance.robust_covariance`.
     cost
         Half the sum of squares of residuals and priors.
     misfit
@@ -145,12 +147,15 @@ def fit(
     if not np.isfinite(ended.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
     residual, slope = rows(ended.x)
-    misfit, place = {}, len(parameters)
+    misfit, place, parts = {}, len(parameters), []
     for each in evidence:
-        own = residual[place : place + len(each.floor.sigma)]
-        misfit[each.driven.block.name, each.record.name] = 0.5 * float(own @ own)
-        place += len(own)
-    covariance = covariance_of(residual[len(parameters) :], slope, len(parameters))
+        block, record = each.driven.block.name, each.record
+        behind = place + len(each.floor.sigma)
+        own = residual[place:behind]
+        misfit[block, record.name] = 0.5 * float(own @ own)
+        parts.append(Piece(block, record.name, record.step * each.floor.places, own, slope[place:behind]))
+        place = behind
+    covariance = robust_covariance(parts, slope[: len(parameters)])
     return Fit(tuple(parameters), rows.values(ended.x), covariance, ended.cost, misfit, ended.converged)
 
 
