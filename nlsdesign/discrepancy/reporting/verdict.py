@@ -136,8 +136,8 @@ class Course:
 
     Parameters
     ----------
-    record, role
-        Which.
+    record
+        Name.
     quantity, unit
         What is shown: a measured signal, or the effort of the drive beside the one that the model needs.
     time
@@ -146,6 +146,8 @@ class Course:
         In the unit, shape (n,) each; the rms of the differences are those of :class:`RecordGap`.
     noise
         Standard deviation of the filtered noise, in the unit.
+    role
+        Of the record.
     """
 
     record: str
