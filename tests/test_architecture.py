@@ -66,7 +66,8 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
     "discrepancy": (
-        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"},
+        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
+        {"diagnose"},
     ),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip

@@ -83,7 +83,7 @@ def test_a_late_motor_that_saturates_is_both_in_any_order(order: tuple[str, str]
 
 
 def test_a_motor_takes_only_parts_of_a_drive() -> None:
-    with pytest.raises(ArrangementError, match=r"'spring' of a motor.*is a Spring"):
+    with pytest.raises(ArrangementError, match=r"'spring' of GearedMotor.*is a Spring"):
         driven(spring=Spring(stiffness=1.0))  # type: ignore[arg-type]
     with pytest.raises(ArrangementError, match=r"name 'inertia'.*is taken"):
         driven(inertia=DriveDelay(delay=1e-3))

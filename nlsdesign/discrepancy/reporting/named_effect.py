@@ -74,8 +74,8 @@ class NamedEffect:
         Value, unit and standard error by full name.
     aliases
         Effects of the catalogue that explain the records as well.
-    share_fit, share_held_out
-        Share of the excess over the noise that it explained when it was added.
+    share
+        Share of the excess over the noise, left when it was added, that it explains in prediction.
     signature, source
         What it leaves in records, and where its law comes from.
     probability
@@ -88,8 +88,7 @@ class NamedEffect:
     location: str
     parameters: Mapping[str, tuple[float, str, float]]
     aliases: tuple[str, ...]
-    share_fit: float
-    share_held_out: float
+    share: float
     signature: str
     source: str
     probability: float = math.nan
@@ -126,8 +125,8 @@ class NamedEffect:
             text += f" Probability {self.probability:.3g}."
         if self.signature:
             text += f" What it leaves in records: {self.signature}."
-        if math.isfinite(self.share_held_out):
-            text += f" It explains {100 * self.share_held_out:.0f} % of the excess over the noise."
+        if math.isfinite(self.share):
+            text += f" It explains {100 * self.share:.0f} % of the excess over the noise that was left."
         if self.evidence is not None:
             text += f" {self.evidence.words()}"
         if self.aliases:
@@ -152,8 +151,7 @@ class NamedEffect:
             ],
             "aliases": list(self.aliases),
             "evidence": {
-                "share_fit": self.share_fit,
-                "share_held_out": self.share_held_out,
+                "share": self.share,
                 "signature": self.signature,
                 **evidence,
             },
