@@ -57,10 +57,6 @@ def test_the_error_in_the_file_is_that_of_the_summed_up_block_in_its_own_unit() 
     assert error["fit"] == {"before": 50.0, "after": 20.0}
 
 
-def test_the_table_has_a_row_per_block_and_record_with_units() -> None:
-    assert verdict().rows()[3] == ("spring", "b", "held_out", "10 N", "3 N", "2 N")
-
-
 def test_nothing_missing_is_said_with_what_the_records_leave_open() -> None:
     assert verdict("none").words().endswith("nothing is missing.")
     assert "They leave 2 of its numbers" in verdict("none", unidentified=("k", "c")).words()
