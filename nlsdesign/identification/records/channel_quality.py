@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _MANY = 0.01
-"""A channel with a larger share of faulty samples is suspect: each takes 41 samples of a filter of 4 with it, so
-a third of the residuals would be lost."""
+"""A channel with a larger share of faulty samples is suspect: each takes 41 samples of a filter of 4 with
+it, so a third of the residuals would be lost."""
 _SHOWN = 3
 _CLIPPED_RUN = 5
 """Smallest number of equal extreme samples that may be clipping."""
@@ -149,7 +149,9 @@ class _Words:
                 yield Finding(where, f"{text} at {self._at(group)}: {way_out}")
             elif group not in short:
                 length = group.behind - group.first
-                text = f"rests at {self.column.values[group.first]:g} for {length} samples, while others go on"
+                text = (
+                    f"rests at {self.column.values[group.first]:g} for {length} samples, while others go on"
+                )
                 yield Finding(where, f"{text}, from {self._at(group)}: cut the record there")
         count = sum(g.behind - g.first for g in short)
         if count > _MANY * len(self.time):

@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 _YEAR = 3.16e7
 _SINCE_1970, _NO_TIME = 1e8, 1e11
-"""A clock that begins later than this, in s, counts from 1970; beyond the second its unit must be another one."""
+"""A clock that begins later than this, in s, counts from 1970; beyond the second it has another unit."""
 
 
 @dataclass(frozen=True, eq=False)
