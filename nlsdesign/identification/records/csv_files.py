@@ -51,8 +51,8 @@ def read_csv(file: Path) -> CsvTable:
     """Read a text file of numbers.
 
     Heads stand in the first row that is no comment (``#``, ``%``, ``//``), or in the last comment where
-    numbers follow at once. Below them a row of units may stand. With semicolons or tabs between the cells, numbers
-    may have decimal commas.
+    numbers follow at once. Below them a row of units may stand. With semicolons or tabs between the cells,
+    numbers may have decimal commas.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Samples that a sensor or a recorder got wrong: spikes, dropouts, stuck values, and jumps of a position.
 
 A group of samples is faulty where it begins and ends abruptly, while the samples on both sides of it lie on
-one cubic from which the group is off by many times their scatter (after Hampel 1974: a robust scale, taken from
-the neighbours). So a step, a jump of stick–slip, the start of a motion or coarse counts are not faults: there
-the two sides do not continue each other, or scatter as much as the group. A change that another channel shows
+one cubic from which the group is off by many times their scatter (after Hampel 1974: a robust scale, taken
+from the neighbours). So a step, a jump of stick–slip, the start of a motion or coarse counts are not faults:
+there the two sides do not continue each other, or scatter as much as the group. A change that another channel shows
 at the same time is no fault of a sensor either. All scales come from the channel itself.
 """
 
@@ -29,7 +29,7 @@ _SIDE = 12
 """Samples on either side of a group that must continue each other."""
 _LEAST_SIDE = 6
 _NEXT, _SHORT = 2, 3
-"""Samples beside a group that must be good, and the length up to which a cubic bridges it; else a parabola."""
+"""Samples beside a group that must be good, and the length that a cubic bridges; beyond it, a parabola."""
 _ABRUPT, _OFF = 5.0, 8.0
 """A change between two samples is abrupt, and a group is faulty, beyond so many times the scatter. White
 noise reaches 4.9 once in a million samples."""
@@ -165,7 +165,8 @@ def repaired(values: Array, groups: Sequence[Group]) -> tuple[Array, Mask]:
     """Return the channel with faulty samples interpolated, and which these are.
 
     A cubic through the good samples on both sides is put in; at an end of the record, and in a group longer
-    than :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as it is.
+    than :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as
+    it is.
 
     Parameters
     ----------
