@@ -69,7 +69,7 @@ FAULTS = {
     "encoder 0": ("angle", put(AT, AT + 1, 0.0), (AT, AT + 1, "spike")),
     "force 10 ms at zero": ("force", put(AT, AT + 5, 0.0), (AT, AT + 5, "dropout")),
     "force 0.2 s at zero": ("force", put(AT, AT + 100, 0.1), (AT, AT + 100, "stuck")),
-    "force holds 10 samples": ("force", hold(AT, AT + 10), (AT, AT + 10, "stuck")),
+    "force holds 10 samples": ("force", hold(AT, AT + 10), (AT + 1, AT + 10, "stuck")),
     "encoder is reset": ("angle", add(AT, None, -0.3), (AT, AT, "jump")),
 }
 
@@ -128,7 +128,8 @@ def test_a_pulse_that_the_machine_answers_is_no_fault() -> None:
     """A force on a free body for one sample: its speed changes. The same pulse that nothing answers is a fault."""
     force = np.zeros(COUNT) + 0.01 * np.random.default_rng(3).standard_normal(COUNT)
     force[AT] += 100.0
-    answered = np.where(TIME > TIME[AT], 0.5 * (TIME - TIME[AT]), 0.0)
+    since = np.maximum(TIME - TIME[AT], 0.0)
+    answered = np.round(2.0 * (1.0 - np.exp(-since / 0.2)), 3)
     assert groups_of({"force": force, "angle": answered}, "force") == []
     assert groups_of({"force": force, "angle": sine(0.3)}, "force") == [(AT, AT + 1, "spike")]
 

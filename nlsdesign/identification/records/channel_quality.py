@@ -26,8 +26,9 @@ _CLIPPED_RUN = 5
 """Smallest number of equal extreme samples that may be clipping."""
 _APPROACH, _MISSING_COUNTS = 3, 3.0
 """Samples before and after a run from which its slope is taken, and the missing peak height in counts."""
-_MOVES = 10.0
-"""A channel moves where its range is so many times its noise and its count."""
+_MOVES, _DRIFT = 10.0, 3.0
+"""A channel moves where its range is so many times its noise and its count; it goes on over a few samples where
+means of a third of them differ by so many times their noise, and its count."""
 _TURN = {"rad": 2.0 * np.pi, "deg": 360.0}
 
 
@@ -207,10 +208,9 @@ def _clipped(
 
 def _changes(values: Array, run: NDArray[np.intp]) -> bool:
     """Tell whether a channel goes on while another one rests: by more than its noise and counts."""
-    inside = values[run[0] : run[-1] + 1]
-    third = max(len(inside) // 3, 1)
-    drift = abs(float(np.mean(inside[-third:]) - np.mean(inside[:third])))
-    return drift > 2.0 * max(noise_of(values) / np.sqrt(third), quantum_of(values))
+    thirds = np.array_split(values[run[0] : run[-1] + 1], 3)
+    changes = float(np.ptp([part.mean() for part in thirds]))
+    return changes > _DRIFT * max(noise_of(values) / np.sqrt(len(thirds[-1])), quantum_of(values))
 
 
 def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:

@@ -94,7 +94,7 @@ class Witness:
     @cached_property
     def least(self) -> float:
         """Scatter that its samples have at least."""
-        return _least_scatter(self.values)
+        return max(noise_of(self.values), quantum_of(self.values))
 
     def turns(self, first: int, behind: int, reach: int) -> bool:
         """Tell whether it changes its course where a group is.
@@ -332,13 +332,19 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
     if noise_of(values) < 2.0 * _count(values):
         return
     extremes = float(values.min()), float(values.max())
+    abrupt = _JUMP * max(noise_of(values), float(np.median(np.abs(np.diff(values)))))
     equal = np.diff(values) == 0.0
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]])))
     starts, ends = bounds[::2], bounds[1::2] + 1
     long = ends - starts >= 4
     usual = (np.sum(equal) - np.sum((ends - starts - 1)[long])) / len(equal)
     for first, behind in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
-        if values[first] in extremes:
+        ends = (
+            [abs(values[b] - values[a]) for a, b in ((first - 1, first), (behind - 1, behind))]
+            if (0 < first and behind < len(values))
+            else [0.0]
+        )
+        if values[first] in extremes and min(ends) < abrupt:
             continue  # it may be clipped, or slack
         length = behind - first
         span = max(_SCATTER_SPAN, 2 * length)
@@ -349,8 +355,7 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
         sides = values[max(first - span, 0) : first + 1], values[behind - 1 : behind + span]
         goes_on = not around.others or any(np.ptp(each.values[first:behind]) > 0.0 for each in around.others)
         if goes_on and all(_is_noise(side) for side in sides):
-            size = float(max(abs(values[behind] - values[first]), abs(values[first - 1] - values[first])))
-            yield Group(first, behind, "stuck", size)
+            yield Group(first, behind, "stuck", float(max(ends)))
 
 
 def _is_noise(side: Array) -> bool:

@@ -102,7 +102,9 @@ def _from_zero(table: RecordTable, mapping: ColumnMap) -> tuple[RecordTable, str
     if first * factor < _SINCE_1970:
         return table, ""
     shifted = {name: table.given[name] - first for name in clocks}
-    return replace(table, given={**table.given, **shifted}), f" (time counted from {first:.9g})"
+    return replace(
+        table, given={**table.given, **shifted}
+    ), f" (time counted from {first:.15g} {mapping.time.unit})"
 
 
 def _checked(table: RecordTable, mapping: ColumnMap) -> Checked:
