@@ -29,15 +29,22 @@ def read(folder: Path, text: str, model: FlatModel, encoding: str = "utf-8") -> 
 
 
 PLAIN = lines(HEADS)
+
+
+def with_commas(separator: str) -> list[str]:
+    first, *rows = lines(HEADS, separator)
+    return [first, *(row.replace(".", ",") for row in rows)]
+
+
 UNITLESS = ("t", "encoder.reading", "cell.reading")
 WRITTEN = {
     "plain": (PLAIN, "utf-8"),
     "byte order mark": (PLAIN, "utf-8-sig"),
     "UTF-16": (PLAIN, "utf-16"),
     "semicolons": (lines(HEADS, ";"), "utf-8"),
-    "decimal commas": ([PLAIN[0].replace(",", ";")] + [r.replace(".", ",") for r in lines(HEADS, ";")[1:]], "utf-8"),
+    "decimal commas": (with_commas(";"), "utf-8"),
     "tabs": (lines(HEADS, "\t"), "utf-8"),
-    "tabs and commas": ([lines(HEADS, "\t")[0]] + [r.replace(".", ",") for r in lines(HEADS, "\t")[1:]], "utf-8"),
+    "tabs and commas": (with_commas("\t"), "utf-8"),
     "comments": (["# bench 3", "% measured in May", "// ok", "", *PLAIN], "utf-8"),
     "heads in a comment": (["# bench 3", f"# {PLAIN[0]}", *PLAIN[1:]], "utf-8"),
     "a row of units": ([",".join(UNITLESS), "s,deg,N*m", *PLAIN[1:]], "utf-8"),

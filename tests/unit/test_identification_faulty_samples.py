@@ -1,4 +1,4 @@
-"""Faulty samples: found where a sensor or a recorder failed, and nowhere else; scale and unit do not matter."""
+"""Faulty samples: found where a sensor or a recorder failed, and nowhere else, in any unit."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_long_tails_are_no_spikes() -> None:
 
 
 def test_a_pulse_that_the_machine_answers_is_no_fault() -> None:
-    """A force on a free body for one sample: its speed changes. The same pulse that nothing answers is a fault."""
+    """A force on a free body for one sample: its speed changes. A pulse that nothing answers is a fault."""
     force = np.zeros(COUNT) + 0.01 * np.random.default_rng(3).standard_normal(COUNT)
     force[AT] += 100.0
     since = np.maximum(TIME - TIME[AT], 0.0)

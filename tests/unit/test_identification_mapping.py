@@ -69,8 +69,11 @@ def test_a_field_of_the_wrong_kind_is_one_message(case: tuple[str, str], tmp_pat
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("columns = 3", r"columns: 3 is not a table"), ("[columns]\ntheta_rad = 3", r"columns.theta_rad: 3 is not")],
-)  # fmt: skip
+    [
+        ("columns = 3", r"columns: 3 is not a table"),
+        ("[columns]\ntheta_rad = 3", r"columns.theta_rad: 3 is not a table"),
+    ],
+)
 def test_columns_are_tables(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "records.toml").write_text(text, encoding="utf8")
     with pytest.raises(MeasurementError, match=words):

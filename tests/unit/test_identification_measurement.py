@@ -260,3 +260,17 @@ def test_uneven_steps_are_interpolated_and_said(folder: Path, model: FlatModel) 
     np.testing.assert_allclose(np.diff(first.trace.time), STEP, rtol=1e-9)
     # What was linear in time still is.
     np.testing.assert_allclose(first.trace["encoder.reading"], 0.5 * first.trace.time, atol=1e-6)
+
+
+def test_a_motion_that_is_sampled_too_coarsely_says_how_often_it_should_be(
+    tmp_path: Path, model: FlatModel
+) -> None:
+    """Ten samples a period at 50 Hz: a hundred would do."""
+    (tmp_path / "records.toml").write_text(MAPPING.replace('held_out = ["c*"]', ""), encoding="utf8")
+    time = np.arange(COUNT) * 0.02
+    angle = 20.0 * np.sin(2 * np.pi * 5.0 * time + 0.3)
+    write(tmp_path, "a", np.column_stack([time, angle, 3.0 * np.radians(angle)]))
+    remarks = [str(r) for r in read(tmp_path, model).remarks]
+    (text,) = [each for each in remarks if "samples a period" in each]
+    assert "a.csv: column 'theta_deg': has about 10 samples a period" in text
+    assert "record at 100 Hz or more" in text

@@ -27,8 +27,11 @@ _CLIPPED_RUN = 5
 _APPROACH, _MISSING_COUNTS = 3, 3.0
 """Samples before and after a run from which its slope is taken, and the missing peak height in counts."""
 _MOVES, _DRIFT = 10.0, 3.0
-"""A channel moves where its range is so many times its noise and its count; it goes on over a few samples where
-means of a third of them differ by so many times their noise, and its count."""
+"""A channel moves where its range is so many times its noise and its count; it goes on over a few samples
+where means of a third of them differ by so many times their noise, and its count."""
+_FASTEST, _LEAST_PERIOD = 98.0, 20.0
+"""Percentile of the changes that counts as the fastest, and the samples a period below which a rate is lost:
+a central difference over it is 2 % too small."""
 _TURN = {"rad": 2.0 * np.pi, "deg": 360.0}
 
 
@@ -111,6 +114,7 @@ def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_
             rows = rows_in_words(np.arange(len(now)), first_row)
             rests = column.shows_input or _all_rest(others)
             (remarks if rests else findings).append(Finding(f"{place}, {rows}", f"is constant at {now[0]:g}"))
+        remarks += _too_coarse(place, column, now, time)
         for finding, suspect in _clipped(place, column, now, others, first_row):
             (findings if suspect else remarks).append(finding)
     return Checked(values, masked, tuple(findings), tuple(remarks))
@@ -169,6 +173,22 @@ class _Words:
 
     def _rows(self, group: Group) -> str:
         return rows_in_words(np.arange(group.first, max(group.behind, group.first + 1)), self.first_row)
+
+
+def _too_coarse(place: str, column: Sampled, values: Array, time: Array) -> Iterable[Finding]:
+    """Yield how often a motion would have to be sampled, where that was too seldom for its rates.
+
+    A sine of amplitude A and n samples a period changes by at most 2πA/n from one sample to the next.
+    """
+    fastest = float(np.percentile(np.abs(np.diff(values)), _FASTEST))
+    if not column.motion or fastest <= _DRIFT * max(noise_of(values), quantum_of(values)):
+        return
+    period = np.pi * float(np.ptp(values)) / fastest
+    if period < _LEAST_PERIOD:
+        rate = (len(time) - 1) / float(time[-1] - time[0])
+        wanted = float(f"{rate * _LEAST_PERIOD / period:.2g}")
+        text = f"has about {period:.2g} samples a period where it is fastest, too few for its rates"
+        yield Finding(place, f"{text}: record at {wanted:g} Hz or more")
 
 
 def _all_rest(others: Sequence[Witness]) -> bool:

@@ -3,8 +3,8 @@
 A group of samples is faulty where it begins and ends abruptly, while the samples on both sides of it lie on
 one cubic from which the group is off by many times their scatter (after Hampel 1974: a robust scale, taken
 from the neighbours). So a step, a jump of stick–slip, the start of a motion or coarse counts are not faults:
-there the two sides do not continue each other, or scatter as much as the group. A change that another channel shows
-at the same time is no fault of a sensor either. All scales come from the channel itself.
+there the two sides do not continue each other, or scatter as much as the group. A change that another
+channel shows at the same time is no fault of a sensor either. All scales come from the channel itself.
 """
 
 from __future__ import annotations
@@ -339,11 +339,9 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
     long = ends - starts >= 4
     usual = (np.sum(equal) - np.sum((ends - starts - 1)[long])) / len(equal)
     for first, behind in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
-        ends = (
-            [abs(values[b] - values[a]) for a, b in ((first - 1, first), (behind - 1, behind))]
-            if (0 < first and behind < len(values))
-            else [0.0]
-        )
+        at_an_end = first == 0 or behind == len(values)
+        pairs = () if at_an_end else ((first - 1, first), (behind - 1, behind))
+        ends = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
         if values[first] in extremes and min(ends) < abrupt:
             continue  # it may be clipped, or slack
         length = behind - first
@@ -355,7 +353,7 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
         sides = values[max(first - span, 0) : first + 1], values[behind - 1 : behind + span]
         goes_on = not around.others or any(np.ptp(each.values[first:behind]) > 0.0 for each in around.others)
         if goes_on and all(_is_noise(side) for side in sides):
-            yield Group(first, behind, "stuck", float(max(ends)))
+            yield Group(first, behind, "stuck", max(ends))
 
 
 def _is_noise(side: Array) -> bool:
