@@ -3,6 +3,9 @@
 from .blocks.prediction_of_blocks import predict
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
+from .effects.unnamed_tables import unnamed_part
+from .planning.experiment import Experiment, Separation, next_experiment, write_command
+from .planning.machine_limits import MachineLimits
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 
@@ -12,15 +15,21 @@ __all__ = [
     "Candidate",
     "Course",
     "Effect",
+    "Experiment",
     "FittedNumber",
+    "MachineLimits",
     "NamedEffect",
     "RecordGap",
     "Refit",
+    "Separation",
     "Unknown",
     "Verdict",
     "diagnose",
+    "next_experiment",
     "predict",
     "refit",
+    "unnamed_part",
+    "write_command",
     "write_refit",
     "write_verdict",
 ]

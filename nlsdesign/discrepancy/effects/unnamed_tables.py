@@ -355,14 +355,14 @@ class _Regression:
 
     def squares(self, folds: Sequence[Sequence[_Fold]]) -> Array:
         """Return the sum of squares on each stretch, when its fold was not used."""
-        found = []
+        sums = []
         for fold in folds:
             x = self.solved(fold)
             for part, rows in fold:
                 left = (self._targets[part][rows] - self._columns[part][rows] @ x) ** 2
                 pieces = max(1, _BLOCKS * len(rows) // len(self._targets[part]))
-                found += [float(piece.sum()) for piece in np.array_split(left, pieces)]
-        return np.array(found)
+                sums += [float(piece.sum()) for piece in np.array_split(left, pieces)]
+        return np.array(sums)
 
 
 def _candidate(
