@@ -325,7 +325,7 @@ def _once(
         left = delta
         if slope.shape[1]:
             step = np.linalg.solve(rival.information[members[0]] + slope.T @ slope, slope.T @ delta)
-            left = delta
+            left = delta - slope @ step
         total += max(float(delta @ left), 0.0)
         place = 0
         for name, part in zip(members, rows, strict=True):
