@@ -97,6 +97,7 @@ class _Family:
         self._speed, self._acceleration = limits.speed, limits.acceleration
         self._duration = float(time[-1] - time[0])
         self._step = self._duration / (len(time) - 1)
+        self._highest = 1.0 / (_SAMPLES_PER_PERIOD * self._step)
         rise = _RISE * self._duration
         self._window = smooth_step(time / rise) * smooth_step((self._duration - time) / rise)
 
@@ -121,40 +122,22 @@ class _Family:
             return
         for share in _SIZES[:1] if fewer else _SIZES:
             for frequency in self._frequencies(share * size)[-1 if fewer else 0 :]:
-                wave = self._wave(frequency, centre != 0.0)
-                words = f"a sine of {self._share(share)}{where} at {frequency:.2g} Hz"
-                yield words, self._window * share * self._placed(centre, size, wave)
+                wave = _wave(frequency * self._time, centre != 0.0)
+                words = f"a sine of {_share(share)}{where} at {frequency:.2g} Hz"
+                yield words, self._window * share * _placed(centre, size, wave)
         for slowness in _SLOWNESS[1 if fewer else 0 :]:
-            wave = self._triangle(slowness * min(self._speed / size, self._quickest()), centre != 0.0)
-            if wave is not None:
+            rate = slowness * min(self._speed / size, 2.0 * math.pi * self._highest)
+            triangle = self._triangle(rate, centre != 0.0)
+            if triangle is not None:
                 words = f"a ramp to and fro{where} at {100 * slowness:.0f} % of the largest speed"
-                yield words, self._placed(centre, size, wave)
+                yield words, _placed(centre, size, triangle)
         yield from self._growing(centre, size, where)
-
-    def _share(self, share: float) -> str:
-        return "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"
-
-    def _placed(self, centre: float, size: float, wave: Array) -> Array:
-        """Return a wave in (−1, 1), or for one side in (0, 2), with its size and the side of its centre."""
-        return (np.sign(centre) or 1.0) * size * wave
-
-    def _wave(self, frequency: float, one_sided: bool) -> Array:
-        turn = 2.0 * np.pi * frequency * self._time
-        wave: Array = 1.0 - np.cos(turn) if one_sided else np.sin(turn)
-        return wave
 
     def _frequencies(self, size: float) -> Array:
         quickest = min(self._speed / size, math.sqrt(self._acceleration / size))
-        highest = min(self._highest(), 0.95 * quickest / (2.0 * np.pi))
+        highest = min(self._highest, 0.95 * quickest / (2.0 * np.pi))
         lowest = min(_PERIODS / self._duration, highest)
         return np.unique(np.geomspace(lowest, highest, _FREQUENCIES))
-
-    def _quickest(self) -> float:
-        """Return the largest speed of a sine of unit size at the highest frequency."""
-        return 2.0 * math.pi * self._highest()
-
-    def _highest(self) -> float:
-        return 1.0 / (_SAMPLES_PER_PERIOD * self._step)
 
     def _triangle(self, rate: float, one_sided: bool) -> Array | None:
         """Return a rounded triangle of unit size; nothing where it would have no time to move."""
@@ -186,13 +169,13 @@ class _Family:
         kernel = np.hanning(max(3, int(0.04 * len(height)) | 1))
         padded = np.pad(height, len(kernel), mode="edge")
         height = np.convolve(padded, kernel / kernel.sum(), mode="same")[len(kernel) : -len(kernel)]
-        wave = self._wave(frequency, centre != 0.0)
-        shape = 0.98 * self._window * height * self._placed(centre, size, wave)
+        wave = _wave(frequency * self._time, centre != 0.0)
+        shape = 0.98 * self._window * height * _placed(centre, size, wave)
         yield f"slow cycles, small, then large, then small again{where}", shape
 
     def _multisine(self, size: float) -> Array:
         """Return tones of falling size, with the phases of Schroeder 1970, so that their peak is low."""
-        frequencies = np.geomspace(_PERIODS / self._duration, 0.5 * self._highest(), _TONES)
+        frequencies = np.geomspace(_PERIODS / self._duration, 0.5 * self._highest, _TONES)
         if np.isfinite(self._speed):
             top = max(4.0 * self._speed / (2.0 * np.pi * size), 2.0 * frequencies[0])
             frequencies = np.geomspace(frequencies[0], min(frequencies[-1], top), _TONES)
@@ -204,7 +187,7 @@ class _Family:
 
     def _sweep(self, size: float) -> Array:
         """Return a sine whose frequency grows and whose size falls so that its speed stays."""
-        low, high = _PERIODS / self._duration, 0.5 * self._highest()
+        low, high = _PERIODS / self._duration, 0.5 * self._highest
         rate = np.log(high / low) / self._duration
         frequency = low * np.exp(rate * self._time)
         turns = 2.0 * np.pi * (frequency - low) / rate
@@ -225,7 +208,7 @@ class _Family:
         if small <= 0.0:
             return
         for frequency in self._frequencies(small)[1:]:
-            wave = self._wave(frequency, False)
+            wave = _wave(frequency * self._time, False)
             yield (
                 f"a small sine{where} at {frequency:.2g} Hz",
                 self._bounded(0.8 * size * rise + small * later * wave),
@@ -254,3 +237,17 @@ class _Family:
         rate = max(float(np.max(np.abs(slope))), 1e-300)
         push = max(float(np.max(np.abs(np.gradient(slope, self._time)))), 1e-300)
         return value * min(1.0, self._speed / rate, self._acceleration / push)
+
+
+def _share(share: float) -> str:
+    return "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"
+
+
+def _placed(centre: float, size: float, wave: Array) -> Array:
+    """Return a wave in (−1, 1), or for one side in (0, 2), with its size and the side of its centre."""
+    return (np.sign(centre) or 1.0) * size * wave
+
+
+def _wave(turns: Array, one_sided: bool) -> Array:
+    wave: Array = 1.0 - np.cos(2.0 * np.pi * turns) if one_sided else np.sin(2.0 * np.pi * turns)
+    return wave

@@ -271,8 +271,7 @@ class _Plan:
         records = self._bench.records.records
         step = float(np.median([r.step for r in records]))
         long = duration or max(float(r.trace.time[-1] - r.trace.time[0]) for r in records)
-        times: Array = np.arange(max(round(long / step), 1) + 1) * step
-        return times
+        return np.asarray(np.arange(max(round(long / step), 1) + 1) * step, dtype=np.float64)
 
     def judged(self, time: Array, command: Command, limits: MachineLimits) -> _Judged | None:
         """Return how well a candidate tells the hypotheses apart; nothing where it leaves the limits."""

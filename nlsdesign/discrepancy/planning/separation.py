@@ -168,8 +168,8 @@ def _information(fit: Fit) -> Array:
     if not fit.parameters:
         return np.zeros((0, 0))
     low, high = _box(fit.parameters)
-    inverse: Array = np.linalg.pinv(fit.covariance, rcond=1e-12, hermitian=True)
-    return inverse + np.diag((0.5 * (high - low)) ** -2.0)
+    inverse = np.linalg.pinv(fit.covariance, rcond=1e-12, hermitian=True)
+    return np.asarray(inverse + np.diag((0.5 * (high - low)) ** -2.0), dtype=np.float64)
 
 
 def _as_good(rival: ReadyHypothesis, bench: Bench, noise: Values, fit: Fit) -> list[Values]:
