@@ -214,7 +214,9 @@ def predicted(run: ca.Function, model: FlatModel, values: Mapping[str, float], l
     names = [v.name for v in model.states]
     state[names.index("servo.angle")] = log.position[0]
     if "servo.late.lag" in names:
-        state[names.index("servo.late.lag")] = gain["servo.loop.proportional"] * (log.goal[0] - log.position[0])
+        state[names.index("servo.late.lag")] = gain["servo.loop.proportional"] * (
+            log.goal[0] - log.position[0]
+        )
     ends = np.vstack([log.goal[:-1], log.goal[1:]])
     path = np.array(run(state, ends, np.repeat(parameter[:, None], ends.shape[1], axis=1)))
     return np.concatenate([log.position[:1], path[names.index("servo.angle")]])
