@@ -135,7 +135,7 @@ def content(verdict: Verdict) -> dict[str, Any]:
         "ratio": verdict.held_out_ratio,
         "before": verdict.rms("before", "held_out") / verdict.rms("noise_floor", "held_out"),
         "where": list(verdict.where),
-        "runners_up": [[name, round(share, 3)] for name, share in verdict.runners_up],
+        "runners_up": [[name, round(share, 3), *why] for name, share, *why in verdict.runners_up],
     }
 
 

@@ -40,6 +40,7 @@ from .selection.comparison import Comparison
 from .selection.criteria import DECLARED, Criteria, Excess, Excesses, Standing, is_complete
 from .selection.excess import excesses
 from .selection.hypothesis import Hypothesis
+from .selection.probability import CALIBRATION
 from .selection.search import Outcome, Step, search
 from .selection.standing import standing_of
 
@@ -52,7 +53,7 @@ _RUNNERS_UP, _MOST_ALIASES = 6, 3
 class _Decision:
     """The verdict in one word, and what makes the records suspect in sentences."""
 
-    verdict: Literal["none", "named", "unknown", "data_suspect"]
+    verdict: Literal["none", "named", "unknown", "undecidable", "data_suspect"]
     findings: tuple[str, ...] = ()
 
 
@@ -140,11 +141,12 @@ def _decided(
 
 def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     """Return what is missing, unless other numbers of the rig explain the records better."""
-    verdict: Literal["none", "named", "unknown"]
+    verdict: Literal["none", "named", "unknown", "undecidable"]
     if not any(e.open for e in case.excesses(base).values()):
         verdict = "none"
     else:
-        verdict = "named" if outcome.steps and outcome.explained else "unknown"
+        undecided = any(each.undecided for each in outcome.tried)
+        verdict = "named" if outcome.steps else "undecidable" if undecided else "unknown"
     better = outcome.last if verdict == "named" else base
     other = other_numbers(case.comparison, base, better, case.criteria)
     return _Decision("data_suspect" if other.decides else verdict, (other.words,) if other.words else ())
@@ -164,7 +166,7 @@ def _verdict(
     every = case.comparison.with_records(records)
     return Verdict(
         verdict,
-        tuple(_named(better, step, place) for place, step in enumerate(steps)),
+        tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
         ((_strained(before[DECLARED], after[DECLARED]),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
@@ -238,7 +240,7 @@ def _not_predicted(key: Key) -> str:
     )
 
 
-def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
+def _named(last: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
     # Later edits may have put the same number under a longer name: the last hypothesis knows.
     candidate = last.added[place]
     own = {u.name for u in candidate.unknowns}
@@ -256,6 +258,7 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         step.share,
         candidate.signature,
         candidate.source,
+        probability=CALIBRATION.probability(step.distance, complete=complete) / (1 + len(step.equals)),
         evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
     )
 

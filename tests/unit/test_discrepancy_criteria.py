@@ -23,12 +23,13 @@ from nlsdesign.discrepancy.selection.criteria import (
     is_beyond_noise,
     is_beyond_prior,
     is_complete,
-    is_explained,
     is_superfluous,
+    is_undecided,
     lacking,
     objections,
     records_made_worse,
     total_excess,
+    unexplained,
 )
 
 RULE, ROWS, RECORDS, PIECES = Criteria(), 1000, ("slow", "quick"), 5
@@ -235,9 +236,18 @@ def test_a_block_counts_as_explained_when_closed_or_by_three_quarters() -> None:
         return {"spring": excess(left, is_open=is_open)}
 
     first = {"spring": excess(1e4)}
-    assert is_explained(RULE, first, last(2.4e3))
-    assert not is_explained(RULE, first, last(2.6e3))
-    assert is_explained(RULE, first, last(9e3, is_open=False))
+    assert not unexplained(RULE, first, last(2.4e3))
+    assert unexplained(RULE, first, last(2.6e3)) == ["spring"]
+    assert not unexplained(RULE, first, last(9e3, is_open=False))
+
+
+def test_what_explains_but_has_numbers_that_are_not_known_is_undecided() -> None:
+    unknown = replace(rival("a", 1, 1e3), standing=standing(0.1))
+    assert is_undecided(RULE, FIRST, unknown)
+    assert not is_undecided(RULE, FIRST, rival("a", 1, 1e3)), "nothing speaks against it"
+    assert not is_undecided(RULE, FIRST, replace(unknown, excesses=with_left(0.6e5))), "explains too little"
+    spoiling = replace(unknown, excesses={"spring": excess(1e3), "motor": excess(3e5)})
+    assert not is_undecided(RULE, FIRST, spoiling), "more than its numbers speaks against it"
 
 
 def test_complete_is_what_leaves_no_block_open() -> None:
@@ -247,10 +257,9 @@ def test_complete_is_what_leaves_no_block_open() -> None:
 
 def test_declared_numbers_decide_only_where_no_block_is_open() -> None:
     alone = {DECLARED: STRAINED}
-    assert not is_explained(RULE, alone, alone)
-    assert is_explained(
-        RULE, {"spring": excess(1e4), DECLARED: STRAINED}, {"spring": excess(1e3), DECLARED: STRAINED}
-    )
+    assert unexplained(RULE, alone, alone) == [DECLARED]
+    first, last = ({"spring": excess(e), DECLARED: STRAINED} for e in (1e4, 1e3))
+    assert not unexplained(RULE, first, last)
     assert lacking({**FIRST, DECLARED: STRAINED}) == ["spring", "motor"]
     assert lacking({"spring": excess(0.0), DECLARED: STRAINED}) == [DECLARED]
 

@@ -108,13 +108,13 @@ def names(found: Outcome) -> list[str]:
 def test_where_nothing_is_open_nothing_is_tried() -> None:
     table = Table({(): (0.0,)})
     found = outcome(table, effect("a"))
-    assert (names(found), found.explained, table.asked) == ([], True, [])
+    assert (names(found), found.complete, table.asked) == ([], True, [])
 
 
 def test_the_one_effect_that_explains_is_named_and_fitted_to_all_samples() -> None:
     found = outcome(Table({(): (1e5,), ("a",): (9e4,), ("b",): (10.0,)}), effect("a"), effect("b"))
     assert names(found) == ["b"]
-    assert found.explained
+    assert found.complete
     assert found.last.values == {"polished": 1.0}
     assert [(e.candidate.effect, round(e.share, 2)) for e in found.tried] == [("b", 1.0), ("a", 0.1)]
     assert [bool(e.objections) for e in found.tried] == [False, True]
@@ -125,7 +125,7 @@ def test_a_second_effect_is_sought_while_a_block_is_open() -> None:
     table = {(): (1e5,), ("a",): (3e4,), ("b",): (9e4,), ("a", "b"): (10.0,)}
     found = outcome(Table(table), effect("a"), effect("b"))
     assert names(found) == ["a", "b"]
-    assert found.explained
+    assert found.complete
 
 
 def test_an_effect_that_a_later_one_makes_superfluous_is_dropped() -> None:
@@ -154,13 +154,24 @@ def test_nothing_is_named_where_neither_one_nor_two_explain_half() -> None:
     table = {(): (1e5,), ("a",): (8e4,), ("b",): (9e4,), ("a", "b"): (6e4,)}
     found = outcome(Table(table), effect("a"), effect("b"))
     assert names(found) == []
-    assert not found.explained
+    assert not found.complete
 
 
-def test_what_remains_open_is_not_explained() -> None:
-    found = outcome(Table({(): (1e5,), ("a",): (4e4,)}), effect("a"))
+def test_what_explains_most_of_a_block_is_named_and_what_is_left_is_said() -> None:
+    found = outcome(Table({(): (1e5,), ("a",): (2e4,)}), effect("a"))
     assert names(found) == ["a"]
-    assert not found.explained
+    assert not found.complete
+
+
+def test_what_leaves_most_of_its_block_unexplained_stands_for_something_else() -> None:
+    found = outcome(Table({(): (1e5,), ("a",): (4e4,)}), effect("a"))
+    assert names(found) == []
+    assert not found.complete
+    beside = {(): (1e5, 9e4), ("a",): (4e4, 9e4), ("b",): (1e5, 10.0), ("a", "b"): (4e4, 10.0)}
+    assert outcome(Table(beside), effect("a")).steps == ()
+    found = outcome(Table(beside), effect("a"), effect("b"))
+    assert names(found) == ["b"], "the other block is explained and has its name"
+    assert not found.complete
 
 
 def test_no_more_than_three_effects_are_named() -> None:
@@ -201,7 +212,7 @@ def test_the_block_that_lacks_most_is_worked_on_first() -> None:
     table = {(): (1e5, 1e6), ("a",): (10.0, 1e6), ("b",): (1e5, 10.0), ("a", "b"): (10.0, 10.0)}
     found = outcome(Table(table), effect("a"), effect("b"))
     assert names(found) == ["b", "a"]
-    assert found.explained
+    assert found.complete
 
 
 def test_what_only_all_samples_show_is_judged_on_all_samples() -> None:

@@ -81,7 +81,7 @@ class Criteria:
         3, "effects that are looked for: a fourth would rest on what three inexact forms leave over"
     )
     closed_share: float = _criterion(
-        0.75, "share of the excess of an open block that all effects together must explain for a name"
+        0.75, "share of the excess of a block that all effects in it together must explain for a name"
     )
 
     def described(self) -> list[dict[str, Any]]:
@@ -366,8 +366,8 @@ def records_made_worse(criteria: Criteria, before: Excesses, after: Excesses) ->
     }
 
 
-def is_explained(criteria: Criteria, first: Excesses, last: Excesses) -> bool:
-    """Tell whether what was added accounts for most of every block that was open.
+def unexplained(criteria: Criteria, first: Excesses, last: Excesses) -> list[str]:
+    """Return the blocks that were open and of whose excess too little is accounted for.
 
     Declared numbers that stay far from their values are no objection where a block was open: they are
     mentioned in ``where``.
@@ -382,7 +382,7 @@ def is_explained(criteria: Criteria, first: Excesses, last: Excesses) -> bool:
     shares = explained(first, last)
     if len(shares) > 1:
         shares.pop(DECLARED, None)
-    return all(not last[name].open or share >= criteria.closed_share for name, share in shares.items())
+    return [n for n, share in shares.items() if last[n].open and share < criteria.closed_share]
 
 
 def is_complete(last: Excesses) -> bool:
@@ -438,6 +438,36 @@ class Rival(Generic[T]):
     excesses: Excesses
     standing: Standing = field(default_factory=Standing)
     simpler: tuple[str, ...] = ()
+
+
+def left_by(rival: Rival[T], block: str) -> float:
+    """Return the excess that a rival leaves in a block.
+
+    Parameters
+    ----------
+    rival
+        Of several.
+    block
+        Name.
+    """
+    return rival.excesses[block].excess
+
+
+def is_undecided(criteria: Criteria, before: Excesses, rival: Rival[T]) -> bool:
+    """Tell whether an effect explains what is left, but the records do not determine its numbers.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    before
+        Of the hypothesis without the effect.
+    rival
+        With it.
+    """
+    explains = max(explained(before, rival.excesses).values(), default=0.0) >= criteria.closed_share
+    unknown = _objections_of_numbers(criteria, rival.standing)
+    return explains and bool(unknown) and list(objections(criteria, before, rival)) == unknown
 
 
 def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[str, ...]:
@@ -535,7 +565,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     def left(rival: Rival[T]) -> float:
         after = rival.excesses.items()
         spoilt = sum(max(0.0, e.excess - before[n].excess) for n, e in after if n != block)
-        return rival.excesses[block].excess + spoilt
+        return left_by(rival, block) + spoilt
 
     able = [rival for rival in rivals if not objections(criteria, before, rival)]
     able = [rival for rival in able if explained(before, rival.excesses).get(block, 0.0) > 0.0] or able

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ...errors import ConvergenceError
 from ...processes import parallel_map
@@ -25,15 +25,17 @@ from .criteria import (
     gain,
     gains_by_record,
     is_complete,
-    is_explained,
     is_superfluous,
+    is_undecided,
     lacking,
     objections,
     predicts_records,
     total_excess,
+    unexplained,
 )
 from .excess import excesses
 from .hypothesis import Hypothesis
+from .probability import distance_to_next
 from .standing import standing_of
 
 _PAIRED = 4
@@ -54,8 +56,12 @@ class Step:
     ----------
     chosen
         Hypothesis with the effect in it.
+    block
+        In which something was lacking.
     share
         Share of the excess that was left in a block before, of the block of which it explains most.
+    distance
+        How many times as much the best other name leaves, natural logarithm.
     gain, gains
         What prediction gains by it, over all records and on each.
     equals
@@ -63,7 +69,9 @@ class Step:
     """
 
     chosen: Hypothesis
+    block: str
     share: float
+    distance: float = 0.0
     gain: Gain = _UNKNOWN_GAIN
     gains: Mapping[str, float] = field(default_factory=dict)
     equals: tuple[Hypothesis, ...] = ()
@@ -86,11 +94,14 @@ class Tried:
         Share of the whole excess that it explains alone.
     objections
         Clauses of the rule that speak against it; empty for one that may be named.
+    undecided
+        Whether it explains what is missing, but the records do not determine its numbers.
     """
 
     candidate: Candidate
     share: float
     objections: tuple[str, ...]
+    undecided: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,8 +140,6 @@ class Outcome:
         One for each effect.
     tried
         What was tried first, the best first.
-    explained
-        Whether that accounts for most of every block that was open.
     complete
         Whether nothing is left beyond the noise.
     skipped
@@ -140,7 +149,6 @@ class Outcome:
     last: Hypothesis
     steps: tuple[Step, ...] = ()
     tried: tuple[Tried, ...] = ()
-    explained: bool = False
     complete: bool = False
     skipped: tuple[Skipped, ...] = ()
 
@@ -184,17 +192,21 @@ class _Search:
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.comparison.coarsely(base)
-        steps = self._backward(start, self._forward(start))
+        steps = self._explaining(start, self._backward(start, self._forward(start)))
         skipped = tuple(dict.fromkeys(self.skipped))
-        first = self._on_all(start)
         if not steps:
-            complete = is_complete(first)
-            return Outcome(base, (), self.tried, complete, complete, skipped)
+            return Outcome(base, (), self.tried, is_complete(self._on_all(start)), skipped)
         self.progress("fitting what was named to all samples")
         last = self.comparison.polished(steps[-1].chosen)
-        done = self._excesses(last)
-        explains = is_explained(self.criteria, first, done)
-        return Outcome(last, tuple(steps), self.tried, explains, is_complete(done), skipped)
+        return Outcome(last, tuple(steps), self.tried, is_complete(self._excesses(last)), skipped)
+
+    def _explaining(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
+        """Drop the effects of blocks that stay unexplained: there they stand for something else."""
+        if not steps:
+            return []
+        left = unexplained(self.criteria, self._excesses(start), self._excesses(steps[-1].chosen))
+        kept = [step for step in steps if step.block not in left]
+        return steps if len(kept) == len(steps) else self._rebuilt(start, kept)
 
     def _excesses(self, hypothesis: Hypothesis) -> Excesses:
         return excesses(hypothesis, self.comparison.bench, self.criteria)
@@ -338,7 +350,7 @@ class _Search:
         if step is None:
             return []
         alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)
-        return [self._made(before, _rival(alone, self._excesses(alone))), step]
+        return [self._made(before, _rival(alone, self._excesses(alone)), block), step]
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
         """Return the same effect at the same kind of place of another assembly."""
@@ -363,27 +375,38 @@ class _Search:
             if later is None:
                 return []
             rival = _rival(later, self._excesses(later))
-            rebuilt.append(self._made(self._excesses(present), rival, step.equals))
+            made = self._made(self._excesses(present), rival, step.block)
+            rebuilt.append(replace(made, distance=step.distance, equals=step.equals))
             present = later
         return rebuilt
 
     def _chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
         """Return the best of some hypotheses, by what each leaves."""
-        choice = choose(self.criteria, before, [_rival(h, after) for h, after in tried.items()], block)
+        rivals = [_rival(h, after) for h, after in tried.items()]
+        choice = choose(self.criteria, before, rivals, block)
         if choice is None:
             return None
-        return self._made(before, choice.taken, tuple(r.hypothesis for r in choice.equals))
+        return replace(
+            self._made(before, choice.taken, block),
+            distance=distance_to_next(self.criteria, choice, rivals, block),
+            equals=tuple(r.hypothesis for r in choice.equals),
+        )
 
-    def _made(self, before: Excesses, rival: Rival[Hypothesis], equals: tuple[Hypothesis, ...] = ()) -> Step:
+    def _made(self, before: Excesses, rival: Rival[Hypothesis], block: str) -> Step:
         share = max(explained(before, rival.excesses).values(), default=0.0)
         gained, gains = gain(before, rival.excesses), gains_by_record(before, rival.excesses)
-        return Step(rival.hypothesis, share, gained, gains, equals)
+        return Step(rival.hypothesis, block, share, gain=gained, gains=gains)
 
     def _account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
         """Return how far each effect goes alone and what speaks against it, the best first."""
         whole = max(total_excess(self._excesses(present)), 1.0)
         every = [
-            Tried(h.newest, 1.0 - total_excess(self._excesses(h)) / whole, self._objections(present, h))
+            Tried(
+                h.newest,
+                1.0 - total_excess(self._excesses(h)) / whole,
+                self._objections(present, h),
+                is_undecided(self.criteria, self._excesses(present), _rival(h, self._excesses(h))),
+            )
             for h in tried
         ]
         return tuple(sorted(every, key=lambda each: -each.share))

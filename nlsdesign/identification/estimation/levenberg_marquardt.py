@@ -97,9 +97,21 @@ def _step(gradient: Array, curvature: Array, damping: float, place: tuple[Array,
     """Return the step that minimises the damped quadratic model inside the box."""
     x, low, high = place
     diagonal = np.diag(curvature)
-    matrix = curvature + np.diag(damping * diagonal + 1e-12 * diagonal.max() + 1e-300)
-    lower = np.linalg.cholesky(matrix)
+    lower = _root(curvature + np.diag(damping * diagonal), float(diagonal.max()))
     target = -np.linalg.solve(lower, gradient)
     walls = np.maximum(low - x, -_LONGEST), np.minimum(high - x, _LONGEST)
     step: Array = lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=20 * len(x)).x
     return step
+
+
+def _root(matrix: Array, largest: float) -> Array:
+    """Return a lower triangular root of a matrix, lifted where rounding has left it indefinite."""
+    lift = 1e-12
+    while lift < 1.0:
+        try:
+            return np.asarray(
+                np.linalg.cholesky(matrix + (lift * largest + 1e-300) * np.eye(len(matrix))), dtype=np.float64
+            )
+        except np.linalg.LinAlgError:
+            lift *= 100.0
+    raise ConvergenceError("fit", "has slopes that are not finite", next_step="narrow the bounds")

@@ -1,0 +1,70 @@
+"""Probability that a name is right, calibrated on cases with known answers.
+
+    ln(p/(1 − p)) = a + b·ln(r) + c·m,   r = (left by the best other name + n)/(left by the named + n)
+
+with what the rivals leave of the excess, the noise margin n, and m = 1 where nothing is left beyond the noise
+(Platt 1999: a logistic curve through scores). What the records cannot tell apart shares the probability.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from .criteria import Choice, Criteria, Rival, left_by
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Numbers of the curve, fitted to the calibration seeds of ``docs/decision.md``.
+
+    Parameters
+    ----------
+    offset, distance, complete
+        a, b and c of the module's formula.
+    """
+
+    offset: float = 0.3
+    distance: float = 0.8
+    complete: float = 1.0
+
+    def probability(self, distance: float, *, complete: bool) -> float:
+        """Return the probability that a name is right.
+
+        Parameters
+        ----------
+        distance
+            ln(r).
+        complete
+            Whether nothing is left beyond the noise.
+        """
+        score = self.offset + self.distance * distance + self.complete * complete
+        return 1.0 / (1.0 + math.exp(-score))
+
+
+CALIBRATION = Calibration()
+
+
+def distance_to_next(criteria: Criteria, choice: Choice[T], rivals: Sequence[Rival[T]], block: str) -> float:
+    """Return ln(r): how many times as much the best other name leaves as the one that is taken.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    choice
+        What is taken, and what cannot be told from it.
+    rivals
+        All that were compared.
+    block
+        Where something was lacking.
+    """
+    names = {choice.taken.effect, *(each.effect for each in choice.equals), *choice.taken.simpler}
+    others = [left_by(rival, block) for rival in rivals if rival.effect not in names]
+    margin = criteria.noise_margin
+    own = left_by(choice.taken, block)
+    return math.log((min(others) + margin) / (own + margin)) if others else 0.0
