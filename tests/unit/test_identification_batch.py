@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nlsdesign.identification.equation_error.batch import Chain, Columns, Point
+from nlsdesign.identification.equation_error.batch import ChainFunction, ColumnFunction, PointFunction
 
 _X, _Y = ca.SX.sym("x"), ca.SX.sym("y")
 _RESULTS = {
@@ -39,13 +39,13 @@ def test_columns_are_what_casadi_computes(kind: str, count: int) -> None:
     random = np.random.default_rng(3)
     x, y = (np.concatenate([[0.5], random.uniform(-0.9, 0.9, count - 1)])[None] for _ in range(2))
     expected = function.map(count)(x, y).full()
-    np.testing.assert_allclose(Columns(function)(count, [x, y]), expected, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(ColumnFunction(function)(count, [x, y]), expected, rtol=1e-13, atol=1e-15)
 
 
 def test_a_column_may_be_the_same_for_all_samples() -> None:
     p, u = ca.SX.sym("p", 2), ca.SX.sym("u")
     function = ca.Function("f", [u, p], [ca.vertcat(p[0] * u, p[1])])
-    result = Columns(function)(3, [np.array([[1.0, 2.0, 3.0]]), np.array([4.0, 5.0])])
+    result = ColumnFunction(function)(3, [np.array([[1.0, 2.0, 3.0]]), np.array([4.0, 5.0])])
     np.testing.assert_array_equal(result, [[4.0, 8.0, 12.0], [5.0, 5.0, 5.0]])
 
 
@@ -57,14 +57,14 @@ def test_a_chain_goes_on_from_what_the_step_before_gave(count: int) -> None:
     path, place = np.zeros((2, count)), np.array([1.0, 0.0])
     for k in range(count):
         place = path[:, k] = np.array([0.9 * place[0] + driven[0, k], place[1] + place[0]])
-    result = Chain(step)(count, [np.array([1.0, 0.0]), driven, np.array([0.9])])
+    result = ChainFunction(step)(count, [np.array([1.0, 0.0]), driven, np.array([0.9])])
     np.testing.assert_allclose(result, path, rtol=1e-12)
 
 
 def test_a_point_gives_all_outputs_in_their_shape() -> None:
     x, y = ca.SX.sym("x", 2), ca.SX.sym("y")
     matrix = ca.densify(ca.horzcat(x, x * y, x + y))
-    point = Point(ca.Function("f", [x, y, ca.SX.sym("none", 0)], [x * x, matrix]))
+    point = PointFunction(ca.Function("f", [x, y, ca.SX.sym("none", 0)], [x * x, matrix]))
     column, table = point(np.array([1.0, 2.0]), 3.0, np.zeros(0))
     np.testing.assert_array_equal(column, [[1.0], [4.0]])
     np.testing.assert_array_equal(table, [[1.0, 3.0, 4.0], [2.0, 6.0, 5.0]])

@@ -73,7 +73,7 @@ _OPERATIONS: dict[int, Callable[..., Any]] = {
 """The elementary operations of CasADi on arrays, by number."""
 
 
-class Columns:
+class ColumnFunction:
     """A function over columns of arrays, each column by itself.
 
     CasADi would go through all instructions for one column after the other; here each instruction is done for
@@ -141,7 +141,7 @@ class Columns:
                 value[place] = operation(value[read[0]])
 
 
-class Chain:
+class ChainFunction:
     """A function over columns of arrays in a chain of steps: its first input is what the step before gave.
 
     CasADi converts NumPy arrays number by number, which takes ten times as long as the arithmetic here; its
@@ -193,7 +193,7 @@ class Chain:
         return columns
 
 
-class Point:
+class PointFunction:
     """A function at one point at a time.
 
     Parameters
@@ -204,16 +204,16 @@ class Point:
 
     def __init__(self, function: ca.Function) -> None:
         self._buffer, self._trigger = function.buffer()
-        self._given = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
-        self._results = [
+        self._given: list[Array] = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
+        self._results: list[Array] = [
             np.zeros((function.size2_out(i), function.size1_out(i))) for i in range(function.n_out())
         ]
         for i, array in enumerate(self._given):
             if array.size:
                 self._buffer.set_arg(i, memoryview(array))  # type: ignore[arg-type, call-arg]
-        for i, array in enumerate(self._results):
-            if array.size:
-                self._buffer.set_res(i, memoryview(array))  # type: ignore[arg-type, call-arg]
+        for i, result in enumerate(self._results):
+            if result.size:
+                self._buffer.set_res(i, memoryview(result))  # type: ignore[arg-type, call-arg]
 
     def __call__(self, *arrays: Array | float) -> list[Array]:
         """Return all outputs, shape (rows, columns) each.

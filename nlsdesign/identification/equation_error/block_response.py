@@ -13,7 +13,7 @@ from ...errors import ConvergenceError, MeasurementError, unknown_name
 from ...symbolic import Expression, depends
 from ..records.measurement import Record
 from ..statistics.filters import derivative, without_rounding
-from .batch import Chain, Columns, Point
+from .batch import ChainFunction, ColumnFunction, PointFunction
 from .block import Block, Drive
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
 
@@ -56,8 +56,8 @@ class _Walk(NamedTuple):
     tells whether there are short implicit steps, ``mean`` whether the mean output over these is taken.
     """
 
-    tables: Point
-    step: Chain
+    tables: PointFunction
+    step: ChainFunction
     near: list[list[int]]
     stiff: bool
     mean: bool
@@ -117,9 +117,9 @@ class DrivenBlock:
         self.free = free_in(block, free)
         self._fixed = block.model.values
         e = _equations(block, self.free)
-        self._digest, self._size = Columns(e.digest), e.state.numel()
+        self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
         self._late = [_free_delay(d, self.free) for d in _late_drives(block, self.free)]
-        self._output = Columns(_output_function(e))
+        self._output = ColumnFunction(_output_function(e))
         self._equations = e
         self._sloped = _sloped(block)
         self._walk: _Walk | None = None
@@ -128,8 +128,8 @@ class DrivenBlock:
             arguments = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
             slope = ca.jacobian(e.derivative, e.state)
             slope = ca.densify(slope)
-            self._rate = Point(ca.Function("rate", arguments, [ca.densify(e.derivative), slope]))
-            self._steepness = Columns(ca.Function("steepness", arguments, [ca.vec(slope)]))
+            self._rate = PointFunction(ca.Function("rate", arguments, [ca.densify(e.derivative), slope]))
+            self._steepness = ColumnFunction(ca.Function("steepness", arguments, [ca.vec(slope)]))
             self._walk = self._made_walk(records, {**self._fixed, **(values or {})})
 
     def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
@@ -245,7 +245,9 @@ class DrivenBlock:
         tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
         rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
         near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
-        return _Walk(Point(tables), Chain(step), near, any(stiff), mean, step.n_instructions())
+        return _Walk(
+            PointFunction(tables), ChainFunction(step), near, any(stiff), mean, step.n_instructions()
+        )
 
     def _stretches(self, record: Record, values: Mapping[str, float], p: Array) -> Array:
         """Return for each stage the largest norm of its derivative along a record, times the step."""
@@ -259,7 +261,7 @@ class DrivenBlock:
         slopes = self._steepness(left.shape[1], [rest, probes, p]).T.reshape(-1, n, n)
         # Where there is no derivative there is no response either, and a fit is told so.
         slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
-        inside = [slopes[(slice(None), *np.ix_(g.states, g.states))] for g in self._stages]
+        inside = [slopes[:, g.states][:, :, g.states] for g in self._stages]
         return record.step * np.array([np.linalg.norm(m, 2, axis=(1, 2)).max(initial=0.0) for m in inside])
 
     def _corners(self, inputs: Array, step: float) -> tuple[Array, Array] | None:
