@@ -19,14 +19,16 @@ from typing import Any, Literal, Protocol
 
 from ..components import Assembly
 from ..components.assembly.deck_writer import write_deck
+from ..errors import ConvergenceError, MeasurementError
 from ..identification.equation_error.evidence import Bench
 from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from ..model import flatten
 from ..writing import write_text
 from .blocks.tearing import blocks_of
-from .effects import ALL, EffectFunction
+from .effects import ALL, Candidate, EffectFunction
 from .fitting.unpredictable import Key
+from .planning.experiment import Experiment, next_experiment
 from .reporting.advice import advice, more_excitation, where_they_differ
 from .reporting.gap import course_of, gaps_of, shapes_of
 from .reporting.named_effect import EffectEvidence
@@ -43,6 +45,7 @@ from .selection.hypothesis import Hypothesis
 from .selection.probability import CALIBRATION
 from .selection.search import Outcome, Step, search
 from .selection.standing import standing_of
+from .selection.without_name import with_what_has_no_name
 
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
@@ -157,8 +160,11 @@ def _verdict(
 ) -> Verdict:
     verdict = decision.verdict
     base = base.as_written()
-    better = outcome.last.as_written() if verdict == "named" else base
+    better = outcome.last if verdict == "named" else base
     steps = outcome.steps if verdict == "named" else ()
+    if verdict in ("named", "unknown", "undecidable"):
+        better = with_what_has_no_name(case.comparison, better, case.criteria)
+    better = better.as_written()
     before, after = case.excesses(base), case.excesses(better)
     worst = _furthest([n for n in before if n != DECLARED], before)
     unpredictable = [k for k in case.comparison.keys if k in better.unpredictable]
@@ -179,12 +185,30 @@ def _verdict(
         tuple(text for fit in better.fits.values() for text in fit.unidentified()),
         shapes_of(base, better, every, worst),
         tuple(better.fits.values()),
-        _remainder(case.comparison, better, after) if verdict in ("named", "unknown") else None,
+        _remainder(case.comparison, better, after) if verdict not in ("none", "data_suspect") else None,
         _next_steps(case.comparison, steps, tuple(better.fits.values())),
         outcome.skipped,
         complete=is_complete(after),
         criteria=case.criteria,
+        remarks=tuple(str(each) for each in records.remarks),
+        unnamed=tuple(_unnamed(better, each) for each in better.added[len(steps) :]),
+        experiment=_experiment(case, base, outcome, decision),
     )
+
+
+def _experiment(case: _Case, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Experiment | None:
+    """Return the record that would tell apart what these records do not."""
+    rivals: tuple[Hypothesis, ...] = ()
+    if decision.verdict == "named":
+        unsure = next((step for step in outcome.steps if step.equals), None)
+        rivals = (unsure.chosen, *unsure.equals[:_MOST_ALIASES]) if unsure else ()
+    elif decision.verdict == "undecidable":
+        fitted = [each.hypothesis for each in outcome.tried if each.undecided]
+        rivals = (*fitted[:_MOST_ALIASES], *((base,) if len(fitted) < 2 else ()))
+    try:
+        return next_experiment(rivals, case.bench)
+    except (ConvergenceError, MeasurementError):
+        return None  # a record that cannot be commanded or predicted is none to propose
 
 
 def _furthest(names: Sequence[str], excesses: Excesses) -> str:
@@ -240,20 +264,35 @@ def _not_predicted(key: Key) -> str:
     )
 
 
-def _named(last: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
-    # Later edits may have put the same number under a longer name: the last hypothesis knows.
-    candidate = last.added[place]
+def _numbers(last: Hypothesis, candidate: Candidate) -> dict[str, tuple[float, str, float]]:
     own = {u.name for u in candidate.unknowns}
-    numbers = {
+    return {
         p.name: (last.values[p.name], p.unit, fit.standard_error(p.name))
         for fit in last.fits.values()
         for p in fit.parameters
         if p.name in own
     }
+
+
+def _unnamed(last: Hypothesis, candidate: Candidate) -> NamedEffect:
     return NamedEffect(
         candidate.effect,
         candidate.location,
-        numbers,
+        _numbers(last, candidate),
+        (),
+        math.nan,
+        candidate.signature,
+        candidate.source,
+    )
+
+
+def _named(last: Hypothesis, step: Step, place: int, *, complete: bool) -> NamedEffect:
+    # Later edits may have put the same number under a longer name: the last hypothesis knows.
+    candidate = last.added[place]
+    return NamedEffect(
+        candidate.effect,
+        candidate.location,
+        _numbers(last, candidate),
         tuple(h.newest.effect for h in step.equals),
         step.share,
         candidate.signature,

@@ -13,8 +13,8 @@ from scipy.stats import chi2, norm
 from nlsdesign.discrepancy.selection.criteria import (
     DECLARED,
     Criteria,
+    EffectNumber,
     Excess,
-    Number,
     Rival,
     Standing,
     choose,
@@ -62,7 +62,7 @@ def with_left(spring: float, motor: float = 2e4) -> dict[str, Excess]:
 
 
 def standing(distance: float = 1.0, error: float = 0.1, *, at_bound: bool = False) -> Standing:
-    return Standing((Number("a.size", distance, True, error, at_bound),), np.array([[error**2]]))
+    return Standing((EffectNumber("a.size", distance, True, error, at_bound),), np.array([[error**2]]))
 
 
 def rival(
@@ -186,7 +186,7 @@ def test_numbers_must_exclude_no_effect_by_four_standard_errors(distance: float,
 
 def test_several_numbers_exclude_no_effect_together_at_the_same_probability() -> None:
     covariance = np.array([[0.01, 0.005], [0.005, 0.02]])
-    numbers = (Number("s", 0.3, True, 0.1, False), Number("c", -0.2, True, 0.14, False))
+    numbers = (EffectNumber("s", 0.3, True, 0.1, False), EffectNumber("c", -0.2, True, 0.14, False))
     distance = np.array([0.3, -0.2])
     statistic = float(distance @ np.linalg.inv(covariance) @ distance)
     by_hand = norm.isf(chi2.sf(statistic, 2) / 2.0)
@@ -194,7 +194,7 @@ def test_several_numbers_exclude_no_effect_together_at_the_same_probability() ->
 
 
 def test_a_number_that_only_shapes_an_effect_excludes_nothing_but_must_be_known() -> None:
-    shape = Number("a.time", 0.0, False, 0.5, False)
+    shape = EffectNumber("a.time", 0.0, False, 0.5, False)
     both = Standing((standing().numbers[0], shape), standing().covariance)
     assert both.exclusion == pytest.approx(10.0)
     assert not objections(RULE, FIRST, replace(rival("a", 2, 1e3), standing=both))

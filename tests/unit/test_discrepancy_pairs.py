@@ -19,7 +19,7 @@ def test_pairs_are_tried_where_no_effect_was_named_and_there_alone(
     monkeypatch: pytest.MonkeyPatch, alone: int, paired: int
 ) -> None:
     start = Hypothesis(assembly("blank", load=Fixed()))
-    named, pairs = iter([Step(start, 0.9)] * alone), list[Any]()
+    named, pairs = iter([Step(start, "motor", 0.9)] * alone), list[Any]()
 
     def pair(self: _Search, *given: Any) -> list[Step]:
         pairs.append(given)

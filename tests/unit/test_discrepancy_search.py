@@ -182,7 +182,7 @@ def test_no_more_than_three_effects_are_named() -> None:
 
 def test_no_more_than_two_effects_are_named_in_free_flight() -> None:
     """The second leaves 40 % of its block, which is open and would be searched for more."""
-    table = {(): (1e6, 9e5), ("a",): (10.0, 9e5), ("a", "b"): (10.0, 3.6e5), ("a", "b", "c"): (10.0, 10.0)}
+    table = {(): (1e6, 9e5), ("a",): (10.0, 9e5), ("a", "b"): (10.0, 2e5), ("a", "b", "c"): (10.0, 10.0)}
     effects = [effect(name) for name in "abc"]
     assert names(outcome(Table(table), *effects)) == ["a", "b", "c"]
     assert names(outcome(Table(table, has_free_flight=True), *effects)) == ["a", "b"]
@@ -199,7 +199,7 @@ def test_what_takes_long_is_tried_only_where_nothing_else_closes_the_block() -> 
 
 
 def test_what_could_not_be_compared_is_in_the_outcome_with_its_reason() -> None:
-    found = outcome(Table({(): (1e5,), ("a",): (3e4,)}), effect("a"), effect("broken"))
+    found = outcome(Table({(): (1e5,), ("a",): (2e4,)}), effect("a"), effect("broken"))
     assert names(found) == ["a"]
     assert found.skipped == (
         Skipped("broken", "motor", (), "has no response"),

@@ -207,6 +207,10 @@ class Verdict:
         What was done to the records or left out, in sentences.
     run
         Records, deck, day and command; ``None`` where a program asked.
+    unnamed
+        Tables in the place of effects that have no name.
+    experiment
+        The record that would tell apart what these records do not; ``None`` where nothing is to be told apart.
     """
 
     verdict: str
@@ -228,6 +232,8 @@ class Verdict:
     criteria: Any = None
     remarks: tuple[str, ...] = ()
     run: DiagnosisRun | None = None
+    unnamed: tuple[NamedEffect, ...] = ()
+    experiment: Experiment | None = None
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.

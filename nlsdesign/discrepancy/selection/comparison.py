@@ -23,9 +23,9 @@ from ...processes import parallel_map
 from ...quantity import Quantity
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
+from .cross_validation import Folds, by_pieces, by_records
 from .hypothesis import Hypothesis
 from .hypothesis_fit import FreeBlock, HypothesisFit
-from .prediction import Folds, by_pieces, by_records
 
 Array = NDArray[np.float64]
 

@@ -1,8 +1,8 @@
 """The decision rule: what is open, what an effect must show to be named, and which of several is named.
 
 Everything here is a function of numbers. For each block and record they are sums of squared residuals in
-units of the noise floor, *predicted*: with numbers that come from the other records (:mod:`.prediction`).
-Records with the role ``held_out`` are not among them. The *excess* of a block is what its sum has beyond the
+units of the noise floor, *predicted*: with numbers that come from other pieces of the records
+(:mod:`.cross_validation`). Records with the role ``held_out`` are not among them. The *excess* of a block is what its sum has beyond the
 number of residuals, which is what noise alone would leave. ``docs/decision.md`` is the rule in prose.
 
 An effect may be named if
@@ -109,7 +109,7 @@ class Excess:
     chi2
         Sum of squares of the latter in units of the floor.
     rows, effective
-        Number of residuals, and of independent ones they are equivalent to.
+        EffectNumber of residuals, and of independent ones they are equivalent to.
     open
         Whether that is more than noise.
     pieces
@@ -139,7 +139,7 @@ class Excess:
 
     @property
     def colour(self) -> float:
-        """Number of residuals for each independent one."""
+        """EffectNumber of residuals for each independent one."""
         return max(1.0, self.rows / max(self.effective, 1.0))
 
 
@@ -147,7 +147,7 @@ Excesses = Mapping[str, Excess]
 """By name of the block."""
 
 
-class Number(NamedTuple):
+class EffectNumber(NamedTuple):
     """A fitted number of an effect.
 
     Parameters
@@ -184,7 +184,7 @@ class Standing:
         Of the numbers that decide, on the scale of their distance, shape (deciding, deciding).
     """
 
-    numbers: tuple[Number, ...] = ()
+    numbers: tuple[EffectNumber, ...] = ()
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property

@@ -16,8 +16,8 @@ from ...model import Variable
 from ..effects.candidate import Unknown
 from ..fitting.strategies import FitProblem, Plain, Start, method_for, refusal
 from ..fitting.unpredictable import Key, Tally
+from .cross_validation import Folds, by_pieces, tallies_of
 from .hypothesis import Hypothesis
-from .prediction import Folds, by_pieces, tallies_of
 
 
 class FreeBlock(NamedTuple):

@@ -88,8 +88,8 @@ class Tried:
 
     Parameters
     ----------
-    candidate
-        Which.
+    hypothesis
+        Fitted with it.
     share
         Share of the whole excess that it explains alone.
     objections
@@ -98,7 +98,7 @@ class Tried:
         Whether it explains what is missing, but the records do not determine its numbers.
     """
 
-    candidate: Candidate
+    hypothesis: Hypothesis
     share: float
     objections: tuple[str, ...]
     undecided: bool = False
@@ -402,7 +402,7 @@ class _Search:
         whole = max(total_excess(self._excesses(present)), 1.0)
         every = [
             Tried(
-                h.newest,
+                h,
                 1.0 - total_excess(self._excesses(h)) / whole,
                 self._objections(present, h),
                 is_undecided(self.criteria, self._excesses(present), _rival(h, self._excesses(h))),

@@ -10,7 +10,7 @@ import numpy as np
 from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter, box
 from ..effects.candidate import Unknown
-from .criteria import Number, Standing
+from .criteria import EffectNumber, Standing
 
 _CLOSE = 0.005
 """Share of the range of a search within which a number stands at its bound."""
@@ -44,7 +44,7 @@ def _standing(known: dict[str, Unknown], fit: Fit, places: Sequence[int]) -> Sta
         at = parameter.inward(value)
         reach = _CLOSE * (high[k] - low[k]) if math.isfinite(low[k]) else 0.0
         numbers.append(
-            Number(
+            EffectNumber(
                 parameter.name,
                 distance,
                 null is not None,

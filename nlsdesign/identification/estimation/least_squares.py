@@ -137,7 +137,7 @@ def fit(
     ConvergenceError
         If the fit ends without a finite cost.
     """
-    rows = Rows(evidence, parameters, known)
+    rows = StackedRows(evidence, parameters, known)
     low, high, start = box(parameters)
     if not parameters:
         fixed = rows(start)[0]
@@ -168,7 +168,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
         As for :func:`fit`.
     """
     low, high, start = box(parameters)
-    residual, slope = Rows(evidence, parameters)(start)
+    residual, slope = StackedRows(evidence, parameters)(start)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
     step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
@@ -176,7 +176,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
     return 0.5 * float(np.sum((residual + slope[:, used] @ step) ** 2))
 
 
-class Rows:
+class StackedRows:
     """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered.
 
     Parameters

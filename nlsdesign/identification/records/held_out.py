@@ -27,9 +27,9 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
 
     A record is described by its length and, for every signal, by its smallest and largest value, its usual
     rate, and how unevenly it moves: the root mean square of the rate over its mean size, large where motion
-    alternates with rest. Held out, one after the other, is a record of the pair that is most alike among those
-    that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of all, so
-    that it is predicted by interpolation, and among equals the one of the smaller motion.
+    alternates with rest. Held out, one after the other, is a record of the pair that is most alike among
+    those that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of
+    all, so that it is predicted by interpolation, and among equals the one of the smaller motion.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from scipy.optimize import lsq_linear
 
 from ...errors import ConvergenceError
 from ...identification.equation_error.evidence import Evidence
-from ...identification.estimation.least_squares import Fit, Rows
+from ...identification.estimation.least_squares import Fit, StackedRows
 from ...identification.estimation.parameters import box
 from ...identification.statistics.residuals import effective_size
 from ..fitting.unpredictable import Key, Tally
@@ -94,7 +94,7 @@ def tallies_of(evidence: Sequence[Evidence], best: Fit, folds: Folds | None) -> 
     folds
         What is left out in turn; with ``None`` everything is predicted with the numbers as they are.
     """
-    rows = Rows(evidence, best.parameters)
+    rows = StackedRows(evidence, best.parameters)
     x = np.array([p.inward(best.values[p.name]) for p in best.parameters])
     pieces = _pieces(rows, evidence, x, folds)
     predicted = [piece.residual for piece in pieces]
@@ -111,12 +111,12 @@ def tallies_of(evidence: Sequence[Evidence], best: Fit, folds: Folds | None) -> 
     }
 
 
-def _pieces(rows: Rows, evidence: Sequence[Evidence], x: Array, folds: Folds | None) -> list[_Piece]:
+def _pieces(rows: StackedRows, evidence: Sequence[Evidence], x: Array, folds: Folds | None) -> list[_Piece]:
     numbers = folds(evidence) if folds else [np.zeros(len(e.floor.sigma), dtype=np.int64) for e in evidence]
     return [_Piece(each, *rows.of(each, x), fold) for each, fold in zip(evidence, numbers, strict=True)]
 
 
-def _predicted(rows: Rows, pieces: Sequence[_Piece], x: Array) -> list[Array]:
+def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array) -> list[Array]:
     """Return the residual of every piece, each fold predicted with the numbers that the other folds give."""
     predicted = [piece.residual.copy() for piece in pieces]
     folds = sorted({int(k) for piece in pieces for k in np.unique(piece.fold) if k >= 0})

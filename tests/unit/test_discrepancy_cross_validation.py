@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from nlsdesign.discrepancy.selection.prediction import SEGMENTS, tallies_of
+from nlsdesign.discrepancy.selection.cross_validation import SEGMENTS, by_pieces, by_records, tallies_of
 from nlsdesign.identification import Fit, Parameter
 from nlsdesign.identification.equation_error.evidence import Evidence
 
@@ -22,12 +22,14 @@ PRIOR = 0.4
 
 
 def evidence(name: str) -> Evidence:
+    """A record of a linear block."""
     def residual(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         return DATA[name] - SLOPES[name] @ [values["a"], values["b"]], -SLOPES[name]
 
     driven = SimpleNamespace(block=SimpleNamespace(name="spring"), free=("a", "b"), stiff=False)
     record = SimpleNamespace(name=name, role=ROLES[name])
-    return cast(Evidence, SimpleNamespace(driven=driven, record=record, residual=residual))
+    floor = SimpleNamespace(sigma=np.ones(ROWS))
+    return cast(Evidence, SimpleNamespace(driven=driven, record=record, floor=floor, residual=residual))
 
 
 def solved(rows: np.ndarray, data: np.ndarray) -> np.ndarray:
@@ -50,7 +52,7 @@ EVERY = [evidence(name) for name in ROLES]
 
 
 def test_each_fold_is_predicted_with_the_numbers_that_the_other_folds_give() -> None:
-    tallies = tallies_of(EVERY, fitted(), leave_out=True)
+    tallies = tallies_of(EVERY, fitted(), by_pieces)
     by_hand = {name: [0.0] * SEGMENTS for name in ("one", "two")}
     piece = np.arange(ROWS) // (ROWS // SEGMENTS)
     for fold in range(3):
@@ -71,15 +73,15 @@ def test_each_fold_is_predicted_with_the_numbers_that_the_other_folds_give() -> 
 def test_a_record_for_selection_is_predicted_with_the_numbers_of_all_fitted_records() -> None:
     best = fitted()
     left = DATA["chosen"] - SLOPES["chosen"] @ [best.values["a"], best.values["b"]]
-    tally = tallies_of(EVERY, best, leave_out=True)["spring", "chosen"]
+    tally = tallies_of(EVERY, best, by_pieces)["spring", "chosen"]
     assert tally.predicted == pytest.approx(float(left @ left))
-    without = tallies_of(EVERY[:2], best, leave_out=True)["spring", "one"]
-    assert without.segments == tallies_of(EVERY, best, leave_out=True)["spring", "one"].segments
+    without = tallies_of(EVERY[:2], best, by_pieces)["spring", "one"]
+    assert without.segments == tallies_of(EVERY, best, by_pieces)["spring", "one"].segments
 
 
 def test_numbers_stay_inside_their_bounds_when_pieces_are_left_out() -> None:
     held = fitted(upper=-1.2)
-    tallies = tallies_of(EVERY[:2], held, leave_out=True)
+    tallies = tallies_of(EVERY[:2], held, by_pieces)
     assert held.values["b"] == -1.2, "or the test would show nothing"
     # The bound holds the second number for every fold, so only the first moves.
     piece = np.arange(ROWS) // (ROWS // SEGMENTS)
@@ -95,5 +97,12 @@ def test_numbers_stay_inside_their_bounds_when_pieces_are_left_out() -> None:
 
 
 def test_without_leaving_out_every_piece_is_as_fitted() -> None:
-    tally = tallies_of(EVERY, fitted(), leave_out=False)["spring", "one"]
+    tally = tallies_of(EVERY, fitted(), None)["spring", "one"]
     assert tally.predicted == pytest.approx(tally.squares)
+
+
+def test_a_whole_record_is_predicted_with_the_numbers_of_the_other_records() -> None:
+    tallies = tallies_of(EVERY, fitted(), by_records)
+    for name, other in (("one", "two"), ("two", "one")):
+        left = DATA[name] - SLOPES[name] @ solved(SLOPES[other], DATA[other])
+        assert tallies["spring", name].predicted == pytest.approx(float(left @ left))
