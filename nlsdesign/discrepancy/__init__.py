@@ -6,6 +6,8 @@ from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
 from .planning.experiment import Experiment, Separation, next_experiment, write_command
 from .planning.machine_limits import MachineLimits
+from .reporting.circumstances import DiagnosisRun, records_of_run
+from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 
@@ -14,7 +16,9 @@ __all__ = [
     "BlockError",
     "Candidate",
     "Course",
+    "DiagnosisRun",
     "Effect",
+    "EffectEvidence",
     "Experiment",
     "FittedNumber",
     "MachineLimits",
@@ -27,6 +31,7 @@ __all__ = [
     "diagnose",
     "next_experiment",
     "predict",
+    "records_of_run",
     "refit",
     "unnamed_part",
     "write_command",

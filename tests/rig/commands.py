@@ -58,11 +58,16 @@ def sines(time: np.ndarray, amplitudes: np.ndarray, frequencies: np.ndarray, pha
 
 def hold(time: np.ndarray) -> Command:
     """Angles of `HOLDS` one after the other, each reached by a smooth rise."""
+    return steps(time, np.radians(HOLDS), HOLD_TIME, HOLD_RISE)
+
+
+def steps(time: np.ndarray, angles: np.ndarray, each: float, duration: float) -> Command:
+    """Angles (rad) one after the other, every so many seconds, each reached by a smooth rise."""
     angle, speed, before = np.zeros_like(time), np.zeros_like(time), 0.0
-    for i, target in enumerate(np.radians(HOLDS)):
-        rise, slope = _smooth((time - i * HOLD_TIME) / HOLD_RISE)
+    for i, target in enumerate(angles):
+        rise, slope = _smooth((time - i * each) / duration)
         angle += (target - before) * rise
-        speed += (target - before) * slope / HOLD_RISE
+        speed += (target - before) * slope / duration
         before = target
     return Command(time, angle, speed)
 

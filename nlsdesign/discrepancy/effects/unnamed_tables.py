@@ -24,6 +24,7 @@ from ...components import Assembly, Element, Parallel, UnnamedFriction, UnnamedS
 from ...components.core.domain import Domain
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench, Evidence
+from ...identification.equation_error.filter_choice import rate_span
 from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import Record
@@ -191,11 +192,12 @@ def _place(assembly: Assembly, model: FlatModel, block: Block) -> _Place | None:
 
 def _motion(model: FlatModel, block: Block, place: _Place, record: Record) -> _Motion | None:
     """Return motion and rate of the place; nothing where the measured motions do not say them."""
-    shown = {}
+    shown, spans = {}, [0.0]
     for signal in dict.fromkeys(d.signal for d in block.drives.values()):
         reading = reading_of(model.readings, signal)
         if reading.shows_value and body_moved_by(model.bodies, reading.measured) is not None:
             shown[reading.measured] = shown_values(model, record, signal)
+            spans.append(rate_span([record], signal))
     if place.on_body:
         name = next(b.motion for b in model.bodies if b.name == place.path)
         value = shown.get(name)
@@ -203,7 +205,7 @@ def _motion(model: FlatModel, block: Block, place: _Place, record: Record) -> _M
         value = _signal(model, f"{place.path}.{place.domain.motion}", shown)
     if value is None:
         return None
-    return _Motion(value, derivative(value, record.step, order=1))
+    return _Motion(value, derivative(value, record.step, order=1, span=max(spans)))
 
 
 def _signal(model: FlatModel, name: str, shown: dict[str, Array]) -> Array | None:
