@@ -11,7 +11,7 @@ from ...identification.records.measurement import Record
 from ...identification.statistics.filters import derivative, smoothing
 
 _WIDTH, _SPAN = 4.0, 30.0
-"""Width of the filter, and span of a rate, in samples, behind which the largest rate is looked for: noise must not count."""
+"""Width of the filter and span of a rate, in samples: noise must not count as a large rate."""
 
 
 @dataclass(frozen=True)
