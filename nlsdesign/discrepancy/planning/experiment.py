@@ -298,8 +298,11 @@ class _Plan:
         return _Judged(record, tuple(separations), score)
 
     def _floors(self, record: Record) -> dict[str, Floor]:
+        bench = self._bench
         floors = {
-            b.name: noise_floor(b, record, self._bench.noise) for b in self._blocks if b.name in self._open
+            b.name: noise_floor(b, record, bench.noise, bench.filters[b.name])
+            for b in self._blocks
+            if b.name in self._open and b.name in bench.filters
         }
         return {name: f for name, f in floors.items() if len(f.sigma) >= _LEAST_ROWS}
 

@@ -10,8 +10,8 @@ import numpy as np
 from ...identification.records.measurement import Record
 from ...identification.statistics.filters import derivative, smoothing
 
-_WIDTH = 4.0
-"""Width in samples of the filter behind which the largest rate is looked for: noise must not count."""
+_WIDTH, _SPAN = 4.0, 30.0
+"""Width of the filter and span of a rate, in samples: noise must not count as a large rate."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def limits_seen(
     """
 
     def smooth(record: Record, signal: str, order: int = 0) -> np.ndarray:
-        rows = derivative(record.trace[signal], record.step, order=order)
+        rows = derivative(record.trace[signal], record.step, order=order, span=_SPAN * record.step)
         filtered: np.ndarray = smoothing(len(rows), _WIDTH, 1) @ rows
         return filtered
 
