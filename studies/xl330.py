@@ -17,15 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 import nlsdesign as nls
-from nlsdesign.components import (
-    Assembly,
-    CommandCompression,
-    CoulombFriction,
-    DriveDelay,
-    LoadFriction,
-    StribeckFriction,
-    tie,
-)
+from nlsdesign.components import Assembly, LoadFriction, tie
 from nlsdesign.model import FlatModel
 from nlsdesign.quantity import Quantity
 from nlsdesign.report import TableSection
@@ -42,7 +34,6 @@ SIGMA = 0.01  # rad; errors far beyond it count in proportion, not squared
 ITERATIONS = 9
 LINEAR = {"servo.inertia": 0.0064, "servo.torque_constant": 0.28, "bearing.damping": 0.015}
 LOADED = {"servo.inertia": 0.0065, "servo.torque_constant": 0.305, "bearing.damping": 0.004}
-WHOLE = {"servo.inertia": 0.0062, "servo.torque_constant": 0.335, "bearing.damping": 0.002}
 """Where fits begin, near what shorter ones gave: the cost has several minima."""
 
 
@@ -108,12 +99,7 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
             errors[variant.name], numbers = held_out_error(variant, logs)
     better = variants(declared)[-1].servo.with_values(numbers)
     nls.write_deck(better, out / "refitted.toml")
-    fitted = {
-        "load_friction_ratio": numbers["weight.ratio"],
-        "delay_ms": 1e3 * numbers["servo.late.delay"],
-        "halving_V": numbers["servo.compression.halving"],
-    }
-    results = Results(errors, fitted)
+    results = Results(errors, {"load_friction_ratio": numbers["weight.ratio"]})
     rows = tuple((name.replace("_", " "), f"{error:.4f}") for name, error in errors.items())
     nls.write_report(
         out / "report.html",
@@ -124,30 +110,13 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
 
 
 def variants(declared: Assembly) -> list[Variant]:
-    """Return the linear servo, and what may be missing in it."""
-
-    def number(value: float, unit: str) -> Quantity:
-        return Quantity(value, unit, "to be fitted")
-
-    coulomb = CoulombFriction(sliding_effort=number(0.02, "N*m")).smooth(CREEP)
-    stribeck = StribeckFriction(
-        sliding_effort=number(0.02, "N*m"),
-        breakaway=number(0.02, "N*m"),
-        stribeck_speed=number(0.3, "rad/s"),
-    ).smooth(CREEP)
-    dry, falling = (declared.with_part("dry", tie(law, "servo")) for law in (coulomb, stribeck))
-    weight = LoadFriction(members=(("held", declared.element("weight")),), ratio=number(0.3, "1"))
+    """Return the linear servo, and the one with friction in proportion to the weight on its gear."""
+    ratio = Quantity(0.3, "1", "to be fitted")
+    weight = LoadFriction(members=(("held", declared.element("weight")),), ratio=ratio)
     loaded = declared.with_part("weight", tie(weight.smooth(CREEP), "servo"))
-    late = loaded.with_part("servo.late", DriveDelay(delay=number(0.012, "s")))
-    whole = late.with_part("servo.compression", CommandCompression(halving=number(24.0, "V")))
-    level, edges = {"dry.sliding_effort": 0.02}, {"dry.breakaway": 0.02, "dry.stribeck_speed": 0.3}
-    rest = {"weight.ratio": 0.36, "servo.late.delay": 0.011, "servo.compression.halving": 19.5}
     return [
         Variant("linear", declared, LINEAR),
-        Variant("coulomb", dry, {**LINEAR, **level}),
-        Variant("stribeck", falling, {**LINEAR, **level, **edges}),
         Variant("load_friction", loaded, {**LOADED, "weight.ratio": 0.42}),
-        Variant("load_friction_and_drive", whole, {**WHOLE, **rest}),
     ]
 
 
@@ -215,9 +184,6 @@ def predicted(run: ca.Function, model: FlatModel, values: Mapping[str, float], l
     state = np.zeros(len(model.states))
     names = [v.name for v in model.states]
     state[names.index("servo.angle")] = log.position[0]
-    if "servo.late.lag" in names:
-        first = log.goal[0] - log.position[0]
-        state[names.index("servo.late.lag")] = gain["servo.loop.proportional"] * first
     ends = np.vstack([log.goal[:-1], log.goal[1:]])
     path = np.array(run(state, ends, np.repeat(parameter[:, None], ends.shape[1], axis=1)))
     return np.concatenate([log.position[:1], path[names.index("servo.angle")]])

@@ -26,6 +26,8 @@ from ...symbolic import Expression, depends
 
 _NEAR_ZERO = 1e-9
 """Drive, in SI, below which the slope at zero stands for the straight line to the measured point."""
+_INSIDE = 0.999
+"""Share of the measured drive at which the tangent is taken."""
 _LEAST_SLOPE = 0.1
 """Of that line, the least slope that is taken for a tangent: no error counts more than ten times."""
 
@@ -80,9 +82,10 @@ def scaled_balance(
             return terms.balance * (declared / slope), declared
         tiny = _NEAR_ZERO**2
         line = (given * reading + tiny * slope) / (reading * reading + tiny)
-        # Held at its limit the drive gives what the measured one does: the limit is no error of it.
-        share = ca.if_else(tangent == 0, line, ca.fmax(tangent / slope, _LEAST_SLOPE * line / slope) * slope)
-        share /= slope
+        # A record of what a limit lets through stands on the limit itself: the slope is that just below it.
+        inside = ca.substitute(tangent, reading, _INSIDE * reading)
+        share = ca.fmax(inside / slope, _LEAST_SLOPE * line / slope)
+        share = ca.if_else(inside == 0, line / slope, share)
         return terms.balance * (declared / (slope * share)), declared
     if any(depends(terms.balance, reading) for reading in efforts):
         return terms.balance, 1.0
