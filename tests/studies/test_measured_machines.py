@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components import (
     Assembly,
     CoulombFriction,
@@ -16,7 +17,6 @@ from nlsdesign.components import (
     StribeckFriction,
     tie,
 )
-from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
