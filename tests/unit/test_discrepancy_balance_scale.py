@@ -125,3 +125,20 @@ def test_without_a_drive_the_error_is_that_of_the_acceleration() -> None:
     )  # fmt: skip
     assert scale == 1.0
     assert ca.is_equal(pulled, balance + torque, 3)
+
+
+def test_a_drive_held_at_its_limit_is_in_the_scale_of_the_drive_below_it() -> None:
+    """A record of a command that is clipped counts no more than any other."""
+    constant, inertia = ca.SX.sym("k"), ca.SX.sym("J")
+    acceleration, command = ca.SX.sym("a"), ca.SX.sym("u")
+    balance = inertia * acceleration - constant * ca.fmin(ca.fmax(command, -7.4), 7.4)
+    scaled, declared = scaled_balance(
+        terms(balance, ca.vertcat(constant, inertia), acceleration, command),
+        drives=[command], efforts=[command], inertia=inertia,
+    )  # fmt: skip
+    assert declared == pytest.approx(2.0)
+    at = ca.Function("at", [ca.vertcat(constant, inertia), acceleration, command], [scaled])
+    for size in (7.0, 7.39, 7.4):
+        assert float(at([2.0, 5.0], (2.0 * size + 0.3) / 5.0, size)) == pytest.approx(0.3, rel=1e-6)
+        assert float(at([1.0, 2.5], (2.0 * size + 0.3) / 5.0, size)) == pytest.approx(0.3, rel=1e-6)
+    assert float(at([2.0, 5.0], (2.0 * 7.4 + 0.3) / 5.0, 14.8)) == pytest.approx(0.6, rel=1e-6)

@@ -16,7 +16,7 @@ from ..core.element import ROTATION, TRANSLATION, Domain, Scope
 from ..core.part import RESERVED, Part, check_names
 from ..core.part_numbers import one_of, parameter
 from .controllers import Controller
-from .drive_chain import Command, DrivePart
+from .drive_chain import DriveCommand, DrivePart
 
 
 class Motion(NamedTuple):
@@ -143,10 +143,10 @@ class Free(Body):
             value = held(scope.input(name, unit, meaning))
         else:
             taken = self._taken(self.loops)
-            goal = Command(scope.input("goal", taken, f"goal of {scope.path}"), taken, *motion)
+            goal = DriveCommand(scope.input("goal", taken, f"goal of {scope.path}"), taken, *motion)
             value = held(_through(scope, self.loops, goal))
             scope.signal(name, value, unit, meaning)
-        return _through(scope, self.chain[len(self.loops) :], Command(value, unit, *motion))
+        return _through(scope, self.chain[len(self.loops) :], DriveCommand(value, unit, *motion))
 
     @abstractmethod
     def drive(self, scope: Scope, motion: Motion) -> Expression:
@@ -166,7 +166,7 @@ class Free(Body):
         )
 
 
-def _through(scope: Scope, parts: Sequence[tuple[str, DrivePart]], command: Command) -> Expression:
+def _through(scope: Scope, parts: Sequence[tuple[str, DrivePart]], command: DriveCommand) -> Expression:
     """Return what comes out behind parts of a drive."""
     for name, part in parts:
         value = part.act(scope.child(name), command)

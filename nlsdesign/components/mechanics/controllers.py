@@ -12,7 +12,7 @@ from ...symbolic import Expression
 from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part_numbers import Reading, one_of, parameter, read_as
-from .drive_chain import Command, DrivePart
+from .drive_chain import DriveCommand, DrivePart
 
 
 def _loop(name: str, effort: str, unit: str, *, turning: bool) -> Domain:
@@ -174,7 +174,7 @@ class PositionLoop(Controller):
     rate: Reading = read_as(WithoutRate, RateFeedback, default=WithoutRate())
     memory: Reading = read_as(WithoutIntegral, Integral, default=WithoutIntegral())
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return u for the goal that comes in."""
         assert isinstance(self.rate, WithoutRate | RateFeedback)
         opposed = self.rate.opposed(scope, command.rate)
@@ -206,6 +206,6 @@ class SpeedLoop(Controller):
     def _goal(self) -> str:
         return self.domain.rate_unit
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return u for the goal that comes in."""
         return self._held(scope, command.value - command.rate, ca.SX(0))

@@ -17,7 +17,7 @@ from ..core.part import Part
 from ..core.part_numbers import parameter
 
 
-class Command(NamedTuple):
+class DriveCommand(NamedTuple):
     """What comes into a part of a drive.
 
     Parameters
@@ -59,7 +59,7 @@ class DrivePart(Part):
         return ""
 
     @abstractmethod
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return the command that an ideal drive would need for the same effort.
 
         Parameters
@@ -87,7 +87,7 @@ class DriveDelay(DrivePart):
 
     delay: Quantity = parameter("s", "time from command to effort", minimum=1e-6, maximum=10.0)
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return the command as it was a delay ago."""
         return delayed(scope, command.value, command.unit)
 
@@ -108,7 +108,7 @@ class DriveLag(DrivePart):
         "s", "time in which 63 % of a step has come through", minimum=1e-6, maximum=100.0
     )
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return the command behind the lag."""
         behind = scope.state("behind", command.unit, f"command behind {scope.path}")
         scope.derive(behind, (command.value - behind) / scope.parameter("time_constant"))
@@ -135,7 +135,7 @@ class DriveSaturation(DrivePart):
         "A", "current at which 71 % of the ideal torque is left", minimum=1e-6, maximum=1e6
     )
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return I/√(1 + (I/I_s)²)."""
         share = command.value / scope.parameter("saturation_current")
         return command.value / ca.sqrt(1 + share * share)

@@ -11,7 +11,7 @@ from ...symbolic import Expression
 from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter
-from .drive_chain import Command, DrivePart
+from .drive_chain import DriveCommand, DrivePart
 
 CURRENT = Domain("current", "charge", "C", "current", "A", "current", "A", "H")
 VOLTAGE = Domain("voltage", "flux", "V*s", "voltage", "V", "voltage", "V", "F")
@@ -58,7 +58,7 @@ class CommandSaturation(DriveFault):
         "{effort}", "command u_s at which 71 % of the ideal effort is left", minimum=1e-9, maximum=1e9
     )
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return u/√(1 + (u/u_s)²)."""
         share = command.value / scope.parameter("saturation")
         return command.value / ca.sqrt(1 + share * share)
@@ -81,7 +81,7 @@ class CommandCompression(DriveFault):
 
     halving: Quantity = parameter("{effort}", "command u_h of which half acts", minimum=1e-9, maximum=1e9)
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return u/(1 + |u|/u_h)."""
         return command.value / (1 + ca.fabs(command.value) / scope.parameter("halving"))
 
@@ -103,7 +103,7 @@ class WindingHeat(DriveFault):
     halving: Quantity = parameter("{effort}", "steady command I_h with ϑ = 1", minimum=1e-9, maximum=1e9)
     cooling_time: Quantity = parameter("s", "time constant τ of cooling", minimum=1e-3, maximum=1e6)
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return I/(1 + ϑ)."""
         heat = scope.state("heat", "1", f"relative loss of effort of {scope.path} by heat")
         share = command.value / scope.parameter("halving")
@@ -129,7 +129,7 @@ class TorqueConstantDrift(DrivePart):
         "s", "time constant τ after which it stays", minimum=1e-3, maximum=1e6, default=1e6
     )
 
-    def act(self, scope: Scope, command: Command) -> Expression:
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
         """Return I times its factor."""
         elapsed = scope.state("elapsed", "s", f"time that {scope.path} has run")
         scope.derive(elapsed, ca.SX(1))

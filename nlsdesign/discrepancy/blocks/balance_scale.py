@@ -8,8 +8,7 @@ the *declared* effort per unit of that signal, a constant:
    the balance, the model asks for the drive u + b/e'(u), to first order: its inverse along the tangent at the
    measured point. So the error is b/e'(u). A drive that saturates gives less and asks for more: the flatter
    it is, the larger its error. Where e is proportional to u this is the exact inverse. Where a drive is held
-   at its limit no drive gives what is asked for; there a tenth of the straight line from zero stands for the
-   tangent.
+   at its limit there is no tangent; the straight line from zero to the measured point stands for it.
 2. Where another effort on the body is measured: the balance as it is, for its reading enters there.
 3. Where motion alone is measured: the error of the acceleration.
 """
@@ -27,6 +26,8 @@ from ...symbolic import Expression, depends
 
 _NEAR_ZERO = 1e-9
 """Drive, in SI, below which the slope at zero stands for the straight line to the measured point."""
+_INSIDE = 0.999
+"""Share of the measured drive at which the tangent is taken."""
 _LEAST_SLOPE = 0.1
 """Of that line, the least slope that is taken for a tangent: no error counts more than ten times."""
 
@@ -81,7 +82,10 @@ def scaled_balance(
             return terms.balance * (declared / slope), declared
         tiny = _NEAR_ZERO**2
         line = (given * reading + tiny * slope) / (reading * reading + tiny)
-        share = ca.fmax(tangent / slope, _LEAST_SLOPE * line / slope)
+        # A record of what a limit lets through stands on the limit itself: the slope is that just below it.
+        inside = ca.substitute(tangent, reading, _INSIDE * reading)
+        share = ca.fmax(inside / slope, _LEAST_SLOPE * line / slope)
+        share = ca.if_else(inside == 0, line / slope, share)
         return terms.balance * (declared / (slope * share)), declared
     if any(depends(terms.balance, reading) for reading in efforts):
         return terms.balance, 1.0
