@@ -111,7 +111,7 @@ def spike(rows: np.ndarray) -> np.ndarray:
 
 
 def dropout(rows: np.ndarray) -> np.ndarray:
-    rows[700:705, FORCE] = 0.0
+    rows[730:735, FORCE] = 0.0
     return rows
 
 
@@ -127,7 +127,7 @@ def huge_current(rows: np.ndarray) -> np.ndarray:
 
 MASKED = {
     "spike": (spike, "force_N", "row 702: spike by 3", 700),
-    "dropout": (dropout, "force_N", "rows 702 to 706: samples off by", 700),
+    "dropout": (dropout, "force_N", "rows 732 to 736: samples off by", 730),
     "encoder": (encoder_at_zero, "theta_rad", "row 735: spike by", 733),
     "current": (huge_current, "current_A", "row 702: spike by", 700),
 }

@@ -55,7 +55,9 @@ _FREE_SIGNS = 0.6
 _JUMP, _JUMP_OVER_ALL = 10.0, 3.0
 """A position jumps where it changes by more than these times the largest change nearby, and anywhere else."""
 _CONFIRMS = 4.0
-_REACH = (12, 50)
+_NEARBY, _BETTER = (-8, -4, 4, 8), 0.95
+"""Samples off a group at which a turn of its own is looked for; it leaves less than this share."""
+_REACH = 12
 """Samples on either side over which another channel is asked whether something happened."""
 
 
@@ -116,7 +118,18 @@ class Witness:
         whole = np.concatenate([left, right])
         joint = _sum_of_squares(self.values, whole, 5)
         apart = _sum_of_squares(self.values, left, 2) + _sum_of_squares(self.values, right, 2)
-        return joint > _CONFIRMS * max(apart, len(whole) * self.least**2)
+        least = max(apart, len(whole) * self.least**2)
+        return joint > _CONFIRMS * least and not self._turns_nearby(left[0], first, right[-1] + 1, least)
+
+    def _turns_nearby(self, begin: int, place: int, end: int, apart: float) -> bool:
+        """Tell whether a turn a few samples off a place describes the samples better than one there."""
+        for split in (place + shift for shift in _NEARBY):
+            sides = np.arange(begin, split), np.arange(split, end)
+            if min(map(len, sides)) < 3:
+                continue
+            if sum(_sum_of_squares(self.values, side, 2) for side in sides) < _BETTER * apart:
+                return True
+        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -381,7 +394,7 @@ def _overlaps(group: Group, groups: Sequence[Group]) -> bool:
 
 def _confirmed(first: int, behind: int, others: Sequence[Witness]) -> bool:
     """Tell whether another channel changes its course where a group is."""
-    return any(each.turns(first, behind, reach) for each in others for reach in _REACH)
+    return any(each.turns(first, behind, _REACH) for each in others)
 
 
 def _sum_of_squares(values: Array, places: NDArray[np.intp], order: int) -> float:
