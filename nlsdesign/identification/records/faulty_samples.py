@@ -216,13 +216,16 @@ class _Course(NamedTuple):
     def through(values: Array, places: NDArray[np.intp], origin: int, order: int = 3) -> _Course:
         """Return the polynomial through samples by least squares."""
         powers = np.vander((places - origin) / _SIDE, order + 1)
-        coefficients = np.linalg.lstsq(powers, values[places], rcond=None)[0]
+        coefficients: Array = np.asarray(
+            np.linalg.lstsq(powers, values[places], rcond=None)[0], dtype=np.float64
+        )
         left = values[places] - powers @ coefficients
         freedom = max(len(places) - order - 1, 1)
         return _Course(coefficients, origin, float(np.sqrt(left @ left / freedom)))
 
     def __call__(self, places: NDArray[np.intp]) -> Array:
-        result: Array = np.polyval(self.coefficients, (places - self.origin) / _SIDE)
+        at = (places - self.origin) / _SIDE
+        result: Array = np.asarray(np.polyval(self.coefficients, at), dtype=np.float64)
         return result
 
 
@@ -354,8 +357,8 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
     for first, behind in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
         at_an_end = first == 0 or behind == len(values)
         pairs = () if at_an_end else ((first - 1, first), (behind - 1, behind))
-        ends = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
-        if values[first] in extremes and min(ends) < abrupt:
+        edges = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
+        if values[first] in extremes and min(edges) < abrupt:
             continue  # it may be clipped, or slack
         length = behind - first
         span = max(_SCATTER_SPAN, 2 * length)
@@ -366,7 +369,7 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
         sides = values[max(first - span, 0) : first + 1], values[behind - 1 : behind + span]
         goes_on = not around.others or any(np.ptp(each.values[first:behind]) > 0.0 for each in around.others)
         if goes_on and all(_is_noise(side) for side in sides):
-            yield Group(first, behind, "stuck", max(ends))
+            yield Group(first, behind, "stuck", max(edges))
 
 
 def _is_noise(side: Array) -> bool:
