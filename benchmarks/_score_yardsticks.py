@@ -21,6 +21,7 @@ from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.identification import RecordSet
 from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.identification.equation_error.filter_choice import rate_span
 from nlsdesign.identification.records.measurement import Record
 from nlsdesign.identification.statistics.filters import derivative
 from nlsdesign.model import flatten
@@ -83,7 +84,8 @@ def _regressors(record: Record, *, torque: bool) -> dict[str, Array]:
         return next(s for s in record.trace.signals if name in s)
 
     angle, current, force = (record.trace[signal(n)] for n in ("encoder", "current", "force"))
-    speed, h = derivative(angle, record.step, order=1), record.step
+    h, span = record.step, rate_span([record], signal("encoder"))
+    speed = derivative(angle, h, order=1, span=span)
     slope, later = np.gradient(force, h), np.linspace(0.0, 1.0, len(angle))
     one, sign, way = np.ones_like(angle), np.tanh(speed / 0.05), np.tanh(speed * np.sign(angle) / 0.05)
     if torque:

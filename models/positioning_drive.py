@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import Assembly, ConstantForce, CoulombFriction, Dashpot, LinearDrive, tie
+from nlsdesign.components import Assembly, ConstantLoad, CoulombFriction, Dashpot, LinearDrive, tie
 from nlsdesign.components.assembly.deck_writer import numbers_of, require_same_numbers
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import Deck
@@ -33,6 +33,6 @@ def positioning_drive(deck: Deck) -> Assembly:
         carriage=LinearDrive(**numbers_of(deck, "carriage", LinearDrive)),
         guide=tie(Dashpot(**numbers_of(deck, "guide", Dashpot)), "carriage"),
         dry_friction=tie(CoulombFriction(**numbers_of(deck, "dry_friction", CoulombFriction)), "carriage"),
-        offset=tie(ConstantForce(**numbers_of(deck, "offset", ConstantForce)), "carriage"),
+        offset=tie(ConstantLoad(**numbers_of(deck, "offset", ConstantLoad)), "carriage"),
     )
     return require_same_numbers(drive, deck)

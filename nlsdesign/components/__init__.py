@@ -16,6 +16,7 @@ from .core.springs import LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
+from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
 from .materials.named_networks import (
@@ -27,23 +28,35 @@ from .materials.named_networks import (
 )
 from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.rate_independent import SlidingFillers
-from .materials.self_heating import HeatBalance, SelfHeating, ViscousHeat, WorkHeat
+from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
+from .materials.smooth_hysteresis import BoucWen
 from .materials.specimen import Specimen, specimen
 from .materials.springpot import Springpot
-from .materials.stress_softening import LargestMotion, OgdenRoxburgh, StressSoftening
+from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
 from .mechanics.backlash import Backlash, Inertial, Slack, Turned
 from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
-from .mechanics.carriage import ConstantForce, LinearDrive
-from .mechanics.drive_chain import DriveDelay, DrivePart, DriveSaturation
-from .mechanics.friction import CoulombFriction, LoadFriction, QuadraticDrag, StribeckFriction
+from .mechanics.carriage import LinearDrive
+from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
+from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
+from .mechanics.drive_faults import CommandCompression, CommandSaturation, TorqueConstantDrift, WindingHeat
+from .mechanics.friction import (
+    AsymmetricFriction,
+    CoulombFriction,
+    LoadFriction,
+    QuadraticDrag,
+    StribeckFriction,
+)
 from .mechanics.gear import Gear, LossyGear
+from .mechanics.loads import ConstantLoad, GravityLoad, HorizontalTorque, MassOnArm
 from .mechanics.lugre import LuGreFriction
-from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, VoltageDrivenMotor
+from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, VoltageDrivenMotor
+from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
+from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
-from .sensing.sensor_faults import Drift, Eccentricity, TransportDelay
+from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
 from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
@@ -61,19 +74,27 @@ __all__ = [
     "ArrheniusShift",
     "ArrudaBoyce",
     "Assembly",
+    "AsymmetricFriction",
     "Backlash",
     "Body",
+    "BoucWen",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
-    "ConstantForce",
+    "ClockDrift",
+    "CommandCompression",
+    "CommandSaturation",
+    "ConstantLoad",
+    "Controller",
     "CoulombFriction",
     "CurrentDrivenMotor",
     "CurrentSensor",
+    "DamageByMotion",
     "Dashpot",
     "Domain",
     "Drift",
     "DriveDelay",
+    "DriveLag",
     "DrivePart",
     "DriveSaturation",
     "Driven",
@@ -89,19 +110,26 @@ __all__ = [
     "ForceSensor",
     "Gear",
     "GearedMotor",
+    "GravityLoad",
     "Guide",
+    "HardeningSpring",
     "HeatBalance",
+    "HorizontalTorque",
     "Hyperelastic",
     "Inertia",
     "Inertial",
     "InextensibleCable",
+    "Integral",
     "LargestMotion",
     "LinearDrive",
     "LinearElastic",
     "LoadFriction",
+    "LoadNonlinearity",
+    "LossHeat",
     "LossyGear",
     "LuGreFriction",
     "Mass",
+    "MassOnArm",
     "Material",
     "NeoHooke",
     "Ogden",
@@ -110,11 +138,14 @@ __all__ = [
     "Parallel",
     "Part",
     "PermanentSet",
+    "PositionLoop",
     "Property",
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "RateFeedback",
     "Regularised",
+    "ResistiveMotor",
     "RigidStop",
     "Rising",
     "Rounded",
@@ -126,6 +157,8 @@ __all__ = [
     "Slack",
     "SlidingFillers",
     "Specimen",
+    "SpeedLoop",
+    "SpotFriction",
     "Spring",
     "Springpot",
     "StrainStiffening",
@@ -135,14 +168,19 @@ __all__ = [
     "Tachometer",
     "Through",
     "Tie",
+    "TorqueConstantDrift",
     "TorqueRipple",
     "TorqueSensor",
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
+    "UnnamedFriction",
+    "UnnamedSpring",
     "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",
+    "WavyFriction",
+    "WindingHeat",
     "WlfShift",
     "WorkHeat",
     "WrapProduct",

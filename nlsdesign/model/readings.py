@@ -38,6 +38,12 @@ class ReadingNames:
         return tuple(f"{name}.{law.late_by}" for name, law in pairs if law.late_by)
 
     @property
+    def stretches(self) -> tuple[str, ...]:
+        """Names of the parameters whose sum says by how much per time the reading becomes late."""
+        pairs = zip(self.sensors, self.laws, strict=True)
+        return tuple(f"{name}.{law.stretched_by}" for name, law in pairs if law.stretched_by)
+
+    @property
     def shows_value(self) -> bool:
         """Whether what is measured can be inferred from the reading."""
         return all(law.shows_value for law in self.laws)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import TRANSLATION, ConstantForce, CoulombFriction, LinearDrive, Part, Regularised
+from nlsdesign.components import TRANSLATION, ConstantLoad, CoulombFriction, LinearDrive, Part, Regularised
 
 EXAMPLES: tuple[Part, ...] = (
     LinearDrive(mass=95.1, force_constant=35.15, voltage_limit=10.0),
     CoulombFriction(sliding_effort=20.4, contact=Regularised(creep_speed=1e-3), domain=TRANSLATION),
-    ConstantForce(load=-3.16),
+    ConstantLoad(load=-3.16),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nlsdesign.components import ConstantForce, CoulombFriction, LinearDrive
+from nlsdesign.components import ConstantLoad, CoulombFriction, LinearDrive
 
 from .table import Row
 
@@ -14,6 +14,6 @@ ROWS: tuple[Row, ...] = (
     Row(LinearDrive, "m·v̇ = g·V + ΣF",
         ("flattened assembly", "Radau on the equation typed again"), _BY_HAND),
     Row(CoulombFriction, "power balance", ("work of the voltage", "½mv² + ∫ of b·v² + F_c·v·tanh"), _BALANCE),
-    Row(ConstantForce, "b·v = g·V − F_c − F₀ at constant v",
+    Row(ConstantLoad, "b·v = g·V − F_c − F₀ at constant v",
         ("simulation for many time constants", "algebra"), _FINAL),
 )  # fmt: skip

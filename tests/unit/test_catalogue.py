@@ -16,7 +16,7 @@ from nlsdesign.components import (
     Assembly,
     Backlash,
     CapstanFriction,
-    ConstantForce,
+    ConstantLoad,
     CoulombFriction,
     Element,
     Fixed,
@@ -109,7 +109,7 @@ HAVE: dict[str, tuple[Assembly, tuple[str, ...]]] = {
     "friction beside a spring": (drive(rub=parallel(rub=WET.smooth(), spring=TWIST)), DRY),
     "sliding, sticking": (cart(CoulombFriction(sliding_effort=2.0, domain=TRANSLATION)), DRY[:1]),
     "sliding, LuGre": (cart(LuGreFriction(**BRISTLES, **STRIBECK, domain=TRANSLATION)), DRY[:1]),
-    "constant force": (cart(ConstantForce(load=1.0)), ("constant_force",)),
+    "constant force": (cart(ConstantLoad(load=1.0)), ("constant_force",)),
     "drag": (drive(fan=QuadraticDrag(drag=1e-3)), ("quadratic_drag",)),
     "load friction, sticking": (
         turned(LoadFriction(ratio=0.1, members=SPRING)),

@@ -22,6 +22,7 @@ from nlsdesign.components import (
     Assembly,
     Body,
     Cam,
+    Controller,
     DrivePart,
     Element,
     Gear,
@@ -31,6 +32,7 @@ from nlsdesign.components import (
     Parallel,
     Part,
     Pulley,
+    ResistiveMotor,
     Sensor,
     Series,
     Spring,
@@ -74,6 +76,10 @@ def around(part: Part) -> Assembly:
         )
         other = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
         return assembly("bench", part=part, other=other, spring=tie(spring, "part", "other"))
+    if isinstance(part, Controller):
+        numbers = {"inertia": 6e-4, "torque_constant": 0.5, "resistance": 4.0, "voltage_limit": 24.0}
+        motor = ResistiveMotor(**numbers, chain=(("part", part),))
+        return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))
     if isinstance(part, DrivePart):
         motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055, chain=(("part", part),))
         return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))

@@ -33,6 +33,7 @@ from nlsdesign.simulation import simulate
 
 SIGNALS = ("motor_encoder.reading", "current_sensor.reading", "force_sensor.reading")
 TIME = np.arange(2000) * 0.001
+WIDTH = 4.0
 
 
 @pytest.fixture(scope="module")
@@ -103,9 +104,9 @@ def test_the_balance_of_a_geared_train_is_in_torque_at_its_leading_body(rig: Ass
     (motor,) = (b for b in blocks_of(flatten(declared), SIGNALS) if b.target is None)
     driven = DrivenBlock(motor, [], records=[record])
     output = driven.respond(driven.samples(record, {}), {}).output
-    seen = smoothing(len(TIME), motor.width, 5) @ output
+    seen = smoothing(len(TIME), WIDTH, 5) @ output
     assert motor.name == "drum"
-    expected = 1e-3 * (smoothing(len(TIME), motor.width, 5) @ record.trace["drum.acceleration"])
+    expected = 1e-3 * (smoothing(len(TIME), WIDTH, 5) @ record.trace["drum.acceleration"])
     assert np.std(expected) > 0.05
     assert np.std((seen + expected)[50:-50]) < 0.02 * np.std(expected)
 
@@ -138,7 +139,7 @@ def remaining(block: Block, record: Record) -> float:
     driven = DrivenBlock(block, [], records=[record])
     output = driven.respond(driven.samples(record, {}), {}).output
     error = (record.trace[block.target] if block.target else 0.0) - output
-    return float(np.sqrt(np.mean((smoothing(len(TIME), block.width, 5) @ error) ** 2)))
+    return float(np.sqrt(np.mean((smoothing(len(TIME), WIDTH, 5) @ error) ** 2)))
 
 
 def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
@@ -148,7 +149,7 @@ def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
         driven = DrivenBlock(block, [], records=[record])
         output = driven.respond(driven.samples(record, {}), {}).output
         error = (record.trace[block.target] if block.target else 0.0) - output
-        found[block.name] = float(np.std(smoothing(len(TIME), block.width, 5) @ error))
+        found[block.name] = float(np.std(smoothing(len(TIME), WIDTH, 5) @ error))
     # 0.003 kg·m² times the acceleration.
     acceleration = np.gradient(np.gradient(record.trace["motor_encoder.reading"], 0.001), 0.001)
     assert found["motor"] == pytest.approx(0.003 * np.std(acceleration[50:-50]), rel=0.05)

@@ -9,7 +9,7 @@ import pytest
 from nlsdesign.components import (
     TRANSLATION,
     Assembly,
-    ConstantForce,
+    ConstantLoad,
     CoulombFriction,
     Dashpot,
     Driven,
@@ -58,7 +58,7 @@ def test_only_friction_and_a_constant_force_can_sit_on_a_carriage() -> None:
 
 @pytest.mark.parametrize(
     ("effect", "kind", "body_force"),
-    [(coulomb_friction, CoulombFriction, -3.0), (constant_force, ConstantForce, -3.0)],
+    [(coulomb_friction, CoulombFriction, -3.0), (constant_force, ConstantLoad, -3.0)],
 )
 def test_the_force_on_a_carriage_is_the_stated_one(effect: object, kind: type, body_force: float) -> None:
     (found,) = effect(drive())  # type: ignore[operator]

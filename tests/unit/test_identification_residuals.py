@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from nlsdesign.identification.statistics.filters import (
     derivative,
+    difference,
+    every,
+    filter_weights,
     kernel,
     noise_gain,
-    rate_noise_gain,
     smoothing,
+    without_rounding,
 )
 from nlsdesign.identification.statistics.metrics import agreement
 from nlsdesign.identification.statistics.residuals import (
@@ -33,6 +38,11 @@ def test_noise_is_found_under_a_signal_a_thousand_times_larger() -> None:
     time = np.arange(6000) * 0.002
     signal = 600.0 * np.abs(np.sin(2 * np.pi * 2.0 * time)) + 0.6 * WHITE
     assert noise_of(signal) == pytest.approx(0.6, rel=0.05)
+
+
+def test_noise_is_found_under_a_motion_of_ten_samples_a_period() -> None:
+    signal = np.sin(2 * np.pi * 0.1 * np.arange(6000)) + 1e-4 * WHITE
+    assert noise_of(signal) == pytest.approx(1e-4, rel=0.1)
 
 
 def test_quantum_is_the_smallest_step() -> None:
@@ -94,29 +104,86 @@ def test_filter_has_no_phase_and_unit_gain() -> None:
 def test_second_derivative_behind_the_filter_makes_no_ripple_of_its_own() -> None:
     # The trap that DESIGN names: a truncated second-derivative kernel answers a parabola with a ripple.
     time = np.arange(600) * 0.002
-    matrix = smoothing(600, 4.0, 5)
+    matrix = smoothing(600, 4.0, 5, margin=4)
     for power, exact in ((1, 0.0), (2, 2.0)):
         np.testing.assert_allclose(matrix @ derivative(time**power, 0.002, order=2), exact, atol=2e-6)
 
 
 def test_rate_is_that_of_a_line_and_of_a_slow_sine() -> None:
     time = np.arange(2000) * 0.002
-    np.testing.assert_allclose(derivative(3.0 * time, 0.002, order=1)[50:-50], 3.0, rtol=1e-5)
-    slow = derivative(np.sin(2.0 * time), 0.002, order=1)[50:-50]
-    np.testing.assert_allclose(slow, 2.0 * np.cos(2.0 * time[50:-50]), atol=1e-3)
+    for span in (0.0, 0.062):
+        np.testing.assert_allclose(derivative(3.0 * time, 0.002, order=1, span=span)[50:-50], 3.0, rtol=1e-5)
+        slow = derivative(np.sin(2.0 * time), 0.002, order=1, span=span)[50:-50]
+        np.testing.assert_allclose(slow, 2.0 * np.cos(2.0 * time[50:-50]), atol=1e-3)
 
 
-@pytest.mark.parametrize("order", [0, 2])
+@pytest.mark.parametrize("rate", [100.0, 500.0, 5000.0])
+def test_a_rate_over_a_span_of_time_is_the_same_at_every_sampling_rate(rate: float) -> None:
+    time, turn = np.arange(0.0, 4.0, 1.0 / rate), 8.0
+    seen = derivative(np.sin(turn * time), 1.0 / rate, order=1, span=2.5 / turn)
+    inside = np.abs(time - 2.0) < 1.0
+    lost = 1.0 - np.std(seen[inside]) / np.std(turn * np.cos(turn * time[inside]))
+    assert lost == pytest.approx(0.0056, abs=0.0015)
+
+
+def test_derivatives_between_neighbours_hold_at_ten_samples_a_period() -> None:
+    time = np.arange(200) * 0.1
+    turn = 2.0 * np.pi
+    for order, exact in ((1, turn * np.cos(turn * time)), (2, -(turn**2) * np.sin(turn * time))):
+        seen = derivative(np.sin(turn * time), 0.1, order=order, span=0.2)
+        np.testing.assert_allclose(seen[10:-10], exact[10:-10], atol=2e-4 * turn**order)
+
+
+def test_rounding_is_removed_over_a_share_of_the_span_and_cubics_pass() -> None:
+    time = np.arange(-200, 200) * 0.002
+    for span in (0.01, 0.062, 0.2):
+        np.testing.assert_allclose(without_rounding(time**3, 0.002, span), time**3, atol=1e-12)
+    rounded = np.round(time / 0.01) * 0.01
+    left = [np.std(without_rounding(rounded, 0.002, span) - time) for span in (0.01, 0.062, 0.2)]
+    assert left[0] == pytest.approx(np.std(rounded - time))
+    assert left[2] < 0.5 * left[1] < 0.5 * left[0]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
 def test_noise_gain_is_what_white_noise_shows(order: int) -> None:
-    noise = np.random.default_rng(5).standard_normal(200_000)
-    found = smoothing(len(noise), 4.0, 1) @ derivative(noise, 1.0, order=order)
-    assert np.std(found) == pytest.approx(noise_gain(4.0, order), rel=0.02)
-
-
-def test_rate_noise_gain_is_what_white_noise_shows() -> None:
-    noise = np.random.default_rng(6).standard_normal(200_000)
-    assert np.std(derivative(noise, 1.0, order=1)) == pytest.approx(rate_noise_gain(), rel=0.05)
+    noise, step = np.random.default_rng(5).standard_normal(200_000), 0.002
+    found = smoothing(len(noise), 4.0, 1) @ derivative(noise, step, order=order, span=0.062)
+    assert np.std(found) == pytest.approx(noise_gain(0.008, order, step, 0.062), rel=0.05)
     assert kernel(4.0).sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("width", "stride"), [(4.0, 5), (1.0, 1), (7.3, 9), (0.1, 2), (3.0, 40)])
+def test_a_filter_of_rows_is_the_convolution_at_their_places(width: float, stride: int) -> None:
+    draw = np.random.default_rng(2)
+    signal, columns = draw.standard_normal(1500), draw.standard_normal((1500, 3))
+    matrix, kept = smoothing(1500, width, stride, margin=7), np.array([0, 2, 3, 11])
+    whole = np.convolve(signal, kernel(width), mode="same")
+    np.testing.assert_allclose(matrix @ signal, whole[matrix.places], atol=1e-12)
+    np.testing.assert_allclose(matrix[kept] @ signal, whole[matrix.places[kept]], atol=1e-12)
+    assert matrix.places[0] >= 7
+    assert matrix.shape == (len(matrix.places), 1500)
+    assert (matrix[np.zeros(0, dtype=int)] @ columns).shape == (0, 3)
+    for k in range(3):
+        np.testing.assert_allclose((matrix @ columns)[:, k], matrix @ columns[:, k], atol=1e-12)
+    np.testing.assert_array_equal(every(1500, stride) @ signal, signal[::stride])
+
+
+def test_the_filter_of_a_record_of_a_million_samples_takes_little_memory() -> None:
+    signal = np.zeros(1_000_000)
+    tracemalloc.start()
+    rows = smoothing(len(signal), 30.0, 37) @ derivative(signal, 1e-4, order=2)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(rows) == pytest.approx(1_000_000 / 37, rel=0.01)
+    assert peak < 4 * signal.nbytes
+
+
+def test_weights_of_derivative_and_filter_are_those_of_one_after_the_other() -> None:
+    signal = np.random.default_rng(4).standard_normal(900)
+    both = np.convolve(signal, filter_weights(0.008, 2, 0.002), mode="same")
+    matrix = smoothing(900, 4.0, 5, margin=4)
+    np.testing.assert_allclose(matrix @ derivative(signal, 0.002, order=2), both[matrix.places], atol=1e-6)
+    assert np.sum(difference(2)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_metrics_are_those_of_the_paper() -> None:

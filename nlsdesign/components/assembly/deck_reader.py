@@ -19,7 +19,7 @@ from ..core.element import Combination, Element
 from ..core.part import Part
 from ..core.part_numbers import ParameterInfo, Reading, domain_by_units, readings, templates
 from ..core.tie import Tie
-from ..mechanics.bodies import Body, GearedMotor
+from ..mechanics.bodies import Body, Free
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
@@ -78,7 +78,7 @@ class Builder:
             return None
         made = {key: child for key, child in children.items() if child is not None}
         fields = self.fields(path, table, kind, next(iter(made.values()), None))
-        if inner and not issubclass(kind, Combination | Through | GearedMotor):
+        if inner and not issubclass(kind, Combination | Through | Free):
             self._problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
         if len(self.problems) > before or len(made) < len(children):
             return None
@@ -319,7 +319,7 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
         if "cam" not in children or len(behind) != 1:
             raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
         return {"cam": children["cam"], "behind": behind[0]}
-    if issubclass(kind, GearedMotor):
+    if issubclass(kind, Free):
         return {"chain": tuple(children.items())}
     if issubclass(kind, Gear):
         return {"between": tuple(table["between"])}

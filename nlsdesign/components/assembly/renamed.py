@@ -6,6 +6,7 @@ from ...errors import UnknownNameError
 
 COMPONENTS: dict[str, str] = {
     "CableGuide": "CapstanFriction with guide=WrapProduct(wrap=...); in a deck with wrap",
+    "ConstantForce": "ConstantLoad, with its load in N",
     "DryFriction": "CoulombFriction, which sticks unless it has a creep_speed",
     "DryLoadFriction": "LoadFriction, which sticks unless it has a creep_speed",
     "DryStribeckFriction": "StribeckFriction, which sticks unless it has a creep_speed",

@@ -74,6 +74,16 @@ class FrictionContact(Reading):
         """
 
     @abstractmethod
+    def sliding(self, scope: Scope, rate: Expression) -> Expression:
+        """Return the square of the sign of a rate: the share of an effort that acts in both directions alike.
+
+        Parameters
+        ----------
+        scope, rate
+            As of :meth:`against`.
+        """
+
+    @abstractmethod
     def size(self, scope: Scope, value: Expression, words: tuple[str, str], name: str) -> Expression:
         """Return |v|, as :meth:`CornerContact.positive_part` returns ⟨v⟩."""
 
@@ -101,6 +111,10 @@ class Sharp(CornerContact, FrictionContact):
     ) -> Expression:
         """Return level·sgn(rate), or while the rate is zero what keeps it there."""
         return dry(scope, rate, level, sticking)
+
+    def sliding(self, scope: Scope, rate: Expression) -> Expression:
+        """Return one: where the sides stick, what they hold is shifted by the effort."""
+        return ca.SX(1)
 
     def size(self, scope: Scope, value: Expression, words: tuple[str, str], name: str) -> Expression:
         """Return |v| with its corner."""
@@ -163,6 +177,10 @@ class Regularised(FrictionContact):
     ) -> Expression:
         """Return level·tanh(v/v_s)."""
         return level(rate) * smooth_sign(rate, scope.parameter("creep_speed"))
+
+    def sliding(self, scope: Scope, rate: Expression) -> Expression:
+        """Return tanh²(v/v_s)."""
+        return smooth_sign(rate, scope.parameter("creep_speed")) ** 2
 
     def size(self, scope: Scope, value: Expression, words: tuple[str, str], name: str) -> Expression:
         """Return |v|."""

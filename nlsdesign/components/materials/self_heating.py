@@ -12,8 +12,10 @@ import casadi as ca
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
-from ..core.element import UNBOUNDED, Combination, Scope
+from ..core.element import UNBOUNDED, Combination, Element, Scope, observed_effort
+from ..core.part import walk
 from ..core.part_numbers import Reading, parameter, read_as
+from ..core.springs import Elastic
 
 _ROOM = 293.15
 
@@ -149,12 +151,65 @@ class ViscousHeat(RelativeHeat):
         return share * share / scope.parameter("cooling_time")
 
 
+@dataclass(frozen=True)
+class LossHeat(Heat):
+    """Heat of what the laws inside lose: F = Σ Fₑ/(1 + ϑ) + Σ Fᵣ/(1 + c·ϑ), dϑ/dt = D/E − ϑ/τ.
+
+    D is the power that the laws inside lose, of a relaxing branch or of sliders; E is the loss after which,
+    uncooled, half of the equilibrium stiffness is left. Fₑ are the elastic laws, Fᵣ those that relax or
+    slide, and c tells by how much these soften as well: 0 not at all, 1 alike. Valid for ϑ below about 0.5.
+    Sources: first law of thermodynamics; Medalia 1991 (heat build-up); Schapery 1964.
+
+    Examples
+    --------
+    >>> LossHeat(halving_loss=4e6, cooling_time=8.0, relaxing_share=0.0).halving_loss
+    4000000.0
+    """
+
+    halving_loss: Quantity = parameter(
+        "{effort}*{motion}", "loss E after which ϑ = 1", minimum=1e-9, maximum=1e15
+    )
+    cooling_time: Quantity = parameter("s", "time constant τ of cooling", minimum=1e-3, maximum=1e6)
+    relaxing_share: Quantity = parameter(
+        "1", "softening c of what relaxes, per softening of the equilibrium", minimum=0.0, maximum=10.0
+    )
+
+    def effort(self, held: Combination, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the effort of the warm elements."""
+        elastic, relaxing = ca.SX(0), ca.SX(0)
+        for name, member in held.members:
+            inside = observed_effort(member, scope.child(name), motion, rate)
+            if is_equilibrium(member):
+                elastic += inside
+            else:
+                relaxing += inside
+        heat = scope.state("heat", "1", f"relative loss of stiffness of {scope.path} by heat")
+        left = 1 / (1 + scope.parameter("relaxing_share") * heat)
+        lost = left * scope.losses()
+        scope.derive(heat, lost / scope.parameter("halving_loss") - heat / scope.parameter("cooling_time"))
+        scope.loss(lost - scope.losses())
+        return elastic / (1 + heat) + left * relaxing
+
+
+def is_equilibrium(member: Element) -> bool:
+    """Tell whether a law has no memory and no loss: everything in it is elastic.
+
+    Parameters
+    ----------
+    member
+        One of several laws in parallel.
+    """
+    leaves = [part for _, part in walk(member) if not part.children()]
+    return all(isinstance(leaf, Elastic) for leaf in leaves)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SelfHeating(Combination):
     """Rubber that softens by its own heat: F = g·F_in, where g falls with the heat of working.
 
     What heats, and how g falls, is the reading ``heat``: :class:`HeatBalance` in a material,
-    :class:`WorkHeat` or :class:`ViscousHeat` around a piece whose section and length are not known apart.
+    :class:`WorkHeat` or :class:`ViscousHeat` around a piece whose section and length are not known apart,
+    :class:`LossHeat` around laws of which some relax or slide.
     Source: first law of thermodynamics.
 
     Examples
@@ -168,7 +223,7 @@ class SelfHeating(Combination):
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"self-heating"})
 
-    heat: Heat = read_as(HeatBalance, WorkHeat, ViscousHeat)
+    heat: Heat = read_as(HeatBalance, WorkHeat, ViscousHeat, LossHeat)
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the effort at the present temperature."""

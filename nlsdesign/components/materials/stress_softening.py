@@ -90,10 +90,10 @@ class OgdenRoxburgh(SofteningCurve):
 class LargestMotion(SofteningCurve):
     """Softening by motion: 1 − s·(1 − (x/x_max)^p), for any element, with x_max the largest motion so far.
 
-    At small motion the share s is lost; p = 1 makes the loss fall linearly with the motion. The memory starts
-    at the first motion and follows a growing motion with the time constant ``following``, which must be short
-    against the motion; it never heals. Valid for one sense of loading from zero. Sources: Mullins 1969 (the
-    effect); Ogden and Roxburgh 1999 (one factor on the virgin effort, kept from the largest load).
+    At small motion the share s is lost; p = 1 makes the loss fall linearly with the motion. x is the size of
+    the motion, alike on both sides. The memory starts at the first motion and follows a growing one with the
+    time constant ``following``, which must be short against the motion; it never heals. Sources: Mullins 1969
+    (the effect); Ogden and Roxburgh 1999 (one factor on the virgin effort, kept from the largest load).
 
     Examples
     --------
@@ -115,10 +115,44 @@ class LargestMotion(SofteningCurve):
         """Return the share and the effort inside."""
         domain = held.domain
         state = ("largest", domain.motion_unit, f"largest {domain.motion} of {scope.path} so far")
-        largest = following(scope, state, motion, scope.parameter("following"))
-        ratio = ca.fmin(ca.fmax(motion / ca.fmax(largest, 1e-12), _LEAST_RATIO), 1)
+        size = ca.fabs(motion)
+        largest = following(scope, state, size, scope.parameter("following"))
+        ratio = ca.fmin(ca.fmax(size / ca.fmax(largest, 1e-12), _LEAST_RATIO), 1)
         lost = scope.parameter("softening") * (1 - ratio ** scope.parameter("exponent"))
         return 1 - lost, held.inside(scope, motion, rate)
+
+
+@dataclass(frozen=True)
+class DamageByMotion(SofteningCurve):
+    """Softening by damage: 1 − d·(1 − e^(−x_max/x_d)), the same at every motion, x_max the largest so far.
+
+    Bonds that break at their largest stretch carry nothing any more, at no later stretch either: the first
+    pull bends over, the later ones are all softer alike. x is the size of the motion; the memory follows it
+    as in :class:`LargestMotion` and never heals. Sources: Mullins 1969; Simo 1987 (this factor).
+
+    Examples
+    --------
+    >>> DamageByMotion(damage=0.3, damage_motion=5e-3).following.number
+    0.005
+    """
+
+    damage: Quantity = parameter("1", "share d that is lost in the end", minimum=0.0, maximum=0.99)
+    damage_motion: Quantity = parameter(
+        "{motion}", "largest motion x_d at which 63 % of that is lost", minimum=1e-9, maximum=1e4
+    )
+    following: Quantity = parameter(
+        "s", "time in which the memory follows the motion", minimum=1e-5, maximum=10.0, default=5e-3
+    )
+
+    def softened(
+        self, held: Combination, scope: Scope, motion: Expression, rate: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return the share and the effort inside."""
+        domain = held.domain
+        state = ("largest", domain.motion_unit, f"largest {domain.motion} of {scope.path} so far")
+        largest = following(scope, state, ca.fabs(motion), scope.parameter("following"))
+        broken = -ca.expm1(-largest / scope.parameter("damage_motion"))
+        return 1 - scope.parameter("damage") * broken, held.inside(scope, motion, rate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,9 +160,10 @@ class StressSoftening(Combination):
     """Stress softening (Mullins effect): F = η·F_in, softer below the hardest pull so far.
 
     Virgin rubber, and rubber pulled harder than ever before, is not softened. How η follows is ``curve``:
-    :class:`OgdenRoxburgh` where the laws say their strain energy, :class:`LargestMotion` around any element,
-    a specimen or a piece whose section and length are not known apart. Valid for what the first pull does;
-    there is no recovery, no set and no loss on reloading. Sources: Mullins 1969; Ogden and Roxburgh 1999.
+    :class:`OgdenRoxburgh` where the laws say their strain energy, :class:`LargestMotion` and
+    :class:`DamageByMotion` around any element, such as a piece whose section and length are not known.
+    Valid for what the first pull does; there is no recovery, no set and no loss on reloading.
+    Sources: Mullins 1969; Ogden and Roxburgh 1999.
 
     Raises
     ------
@@ -145,7 +180,7 @@ class StressSoftening(Combination):
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"stress softening"})
 
-    curve: SofteningCurve = read_as(OgdenRoxburgh, LargestMotion)
+    curve: SofteningCurve = read_as(OgdenRoxburgh, LargestMotion, DamageByMotion)
 
     def __post_init__(self) -> None:
         super().__post_init__()

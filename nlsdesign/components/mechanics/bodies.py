@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple, Self
 
 import casadi as ca
 
 from ...errors import ArrangementError
-from ...quantity import Quantity
+from ...quantity import Quantity, typeset_unit
 from ...symbolic import Expression
 from ..core.element import ROTATION, TRANSLATION, Domain, Scope
 from ..core.part import RESERVED, Part, check_names
 from ..core.part_numbers import one_of, parameter
-from .drive_chain import DrivePart
+from .controllers import Controller
+from .drive_chain import Command, DrivePart
 
 
 class Motion(NamedTuple):
@@ -50,10 +51,71 @@ class Body(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Free(Body):
-    """Base of the bodies that move by themselves: two states."""
+    """Base of the bodies that move by themselves: two states, and a drive.
+
+    Parameters
+    ----------
+    chain
+        Pairs of name and part of the drive, in the order of action; none for an ideal drive. What follows the
+        last controller lies between the command and the effort. With a controller the input of the body is a
+        ``goal``, and its command goes on as a signal.
+
+    Raises
+    ------
+    ArrangementError
+        If a part does not belong into a drive, a name is taken, or the units of two neighbours differ.
+    """
 
     inertia_name: ClassVar[str] = "inertia"
     """Field that says what is accelerated."""
+    command: ClassVar[tuple[str, str]] = ("torque", "N*m")
+    """Name and unit of what drives the body from outside."""
+
+    chain: tuple[tuple[str, DrivePart], ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        kind = type(self).__name__
+        check_names(kind, [n for n, _ in self.chain], taken=RESERVED | set(self.parameter_infos()))
+        for name, part in self.chain:
+            if not isinstance(part, DrivePart):
+                raise ArrangementError(
+                    f"part '{name}' of {kind}",
+                    f"is a {type(part).__name__}, which does not lie between a command and its effort",
+                    next_step="put for instance a DriveDelay or a PositionLoop there",
+                )
+        self._taken(self.chain)
+
+    def _taken(self, parts: Sequence[tuple[str, DrivePart]]) -> str:
+        """Return the unit of what comes into parts of the drive that give the command."""
+        unit = self.command[1]
+        for name, part in reversed(parts):
+            taken = part.taken(unit, self.domain)
+            if taken is None:
+                own = f"{type(part).__name__} gives {typeset_unit(part.gives or part.unit)}"
+                raise ArrangementError(
+                    f"part '{name}' of {type(self).__name__}",
+                    f"{own}; here {typeset_unit(unit)} is asked for, by {self.domain.motion}",
+                    next_step=f"give its numbers in units of {typeset_unit(unit)} and "
+                    f"{typeset_unit(self.domain.motion_unit)}, or take another part",
+                )
+            unit = taken
+        return unit
+
+    @property
+    def loops(self) -> tuple[tuple[str, DrivePart], ...]:
+        """The parts of the drive up to the last controller: they give the command."""
+        places = [k for k, (_, part) in enumerate(self.chain) if isinstance(part, Controller)]
+        return self.chain[: places[-1] + 1] if places else ()
+
+    def children(self) -> Mapping[str, Part]:
+        """Return the parts of the drive by name."""
+        return dict(self.chain)
+
+    def with_children(self, children: Mapping[str, Part]) -> Self:
+        """Return a copy with other parts of the drive."""
+        # The kind is checked where the copy is made.
+        return replace(self, chain=tuple(children.items()))  # type: ignore[arg-type]
 
     def motion(self, scope: Scope) -> Motion:
         """Declare motion and speed as states."""
@@ -62,6 +124,29 @@ class Free(Body):
             scope.state(place, self.domain.motion_unit, f"{place} of {scope.path}"),
             scope.state(speed, self.domain.rate_unit, f"{speed} of {scope.path}"),
         )
+
+    def commanded(
+        self, scope: Scope, motion: Motion, held: Callable[[Expression], Expression] = lambda value: value
+    ) -> Expression:
+        """Return the command as it acts behind all parts of the drive.
+
+        Parameters
+        ----------
+        scope, motion
+            Of the body.
+        held
+            Keeps the command within the limits of the drive.
+        """
+        name, unit = self.command
+        meaning = f"{name.replace('_', ' ')} of {scope.path}"
+        if not self.loops:
+            value = held(scope.input(name, unit, meaning))
+        else:
+            taken = self._taken(self.loops)
+            goal = Command(scope.input("goal", taken, f"goal of {scope.path}"), taken, *motion)
+            value = held(_through(scope, self.loops, goal))
+            scope.signal(name, value, unit, meaning)
+        return _through(scope, self.chain[len(self.loops) :], Command(value, unit, *motion))
 
     @abstractmethod
     def drive(self, scope: Scope, motion: Motion) -> Expression:
@@ -81,17 +166,28 @@ class Free(Body):
         )
 
 
+def _through(scope: Scope, parts: Sequence[tuple[str, DrivePart]], command: Command) -> Expression:
+    """Return what comes out behind parts of a drive."""
+    for name, part in parts:
+        value = part.act(scope.child(name), command)
+        command = command._replace(value=value, unit=part.gives or command.unit)
+    return command.value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Inertia(Free):
-    """A turning body, J·ω̇ = ΣT + load torque."""
+    """A turning body, J·ω̇ = ΣT + T_o, with a torque T_o from outside: a load, or that of a drive.
+
+    With ``chain`` it stands for a drive that is given a torque, for instance one that comes late.
+    """
 
     domain: ClassVar[Domain] = ROTATION
 
     inertia: Quantity = parameter("kg*m^2", "moment of inertia", minimum=1e-12, maximum=1e6)
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
-        """Return the torque from outside, an input."""
-        return scope.input("torque", "N*m", f"torque on {scope.path} from outside")
+        """Return the torque from outside, or that of the drive."""
+        return self.commanded(scope, motion)
 
     def inertia_of(self, scope: Scope) -> Expression:
         """Return J."""
@@ -100,17 +196,18 @@ class Inertia(Free):
 
 @dataclass(frozen=True, kw_only=True)
 class Mass(Free):
-    """A sliding body, m·v̇ = ΣF + outer force."""
+    """A sliding body, m·v̇ = ΣF + F_o, with a force F_o from outside: a load, or that of a drive."""
 
     domain: ClassVar[Domain] = TRANSLATION
 
     inertia_name: ClassVar[str] = "mass"
+    command: ClassVar[tuple[str, str]] = ("force", "N")
 
     mass: Quantity = parameter("kg", "mass", minimum=1e-9, maximum=1e9)
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
-        """Return the force from outside, an input."""
-        return scope.input("force", "N", f"force on {scope.path} from outside")
+        """Return the force from outside, or that of the drive."""
+        return self.commanded(scope, motion)
 
     def inertia_of(self, scope: Scope) -> Expression:
         """Return m."""
@@ -125,16 +222,6 @@ class GearedMotor(Free):
     friction is an element of its own. I is the current within its limit, as it comes out of the parts of the
     drive, in written order. Source: Leonhard 2001.
 
-    Parameters
-    ----------
-    chain
-        Pairs of name and part of the drive between current and torque; none for an ideal drive.
-
-    Raises
-    ------
-    ArrangementError
-        If a part does not lie between current and torque, or a name is taken.
-
     Examples
     --------
     >>> from nlsdesign.components import DriveDelay, DriveSaturation
@@ -145,6 +232,7 @@ class GearedMotor(Free):
     """
 
     domain: ClassVar[Domain] = ROTATION
+    command: ClassVar[tuple[str, str]] = ("current", "A")
 
     inertia: Quantity = parameter(
         "kg*m^2", "moment of inertia at the gear's output", minimum=1e-12, maximum=1e6
@@ -152,34 +240,11 @@ class GearedMotor(Free):
     gear_ratio: Quantity = parameter("1", "motor turns per output turn", minimum=1e-3, maximum=1e4)
     torque_constant: Quantity = parameter("N*m/A", "motor torque per current", minimum=1e-6, maximum=1e3)
     current_limit: Quantity = parameter("A", "largest current", minimum=1e-6, maximum=1e4, default=20.0)
-    chain: tuple[tuple[str, DrivePart], ...] = ()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_names("GearedMotor", [n for n, _ in self.chain], taken=RESERVED | set(self.parameter_infos()))
-        for name, part in self.chain:
-            if not isinstance(part, DrivePart):
-                raise ArrangementError(
-                    f"part '{name}' of a motor",
-                    f"is a {type(part).__name__}, which does not lie between current and torque",
-                    next_step="put a DriveDelay or a DriveSaturation there",
-                )
-
-    def children(self) -> Mapping[str, Part]:
-        """Return the parts of the drive by name."""
-        return dict(self.chain)
-
-    def with_children(self, children: Mapping[str, Part]) -> Self:
-        """Return a copy with other parts of the drive."""
-        # The kind is checked where the copy is made.
-        return replace(self, chain=tuple(children.items()))  # type: ignore[arg-type]
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return n·k_T·I: the current within its limit, then through the parts of the drive."""
         limit = scope.parameter("current_limit")
-        current = ca.fmin(ca.fmax(scope.input("current", "A", f"current of {scope.path}"), -limit), limit)
-        for name, part in self.chain:
-            current = part.act(scope.child(name), current)
+        current = self.commanded(scope, motion, lambda wanted: ca.fmin(ca.fmax(wanted, -limit), limit))
         torque = scope.parameter("gear_ratio") * scope.parameter("torque_constant") * current
         scope.signal("drive_torque", torque, "N*m", f"torque of {scope.path} at the gear's output")
         return torque

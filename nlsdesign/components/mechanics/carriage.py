@@ -1,4 +1,4 @@
-"""A positioning drive along a line: its carriage, and a constant force that acts on it."""
+"""The carriage of a positioning drive along a line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.element import TRANSLATION, Domain, Scope
 from ..core.part import parameter
-from ..core.springs import Elastic
 from .bodies import Free, Motion
 
 
@@ -32,6 +31,7 @@ class LinearDrive(Free):
     domain: ClassVar[Domain] = TRANSLATION
 
     inertia_name: ClassVar[str] = "mass"
+    command: ClassVar[tuple[str, str]] = ("voltage", "V")
 
     mass: Quantity = parameter("kg", "mass that moves, reflected to the line", minimum=1e-9, maximum=1e9)
     force_constant: Quantity = parameter(
@@ -40,9 +40,9 @@ class LinearDrive(Free):
     voltage_limit: Quantity = parameter("V", "largest voltage", minimum=1e-6, maximum=1e4)
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
-        """Return g·V with the voltage held within its limit."""
+        """Return g·V with the voltage held within its limit, then through the parts of the drive."""
         limit = scope.parameter("voltage_limit")
-        voltage = ca.fmin(ca.fmax(scope.input("voltage", "V", f"voltage of {scope.path}"), -limit), limit)
+        voltage = self.commanded(scope, motion, lambda wanted: ca.fmin(ca.fmax(wanted, -limit), limit))
         force = scope.parameter("force_constant") * voltage
         scope.signal("drive_force", force, "N", f"force of {scope.path} on the carriage")
         return force
@@ -50,34 +50,3 @@ class LinearDrive(Free):
     def inertia_of(self, scope: Scope) -> Expression:
         """Return m."""
         return scope.parameter("mass")
-
-
-@dataclass(frozen=True, kw_only=True)
-class ConstantForce(Elastic):
-    """A force that never changes, F = F₀, positive against positive motion: a weight, an amplifier's offset.
-
-    It stores F₀·e, so it is elastic. With dry friction it reads as friction that differs between the two
-    directions; the two cannot be told apart. Source: Janot et al. 2019, the offset of the model.
-
-    Examples
-    --------
-    >>> ConstantForce(load=-3.16).title()
-    'ConstantForce(load = -3.16 N)'
-    """
-
-    domain: ClassVar[Domain] = TRANSLATION
-
-    picture: ClassVar[str] = "box"
-    phenomena: ClassVar[frozenset[str]] = frozenset({"constant force"})
-
-    # Not named "force": every element between bodies has a signal of that name.
-    load: Quantity = parameter("N", "constant force", minimum=-1e9, maximum=1e9)
-
-    @property
-    def restores(self) -> bool:
-        """False: it pushes the same way at every place."""
-        return False
-
-    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return F₀."""
-        return scope.parameter("load")

@@ -1,43 +1,83 @@
-"""What lies between the current of a motor and its torque, one part after the other."""
+"""What lies between the command of a drive and its effort, one part after the other."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import casadi as ca
 
-from ...quantity import Quantity
+from ...quantity import Quantity, same_dimension
 from ...symbolic import Expression
 from ..core.delay import delayed
+from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part import Part
 from ..core.part_numbers import parameter
 
 
+class Command(NamedTuple):
+    """What comes into a part of a drive.
+
+    Parameters
+    ----------
+    value, unit
+        For instance a current in A, or the goal of a position controller in rad.
+    motion, rate
+        Of the body that is driven.
+    """
+
+    value: Expression
+    unit: str
+    motion: Expression
+    rate: Expression
+
+
 @dataclass(frozen=True, kw_only=True)
 class DrivePart(Part):
-    """Base of the parts of a drive: each takes a current and gives the one that acts behind it."""
+    """Base of the parts of a drive: each takes a command and gives the one that acts behind it."""
+
+    unit: ClassVar[str] = ""
+    """Unit of the only command that it can take; any if there is none."""
+
+    def taken(self, given: str, moved: Domain) -> str | None:
+        """Return the unit of the command that it takes, ``None`` if it cannot give what is asked for.
+
+        Parameters
+        ----------
+        given
+            Unit of what it has to give.
+        moved
+            Domain of the body that is driven.
+        """
+        return given if not self.unit or same_dimension(self.unit, given) else None
+
+    @property
+    def gives(self) -> str:
+        """Unit of what it gives; empty if that is the unit of what it takes."""
+        return ""
 
     @abstractmethod
-    def act(self, scope: Scope, current: Expression) -> Expression:
-        """Return the current that an ideal motor would need for the same torque.
+    def act(self, scope: Scope, command: Command) -> Expression:
+        """Return the command that an ideal drive would need for the same effort.
 
         Parameters
         ----------
         scope
             Of the part.
-        current
-            That comes in, in A.
+        command
+            That comes in.
         """
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveDelay(DrivePart):
-    """A torque that follows the current by a transport delay τ: I'(t) = I(t − τ).
+    """An effort that follows the command by a transport delay τ: u'(t) = u(t − τ).
 
-    In (2,2) Padé approximation, see :func:`~nlsdesign.components.core.delay.delayed`.
-    Source: Golub and Van Loan 2013 (Padé table of the exponential).
+    Before a controller its goal comes late. In (2,2) Padé approximation, see
+    :func:`~nlsdesign.components.core.delay.delayed`. Source: Golub and Van Loan 2013 (Padé table of the
+    exponential).
 
     Examples
     --------
@@ -45,11 +85,34 @@ class DriveDelay(DrivePart):
     'DriveDelay(delay = 0.004 s)'
     """
 
-    delay: Quantity = parameter("s", "time from current to torque", minimum=1e-6, maximum=10.0)
+    delay: Quantity = parameter("s", "time from command to effort", minimum=1e-6, maximum=10.0)
 
-    def act(self, scope: Scope, current: Expression) -> Expression:
-        """Return the current as it was a delay ago."""
-        return delayed(scope, current, "A")
+    def act(self, scope: Scope, command: Command) -> Expression:
+        """Return the command as it was a delay ago."""
+        return delayed(scope, command.value, command.unit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveLag(DrivePart):
+    """An amplifier or a filter that follows its command with a time constant: T·u̇' = u − u'.
+
+    Valid where one time constant dominates. Source: Leonhard 2001 (loops in cascade, the inner one as a lag).
+
+    Examples
+    --------
+    >>> DriveLag(time_constant=0.012).title()
+    'DriveLag(time_constant = 0.012 s)'
+    """
+
+    time_constant: Quantity = parameter(
+        "s", "time in which 63 % of a step has come through", minimum=1e-6, maximum=100.0
+    )
+
+    def act(self, scope: Scope, command: Command) -> Expression:
+        """Return the command behind the lag."""
+        behind = scope.state("behind", command.unit, f"command behind {scope.path}")
+        scope.derive(behind, (command.value - behind) / scope.parameter("time_constant"))
+        return behind
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +129,13 @@ class DriveSaturation(DrivePart):
     'DriveSaturation(saturation_current = 6 A)'
     """
 
+    unit: ClassVar[str] = "A"
+
     saturation_current: Quantity = parameter(
         "A", "current at which 71 % of the ideal torque is left", minimum=1e-6, maximum=1e6
     )
 
-    def act(self, scope: Scope, current: Expression) -> Expression:
+    def act(self, scope: Scope, command: Command) -> Expression:
         """Return I/√(1 + (I/I_s)²)."""
-        share = current / scope.parameter("saturation_current")
-        return current / ca.sqrt(1 + share * share)
+        share = command.value / scope.parameter("saturation_current")
+        return command.value / ca.sqrt(1 + share * share)

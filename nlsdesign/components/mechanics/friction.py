@@ -81,6 +81,31 @@ class StribeckFriction(CoulombFriction):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AsymmetricFriction(CoulombFriction):
+    """Dry friction that differs between the directions: T = T_c·(sgn(ω) + a) while ω ≠ 0.
+
+    Forward it is T_c·(1 + a), backward T_c·(1 − a), at rest anything between −T_c·(1 − a) and T_c·(1 + a).
+    With ``contact=Regularised(creep_speed=...)`` it is T_c·(s + a·s²) with s = tanh(ω/ω_s), C∞, and creeps
+    at rest. In motion it cannot be told from a constant load a·T_c beside even friction. Valid as
+    :class:`CoulombFriction`. Sources: Coulomb 1785; Armstrong-Hélouvry 1991 (levels by direction).
+
+    Examples
+    --------
+    >>> AsymmetricFriction(sliding_effort=0.2, asymmetry=0.1).title()
+    'AsymmetricFriction(sliding_effort = 0.2 N·m, asymmetry = 0.1)'
+    """
+
+    asymmetry: Quantity = parameter(
+        "1", "half the difference between the directions over the mean", minimum=-1.0, maximum=1.0
+    )
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return T."""
+        uneven = scope.parameter("asymmetry") * scope.parameter("sliding_effort")
+        return super().effort(scope, motion, rate) + uneven * self.rubbing.sliding(scope, rate)
+
+
+@dataclass(frozen=True, kw_only=True)
 class LoadFriction(WithFriction, Combination):
     """Friction of a gear or cable drive that grows with the load: T = T_in + µ·|T_in|·sgn(ω) while ω ≠ 0.
 

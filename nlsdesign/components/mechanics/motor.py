@@ -46,6 +46,38 @@ class ElectricMotor(Free):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ResistiveMotor(ElectricMotor):
+    """Motor at a voltage whose winding settles at once: J·ω̇ = k·(U − k·ω)/R + ΣT.
+
+    U is the wanted voltage held within ±U_max, the current is held within ±I_max. Behind a rigid gear k, J
+    and ω are those of the output. Continuous, with corners at the limits. Valid for changes slower than L/R;
+    :class:`VoltageDrivenMotor` has the inductance.
+
+    Examples
+    --------
+    >>> servo = ResistiveMotor(inertia=2e-3, torque_constant=0.5, resistance=4.0, voltage_limit=7.4)
+    >>> servo.current_limit.number
+    10000.0
+    """
+
+    command: ClassVar[tuple[str, str]] = ("wanted_voltage", "V")
+
+    current_limit: Quantity = parameter(
+        "A", "largest current of the amplifier", minimum=1e-6, maximum=1e4, default=1e4
+    )
+
+    def drive(self, scope: Scope, motion: Motion) -> Expression:
+        """Return k·I."""
+        most, supply = scope.parameter("current_limit"), scope.parameter("voltage_limit")
+        resistance = scope.parameter("resistance")
+        voltage = ca.fmin(ca.fmax(self.commanded(scope, motion), -supply), supply)
+        pushed = (voltage - scope.parameter("torque_constant") * motion.rate) / resistance
+        current = ca.fmin(ca.fmax(pushed, -most), most)
+        scope.signal("winding_current", current, "A", f"current in the winding of {scope.path}")
+        return self._torque(scope, current, voltage)
+
+
+@dataclass(frozen=True, kw_only=True)
 class CurrentDrivenMotor(ElectricMotor):
     """Motor behind a fast current loop: J·ω̇ = k·I + ΣT, U = R·I + k·ω.
 
@@ -61,9 +93,11 @@ class CurrentDrivenMotor(ElectricMotor):
     'torque'
     """
 
+    command: ClassVar[tuple[str, str]] = ("current", "A")
+
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return k·I."""
-        wanted = scope.input("current", "A", f"wanted current of {scope.path}")
+        wanted = self.commanded(scope, motion)
         most, supply = scope.parameter("current_limit"), scope.parameter("voltage_limit")
         resistance = scope.parameter("resistance")
         induced = scope.parameter("torque_constant") * motion.rate
@@ -88,6 +122,8 @@ class VoltageDrivenMotor(ElectricMotor):
     0.0001
     """
 
+    command: ClassVar[tuple[str, str]] = ("wanted_voltage", "V")
+
     inductance: Quantity = parameter("H", "inductance of the winding", minimum=1e-9, maximum=1e3)
     limiter_time: Quantity = parameter(
         "s", "time in which the amplifier holds the current", minimum=1e-7, maximum=1.0, default=1e-4
@@ -95,7 +131,7 @@ class VoltageDrivenMotor(ElectricMotor):
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return k·I."""
-        wanted = scope.input("wanted_voltage", "V", f"wanted voltage of {scope.path}")
+        wanted = self.commanded(scope, motion)
         current = scope.state("current", "A", f"current in the winding of {scope.path}")
         most, supply = scope.parameter("current_limit"), scope.parameter("voltage_limit")
         inductance = scope.parameter("inductance")

@@ -12,8 +12,9 @@ import numpy as np
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.delay import delayed
+from ..core.domain import ROTATION, TRANSLATION, Domain
 from ..core.element import Scope
-from ..core.part_numbers import parameter
+from ..core.part_numbers import one_of, parameter
 from .sensors import Array, Numbers, Sensor
 
 
@@ -50,7 +51,7 @@ class TransportDelay(Sensor):
 
 @dataclass(frozen=True, kw_only=True)
 class Drift(Sensor):
-    """A force whose zero wanders while the instrument warms up: reading = F + d·(t − t₀), linear in time.
+    """A force or torque whose zero wanders as the instrument warms up: reading = F + d·(t − t₀).
 
     The drift so far is a state that starts at zero, so a model does not depend on the clock. Valid for runs
     that are short against the time of warming up. Source: data sheets, "temperature coefficient of zero".
@@ -61,9 +62,10 @@ class Drift(Sensor):
     'N/s'
     """
 
-    units: ClassVar[tuple[str, ...]] = ("N",)
+    units: ClassVar[tuple[str, ...]] = ("N", "N*m")
 
-    drift: Quantity = parameter("N/s", "change of the zero", minimum=-1e4, maximum=1e4)
+    domain: Domain = one_of(TRANSLATION, ROTATION)
+    drift: Quantity = parameter("{effort}/s", "change of the zero", minimum=-1e4, maximum=1e4)
 
     def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
         """Return F + drift so far."""
@@ -79,6 +81,91 @@ class Drift(Sensor):
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return reading − drift so far."""
         return reading - numbers.memory("drifted")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadNonlinearity(Sensor):
+    """A load cell or transducer whose gain changes with the load: reading = F·(1 + n·|F|/F_fs).
+
+    Alike on both sides. F_fs is the full scale; data sheets state the largest distance from the line through
+    zero and full scale, a quarter of n. Valid while 2·|n·F| < F_fs, so that the reading grows with the load.
+    Source: data sheets, "nonlinearity in per cent of full scale".
+
+    Examples
+    --------
+    >>> LoadNonlinearity(of="spring.force", nonlinearity=0.02, full_scale=200.0).title()
+    'LoadNonlinearity(nonlinearity = 0.02, full_scale = 200 N)'
+    """
+
+    units: ClassVar[tuple[str, ...]] = ("N", "N*m")
+
+    domain: Domain = one_of(TRANSLATION, ROTATION)
+    nonlinearity: Quantity = parameter(
+        "1", "relative change n of the gain at full scale", minimum=-1e6, maximum=1e6
+    )
+    full_scale: Quantity = parameter("{effort}", "full scale F_fs", minimum=1e-9, maximum=1e9)
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return F·(1 + n·|F|/F_fs)."""
+        share = ca.fabs(value) / scope.parameter("full_scale")
+        return value * (1 + scope.parameter("nonlinearity") * share)
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return F·(1 + n·|F|/F_fs)."""
+        share = np.abs(values) / self.full_scale.number
+        result: Array = values * (1.0 + self.nonlinearity.number * share)
+        return result
+
+    def infer(self, numbers: Numbers, reading: Expression) -> Expression:
+        """Return 2·R/(1 + √(1 + 4·n·|R|/F_fs)), the load behind a reading R."""
+        share = ca.fabs(reading) / numbers.parameter("full_scale")
+        under_root = ca.fmax(1 + 4 * numbers.parameter("nonlinearity") * share, 1e-6)
+        return 2 * reading / (1 + ca.sqrt(under_root))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClockDrift(Sensor):
+    """An instrument with a clock of its own, late by more and more: reading(t) = value(t − ε·t), t from 0.
+
+    ε < 0 where its clock runs ahead. In the flat model, with a = ε·t and v̇, v̈ from a filter of three equal
+    lags T: v − a·(v̇ + 3·T·v̈) + a²·v̈/2, to second order. Valid where a and T are short against the motion.
+    In records, and where a reading drives a model, the shift is exact. Source: Oppenheim and Schafer 2010
+    (changing the sampling rate).
+
+    Examples
+    --------
+    >>> ClockDrift(of="load_cell.reading", rate=2e-4).differentiating_time.number
+    0.001
+    """
+
+    rate: Quantity = parameter("1", "time ε lost per time", minimum=-0.5, maximum=0.5)
+    differentiating_time: Quantity = parameter(
+        "s", "time constant T of the filter of the derivatives", minimum=1e-6, maximum=1.0, default=1e-3
+    )
+
+    @property
+    def stretched_by(self) -> str | None:
+        """The rate."""
+        return "rate"
+
+    def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
+        """Return the value of somewhat earlier or later."""
+        lag = scope.parameter("differentiating_time")
+        elapsed = scope.state("elapsed", "s", f"time that {scope.path} has run")
+        lags, inner = [], value
+        for place in ("first", "second", "third"):
+            lags.append(scope.state(place, unit, f"value behind the {place} lag of {scope.path}"))
+            scope.derive(lags[-1], (inner - lags[-1]) / lag)
+            inner = lags[-1]
+        scope.derive(elapsed, ca.SX(1))
+        slope, bend = (lags[1] - lags[2]) / lag, (lags[0] - 2 * lags[1] + lags[2]) / lag**2
+        late = scope.parameter("rate") * elapsed
+        return value - late * (slope + 3 * lag * bend) + late**2 / 2 * bend
+
+    def recorded(self, times: Array, values: Array, noise: np.random.Generator) -> Array:
+        """Return what was there ε·t before."""
+        earlier: Array = np.interp(times - self.rate.number * (times - times[0]), times, values)
+        return earlier
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -120,6 +120,11 @@ class Sensor(Part):
         """Name of the parameter that says by how much the reading is late, if there is one."""
         return None
 
+    @property
+    def stretched_by(self) -> str | None:
+        """Name of the parameter that says by how much per time the reading becomes late, if there is one."""
+        return None
+
     def infer(self, numbers: Numbers, reading: Expression) -> Expression:
         """Return the value behind a reading: the inverse of :meth:`read`, but for rounding, noise and delay.
 

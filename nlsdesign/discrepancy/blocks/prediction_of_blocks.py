@@ -8,7 +8,8 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...errors import unknown_name
 from ...identification.equation_error.block import Block
-from ...identification.equation_error.evidence import Bench, measured_inputs
+from ...identification.equation_error.evidence import Bench
+from ...identification.equation_error.filter_choice import measured_inputs
 from ...identification.records.measurement import Record, RecordSet
 from ...model import flatten
 from ...simulation import RangeWarning, Trace, range_warnings, simulate
@@ -52,16 +53,16 @@ def predict(actuator: Assembly, records: RecordSet, name: str) -> Trace:
         for each in bench.evidence(bench.driven(block, []), chosen, {}):
             shown = block.target or block.output
             signals[shown], units[shown] = each.predicted({}), block.model.outputs[0].unit
-    warnings = {each.name: each for block in blocks for each in _range_warnings(block, chosen[0])}
+    warnings = {each.name: each for block in blocks for each in _range_warnings(block, chosen[0], bench)}
     return Trace(chosen[0].trace.time, signals, units, name, warnings=tuple(warnings.values()))
 
 
-def _range_warnings(block: Block, record: Record) -> tuple[RangeWarning, ...]:
+def _range_warnings(block: Block, record: Record, bench: Bench) -> tuple[RangeWarning, ...]:
     """Return where the measured motion takes a law of the block out of its stated range."""
     model, time = block.model, record.trace.time
     if not any(v.bounded for v in model.signals + model.states):
         return ()
-    rows = measured_inputs(block, record)
+    rows = measured_inputs(block, record, bench.filters[block.name].span)
     s = model.symbols()
     if any(v.bounded for v in model.states) or depends(s.signal, s.state):
         inputs = {v.name: row for v, row in zip(model.inputs, rows, strict=True)}

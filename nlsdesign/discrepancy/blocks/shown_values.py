@@ -46,5 +46,7 @@ def shown_values(model: FlatModel, record: Record, signal: str) -> Array:
     behind = ca.Function("behind", [symbol], [reading.inferred(symbol, numbers)])
     shown: Array = behind.map(len(values))(values[None, :]).full().ravel()
     delay = sum(model.values[name] for name in reading.delays)
+    stretch = sum(model.values[name] for name in reading.stretches)
     time = record.trace.time
-    return np.interp(time + delay, time, shown) if delay else shown
+    late = delay + stretch * (time - time[0])
+    return np.interp(time + late, time, shown) if delay or stretch else shown

@@ -27,7 +27,7 @@ from ...quantity import Quantity
 from .candidate import SOURCE, Unknown, numbers_of, wrapped
 from .effect import Edit, Effect, Form
 from .friction import number
-from .places import laws, stretched, turning_ties, wrapping
+from .places import effort_over_motion, laws, stretched, turning_ties, wrapping
 
 _CONTROL_VALUES = 7
 """Of the error of a contour: four spans, a quarter of the contour each."""
@@ -41,8 +41,12 @@ def _without_rate(assembly: Assembly) -> list[str]:
 
 def _stretchy(assembly: Assembly, path: str) -> Iterator[Edit]:
     edited = wrapped(assembly, path, "elastic", wrapping(StretchyCable, stiffness=number(1e5, "N/m")))
-    name = f"{path.rpartition('.')[0]}.elastic.stiffness"
-    yield Edit(edited, (Unknown(name, (3e4, 3e5), 1e3, 1e7, null=math.inf),))
+    name, (effort, motion) = (
+        f"{path.rpartition('.')[0]}.elastic.stiffness",
+        effort_over_motion(assembly, path),
+    )
+    stiffness = Unknown(name, (3.0, 30.0), 0.1, 1e4, f"{effort} / {motion}", null=math.inf)
+    yield Edit(edited, (stiffness,))
 
 
 def _pulled(assembly: Assembly) -> list[str]:

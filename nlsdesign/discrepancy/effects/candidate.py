@@ -26,8 +26,9 @@ class Unknown:
     lower, upper
         Bounds. Where both are positive the number is fitted on a logarithmic scale.
     of
-        Name of a signal of the declared model in whose largest value starts and bounds are counted; empty
-        where they are in SI.
+        Size in which starts and bounds are counted, as :class:`~.sizes.Sizes` reads it: for instance a signal
+        of the declared model, for its largest value on the records. Empty where they are in SI, as of angles,
+        shares and exponents, which have a size by themselves.
     null
         Value at which the effect vanishes: 0, 1 for a gain, infinity for a stiffness in series; ``None`` for
         a number that only shapes the effect, such as a time constant or an order.
@@ -148,6 +149,22 @@ def free_name(assembly: Assembly, name: str) -> str:
         The name wanted; a number is added where it is taken.
     """
     taken, number, free = {n for n, _ in assembly.parts}, 2, name
+    while free in taken:
+        free, number = f"{name}_{number}", number + 1
+    return free
+
+
+def free_inside(part: Part, name: str) -> str:
+    """Return a name that no part inside another has yet.
+
+    Parameters
+    ----------
+    part
+        That holds others.
+    name
+        The name wanted; a number is added where it is taken.
+    """
+    taken, number, free = set(part.children()), 2, name
     while free in taken:
         free, number = f"{name}_{number}", number + 1
     return free

@@ -1,51 +1,89 @@
-"""Effects of the drivetrain beside friction: ripple, backlash, a constant force."""
+"""Effects of the drivetrain beside friction: ripple, backlash, a shaft that twists, a constant force."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 from ...components import (
+    ROTATION,
     Assembly,
     Backlash,
-    ConstantForce,
-    GearedMotor,
+    ConstantLoad,
+    Dashpot,
+    GravityLoad,
+    HorizontalTorque,
     Inertia,
     Inertial,
     Rounded,
+    Spring,
     Tie,
     TorqueRipple,
+    parallel,
+    tie,
 )
+from ...components.mechanics.bodies import Free
+from ...quantity import Quantity
 from ..fitting.strategies import Continuation
-from .candidate import Unknown, wrapped
+from .candidate import Unknown, free_name, wrapped
 from .effect import Edit, Effect, Form
-from .friction import is_spring, number, tied
-from .places import sliding_bodies, turning_bodies, turning_ties, typical_torque, wrapping
+from .friction import number, tied
+from .places import (
+    domain_of,
+    restoring_ties,
+    sliding_bodies,
+    turning_bodies,
+    turns_per_turn,
+    wrapping,
+)
+from .sizes import QUICKEST, efforts_on
 
-_ORDERS = tuple(float(n) for n in range(4, 121, 2))
-"""Periods per turn where fits begin: cogging and teeth have even numbers of them."""
+_ORDERS = (*range(1, 37), *range(38, 121, 2))
+"""Periods per turn where fits begin; a start between two of them is reached from either."""
+_OF_A_MOTOR = (1, 2, 6, 7, 12, 14, 21, 24, 28, 42)
+"""Periods per turn of a motor: of its pole pairs, slots and what they have in common."""
+_SHARE_BEHIND = 0.2
+"""Part of an inertia that is put behind a shaft at first."""
 
 
 def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
     law = TorqueRipple(sine=number(0.0, "N*m"), cosine=number(0.0, "N*m"), order=number(1.0, "1"))
     edited, part = tied(assembly, "ripple", body, law)
-    torque = typical_torque(assembly, body)
+    torque = efforts_on(body)
+    shafts = (turns for turns in turns_per_turn(assembly, body) if turns != 1.0)
+    orders = sorted({float(n) for n in _ORDERS} | {turns * n for turns in shafts for n in _OF_A_MOTOR})
     unknowns = (
         Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, torque),
         Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, torque),
-        Unknown(f"{part}.order", _ORDERS, 2.0, 150.0, null=None),
+        Unknown(f"{part}.order", tuple(orders), 0.5 * orders[0], max(150.0, 1.2 * orders[-1]), null=None),
     )
     yield Edit(edited, unknowns)
 
 
 def _drivers(assembly: Assembly, name: str) -> list[str]:
+    """Return the bodies that turn freely at the ends of a tie, in the order in which it names them."""
     part = assembly[name]
     ends = part.between if isinstance(part, Tie) else ()
-    return [end for end in ends if isinstance(assembly[end], GearedMotor | Inertia)]
+    return [end for end in ends if isinstance(assembly[end], Free) and domain_of(assembly, end) == ROTATION]
 
 
 def _driven_springs(assembly: Assembly) -> list[str]:
-    return [name for name in turning_ties(assembly, is_spring) if _drivers(assembly, name)]
+    return [name for name in restoring_ties(assembly) if _drivers(assembly, name)]
+
+
+def _without_shaft(assembly: Assembly) -> list[str]:
+    """Return the turning bodies that no spring ties to another body with a motion of its own."""
+    coupled = set()
+    for name in restoring_ties(assembly):
+        ends = _drivers(assembly, name)
+        coupled |= set(ends) if len(ends) > 1 else set()
+    return [body for body in turning_bodies(assembly) if body not in coupled]
+
+
+def _rigidly_driven_springs(assembly: Assembly) -> list[str]:
+    bodies = _without_shaft(assembly)
+    return [name for name in _driven_springs(assembly) if _drivers(assembly, name)[0] in bodies]
 
 
 def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -56,7 +94,7 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
     """
     driver = _drivers(assembly, name)[0]
     whole = assembly.quantities()[f"{driver}.inertia"]
-    own = replace(whole.with_value(0.9 * whole.number, whole.source), spread=max(whole.spread, 0.15))
+    own = _reduced(whole, 0.9, 0.15)
     gap = number(0.01, "rad")
     behind = Inertial(inertia=number(0.1 * whole.number, "kg*m^2"))
     inertial = wrapping(Backlash, gap=gap, contact=behind)
@@ -72,8 +110,80 @@ def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
 
 
 def _constant(assembly: Assembly, body: str) -> Iterator[Edit]:
-    edited, part = tied(assembly, "offset", body, ConstantForce(load=number(0.0, "N")))
-    yield Edit(edited, (Unknown(f"{part}.load", (0.0,), -1e3, 1e3),))
+    domain = domain_of(assembly, body)
+    load = ConstantLoad(load=number(0.0, domain.effort_unit), domain=domain)
+    edited, part = tied(assembly, "offset", body, load)
+    yield Edit(edited, (Unknown(f"{part}.load", (0.0,), -2.0, 2.0, efforts_on(body)),))
+
+
+def _gravity(assembly: Assembly, body: str) -> Iterator[Edit]:
+    weight = HorizontalTorque(horizontal_torque=number(0.01, "N*m"))
+    load = GravityLoad(weight=weight, hanging_angle=number(0.0, "rad"))
+    edited, part = tied(assembly, "weight", body, load)
+    quarter = math.pi / 2.0
+    unknowns = (
+        Unknown(f"{part}.horizontal_torque", (0.2,), 1e-4, 3.0, efforts_on(body)),
+        # All directions; the bounds overlap, so that none of them stands at a bound.
+        Unknown(f"{part}.hanging_angle", (-2.0 * quarter, -quarter, 0.0, quarter), -5.0, 5.0, null=None),
+    )
+    yield Edit(edited, unknowns)
+
+
+def _reduced(whole: Quantity, share: float, spread: float) -> Quantity:
+    """Return what is left of an inertia of which a part is put elsewhere, with at least a spread."""
+    return replace(whole.with_value(share * whole.number, whole.source), spread=max(whole.spread, spread))
+
+
+def _shaft(assembly: Assembly, behind: str, inertia: Quantity) -> tuple[Assembly, str, tuple[Unknown, ...]]:
+    """Return the assembly with a second inertia behind a shaft that twists, its name, and what is open."""
+    second = _SHARE_BEHIND * inertia.number
+    body = free_name(assembly, "second_inertia")
+    edited = assembly.with_part(body, Inertia(inertia=number(second, "kg*m^2")))
+    shaft = free_name(edited, "shaft")
+    twist = parallel(
+        stiffness=Spring(stiffness=number(1.0, "N*m/rad")),
+        loss=Dashpot(damping=number(1e-3, "N*m*s/rad"), domain=ROTATION),
+    )
+    edited = edited.with_part(shaft, tie(twist, behind, body))
+    left = _reduced(inertia, 1.0 - _SHARE_BEHIND, 0.3)
+    name = next(n for n, q in assembly.quantities().items() if q is inertia and n.startswith(f"{behind}."))
+    edited = edited.with_values({name: left})
+    # Natural frequencies from about that of the quickest motion to twenty times as much; little loss.
+    unknowns = (
+        Unknown(f"{body}.inertia", (second,), 1e-3 * second, 5.0 * second, null=None),
+        Unknown(
+            f"{shaft}.stiffness.stiffness",
+            tuple(second * omega**2 for omega in (2.0, 4.0, 8.0)),
+            second * 0.1,
+            second * 1e4,
+            f"1 / {QUICKEST} / {QUICKEST}",
+            null=math.inf,
+        ),
+        Unknown(
+            f"{shaft}.loss.damping",
+            (0.2 * second,),
+            1e-5 * second,
+            50.0 * second,
+            f"1 / {QUICKEST}",
+            null=None,
+        ),
+    )
+    return edited, body, unknowns
+
+
+def _absorber(assembly: Assembly, body: str) -> Iterator[Edit]:
+    """Let a part of the inertia hang on a shaft; what acts on the body goes on acting on it."""
+    edited, _, unknowns = _shaft(assembly, body, assembly.quantities()[f"{body}.inertia"])
+    yield Edit(edited, unknowns)
+
+
+def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
+    """Put a shaft between a body and its load: the spring pulls at the second inertia from now on."""
+    part, driver = assembly[name], _drivers(assembly, name)[0]
+    assert isinstance(part, Tie)
+    edited, body, unknowns = _shaft(assembly, driver, assembly.quantities()[f"{driver}.inertia"])
+    ends = tuple(body if end == driver else end for end in part.between)
+    yield Edit(edited.with_part(name, replace(part, between=ends)), unknowns)
 
 
 torque_ripple = Effect(
@@ -103,6 +213,25 @@ backlash = Effect(
         ),
     ),
 )
+drivetrain_resonance = Effect(
+    "drivetrain_resonance",
+    "A second inertia behind a shaft that twists, between a body and its load or beside it.",
+    175,
+    (
+        Form(
+            _rigidly_driven_springs,
+            _two_masses,
+            "an oscillation of its own frequency after each jolt, between drive and load",
+            "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
+        ),
+        Form(
+            _without_shaft,
+            _absorber,
+            "an oscillation of its own frequency after each jolt of the drive",
+            "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
+        ),
+    ),
+)
 constant_force = Effect(
     "constant_force",
     "A force that never changes on a freely sliding body: an offset of the drive, a weight.",
@@ -113,7 +242,35 @@ constant_force = Effect(
             _constant,
             "a force that is the same forward and backward, at any speed and place",
             "Janot et al. 2019",
-            "constant force",
+            "constant load",
+        ),
+    ),
+)
+constant_torque = Effect(
+    "constant_torque",
+    "A torque that never changes on a freely turning body: an offset of the drive, a preloaded seal.",
+    75,
+    (
+        Form(
+            turning_bodies,
+            _constant,
+            "a torque that is the same forward and backward, at any speed and angle",
+            "Janot et al. 2019",
+            "constant load",
+        ),
+    ),
+)
+gravity_load = Effect(
+    "gravity_load",
+    "The weight of an arm on a body that turns in a vertical plane.",
+    77,
+    (
+        Form(
+            turning_bodies,
+            _gravity,
+            "a torque as the sine of the angle, once per turn, forward and backward alike",
+            "Newton 1687",
+            "gravity",
         ),
     ),
 )

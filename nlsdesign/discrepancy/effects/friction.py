@@ -1,27 +1,39 @@
-"""Effects of friction: dry, falling with speed, growing with load, drag."""
+"""Effects of friction: dry, falling with speed, growing with load, of one place, drag."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from ...components import (
-    ROTATION,
-    TRANSLATION,
     Assembly,
+    AsymmetricFriction,
     CoulombFriction,
     Element,
     LoadFriction,
-    Part,
     QuadraticDrag,
-    Spring,
+    SpotFriction,
     StribeckFriction,
-    Through,
+    WavyFriction,
     tie,
 )
+from ...components.core.domain import Domain
+from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
 from .candidate import SOURCE, Unknown, free_name, wrapped
 from .effect import Edit, Effect, Form
-from .places import sliding_bodies, turning_bodies, turning_ties, typical_torque
+from .places import (
+    beside,
+    domain_of,
+    driven_ties,
+    driving_end,
+    moving_bodies,
+    restoring_ties,
+    turning_bodies,
+)
+from .sizes import efforts_on
+
+Law = Callable[[Domain], Element]
+"""From a domain to a law, its numbers at some value."""
 
 
 def number(value: float, unit: str) -> Quantity:
@@ -55,106 +67,163 @@ def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[As
     return assembly.with_part(part, tie(element, body)), part
 
 
-def is_spring(part: Part) -> bool:
-    """Tell whether a part makes a tie a spring: a cam with what it stretches, or a spring itself.
+class Placed:
+    """A law of friction put on a body, or beside what a prescribed motion strains.
 
     Parameters
     ----------
-    part
-        Law of a part in the tie.
+    assembly
+        To be edited.
+    place
+        Name of a body that moves freely, or of a tie with no such body at an end.
+    name
+        Wanted for the law.
+    law
+        Made for the domain.
     """
-    return isinstance(part, Through | Spring)
+
+    def __init__(self, assembly: Assembly, place: str, name: str, law: Law) -> None:
+        if isinstance(assembly[place], Free):
+            domain, body = domain_of(assembly, place), place
+            self.assembly, self.path = tied(assembly, name, place, law(domain))
+            self.effort = efforts_on(place)
+        else:
+            domain, body = assembly.element(place).domain, driving_end(assembly, place)
+            self.assembly, self.path = beside(assembly, place, name, law(domain))
+            self.effort = f"{place}.{domain.effort}"
+        own = assembly[body].motion_names  # type: ignore[attr-defined]
+        self.motion, self.speed = (f"{body}.{each}" for each in own)
 
 
-def _springs(assembly: Assembly) -> list[str]:
-    return turning_ties(assembly, is_spring)
+def _coulomb(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        level = number(0.01, domain.effort_unit)
+        return CoulombFriction(sliding_effort=level, domain=domain).smooth()
+
+    put = Placed(assembly, place, "dry_friction", law)
+    yield Edit(put.assembly, (Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),))
 
 
-def _coulomb_turning(assembly: Assembly, body: str) -> Iterator[Edit]:
-    friction = CoulombFriction(sliding_effort=number(0.01, "N*m"), domain=ROTATION).smooth()
-    edited, part = tied(assembly, "dry_friction", body, friction)
-    torque = typical_torque(assembly, body)
-    yield Edit(edited, (Unknown(f"{part}.sliding_effort", (0.05,), 1e-4, 2.0, torque),))
+def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        level, speed = number(0.01, domain.effort_unit), number(0.2, domain.rate_unit)
+        return StribeckFriction(
+            sliding_effort=level, breakaway=level, stribeck_speed=speed, domain=domain
+        ).smooth()
 
-
-def _coulomb_sliding(assembly: Assembly, body: str) -> Iterator[Edit]:
-    friction = CoulombFriction(sliding_effort=number(1.0, "N"), domain=TRANSLATION).smooth()
-    edited, part = tied(assembly, "dry_friction", body, friction)
-    yield Edit(edited, (Unknown(f"{part}.sliding_effort", (10.0,), 1e-3, 1e4),))
-
-
-def _stribeck(assembly: Assembly, body: str) -> Iterator[Edit]:
-    friction = StribeckFriction(
-        sliding_effort=number(0.01, "N*m"),
-        breakaway=number(0.01, "N*m"),
-        stribeck_speed=number(0.2, "rad/s"),
-    ).smooth()
-    edited, part = tied(assembly, "dry_friction", body, friction)
-    torque = typical_torque(assembly, body)
+    put = Placed(assembly, place, "dry_friction", law)
     unknowns = (
-        Unknown(f"{part}.sliding_effort", (0.05,), 1e-4, 2.0, torque),
-        Unknown(f"{part}.breakaway", (0.05,), 1e-4, 2.0, torque),
-        Unknown(f"{part}.stribeck_speed", (0.1, 0.5), 0.02, 5.0, null=None),
+        Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),
+        Unknown(f"{put.path}.breakaway", (0.05,), 1e-4, 2.0, put.effort),
+        Unknown(f"{put.path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, put.speed, null=None),
     )
-    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
+    yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction",)})
+
+
+def _asymmetric(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        level = number(0.01, domain.effort_unit)
+        return AsymmetricFriction(sliding_effort=level, asymmetry=number(0.0, "1"), domain=domain).smooth()
+
+    put = Placed(assembly, place, "dry_friction", law)
+    unknowns = (
+        Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),
+        Unknown(f"{put.path}.asymmetry", (0.0,), -1.0, 1.0),
+    )
+    yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction", "constant_torque", "constant_force")})
 
 
 def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:
     def around(inner: str, element: Element) -> Element:
         return LoadFriction(members=((inner, element),), ratio=number(0.01, "1")).smooth()
 
-    yield Edit(wrapped(assembly, name, "driven", around), (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
+    outside = name in driven_ties(assembly)
+    edited = wrapped(assembly, name, "driven", around, read_outside=outside)
+    yield Edit(edited, (Unknown(f"{name}.ratio", (0.05,), 1e-4, 0.9),))
 
 
-def _drag(assembly: Assembly, body: str) -> Iterator[Edit]:
-    edited, part = tied(assembly, "drag", body, QuadraticDrag(drag=number(1e-3, "N*m*s^2/rad^2")))
-    yield Edit(edited, (Unknown(f"{part}.drag", (1e-3,), 1e-7, 10.0),))
+def _drag(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        unit = domain.unit("{effort}*s^2/{motion}^2")
+        return QuadraticDrag(drag=number(1e-3, unit), domain=domain)
 
+    put = Placed(assembly, place, "drag", law)
+    of = f"{put.effort} / {put.speed} / {put.speed}"
+    yield Edit(put.assembly, (Unknown(f"{put.path}.drag", (0.05,), 1e-6, 10.0, of),))
+
+
+def _spot(assembly: Assembly, place: str) -> Iterator[Edit]:
+    def law(domain: Domain) -> Element:
+        level, at = number(0.01, domain.effort_unit), number(0.0, domain.motion_unit)
+        width = number(0.1, domain.motion_unit)
+        return SpotFriction(sliding_effort=level, place=at, width=width, domain=domain).smooth()
+
+    put = Placed(assembly, place, "rubbing", law)
+    unknowns = (
+        Unknown(f"{put.path}.sliding_effort", (0.1,), 1e-4, 5.0, put.effort),
+        Unknown(f"{put.path}.place", (-0.7, -0.35, 0.0, 0.35, 0.7), -1.2, 1.2, put.motion, null=None),
+        Unknown(f"{put.path}.width", (0.15,), 0.01, 3.0, put.motion, null=None),
+    )
+    yield Edit(put.assembly, unknowns)
+
+
+def _wavy(assembly: Assembly, body: str) -> Iterator[Edit]:
+    zero = number(0.0, "N*m")
+    friction = WavyFriction(sliding_effort=number(0.01, "N*m"), sine=zero, cosine=zero).smooth()
+    edited, part = tied(assembly, "dry_friction", body, friction)
+    unknowns = (
+        Unknown(f"{part}.sliding_effort", (0.05,), 1e-4, 2.0, efforts_on(body)),
+        Unknown(f"{part}.sine", (0.0,), -2.0, 2.0, efforts_on(body)),
+        Unknown(f"{part}.cosine", (0.0,), -2.0, 2.0, efforts_on(body)),
+    )
+    yield Edit(edited, unknowns, {"simpler": ("coulomb_friction",)})
+
+
+def _forms(
+    edits: Callable[[Assembly, str], Iterator[Edit]], words: str, source: str, brings: str
+) -> Iterator[Form]:
+    """Yield the forms of friction on a body that moves freely, and beside what is strained from outside."""
+    for places, where in ((moving_bodies, ""), (driven_ties, " in the reading of a piece under test")):
+        yield Form(places, edits, words + where, source, brings)
+
+
+_DRY = "Coulomb 1785; Armstrong-Hélouvry 1991"
 
 coulomb_friction = Effect(
     "coulomb_friction",
-    "Dry friction on a freely turning or sliding body.",
+    "Dry friction on a body that turns or slides, or in a piece that is strained from outside.",
     10,
-    (
-        Form(
-            turning_bodies,
-            _coulomb_turning,
-            "a constant torque against the motion, that jumps where the speed changes sign",
-            "Coulomb 1785; Armstrong-Hélouvry 1991",
+    tuple(
+        _forms(
+            _coulomb,
+            "a constant effort against the motion, that jumps where the speed changes sign",
+            _DRY,
             "dry friction",
-        ),
-        Form(
-            sliding_bodies,
-            _coulomb_sliding,
-            "a constant force against the motion, that jumps where the speed changes sign",
-            "Coulomb 1785; Armstrong-Hélouvry 1991",
-            "dry friction",
-        ),
+        )
     ),
 )
 stribeck_friction = Effect(
     "stribeck_friction",
-    "Dry friction that falls with speed, on a freely turning body.",
+    "Dry friction that falls with speed, on a body that turns or slides.",
     20,
-    (
-        Form(
-            turning_bodies,
+    tuple(
+        _forms(
             _stribeck,
-            "a torque against the motion that is largest just off standstill",
+            "an effort against the motion that is largest just off standstill",
             "Stribeck 1902; Armstrong-Hélouvry 1991",
             "dry friction",
-        ),
+        )
     ),
 )
 load_dependent_friction = Effect(
     "load_dependent_friction",
-    "Friction in proportion to the torque that a spring puts on its drive.",
+    "Friction in proportion to the effort that a spring puts on what drives it.",
     30,
     (
         Form(
-            _springs,
+            restoring_ties,
             _loaded,
-            "a torque against the motion in proportion to the load",
+            "an effort against the motion in proportion to the load",
             "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",
             "load friction",
         ),
@@ -162,15 +231,48 @@ load_dependent_friction = Effect(
 )
 quadratic_drag = Effect(
     "quadratic_drag",
-    "Drag that grows with the square of the speed, on a freely turning body.",
+    "Drag that grows with the square of the speed, on a body that turns or slides.",
     40,
-    (
-        Form(
-            turning_bodies,
+    tuple(
+        _forms(
             _drag,
-            "a torque against the motion that grows with the square of the speed",
+            "an effort against the motion that grows with the square of the speed",
             "Newton 1687, book II; Batchelor 1967",
             "drag",
+        )
+    ),
+)
+asymmetric_friction = Effect(
+    "asymmetric_friction",
+    "Dry friction that differs between the two directions: the same as even friction beside a constant load.",
+    25,
+    tuple(
+        _forms(
+            _asymmetric,
+            "an effort against the motion that is larger in one direction",
+            "Coulomb 1785; Armstrong-Hélouvry 1991 (levels by direction)",
+            "dry friction",
+        )
+    ),
+)
+position_dependent_friction = Effect(
+    "position_dependent_friction",
+    "Dry friction that depends on the place: at one spot, or coming round with the angle.",
+    165,
+    (
+        Form(
+            moving_bodies,
+            _spot,
+            "an effort against the motion in one place only",
+            "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
+            "friction of a place",
+        ),
+        Form(
+            turning_bodies,
+            _wavy,
+            "a torque against the motion that is larger in one half of each turn",
+            "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
+            "dry friction",
         ),
     ),
 )

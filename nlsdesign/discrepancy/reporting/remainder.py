@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...identification.equation_error.filter_choice import rate_span
 from ...identification.records.measurement import RecordSet
 from ...identification.statistics.filters import derivative
 from ...quantity import with_unit
@@ -105,7 +106,9 @@ def remainder_of(judged: Sequence[Judged], records: RecordSet, rounded: Sequence
         Signals whose noise is rounding, as that of an encoder; the rate of the first is the speed.
     """
     block = judged[0].block
-    rows = [_rows(each, records, [*rounded, *records.signals][0]) for each in judged]
+    motion = [*rounded, *records.signals][0]
+    span = rate_span(records.records, motion)
+    rows = [_rows(each, records, motion, span) for each in judged]
     size = float(np.sqrt(np.mean(np.concatenate([r.error for r in rows]) ** 2)))
     floor = float(np.sqrt(np.mean(np.concatenate([j.floor.sigma for j in judged]) ** 2)))
     own = block.target or block.output
@@ -121,10 +124,11 @@ def remainder_of(judged: Sequence[Judged], records: RecordSet, rounded: Sequence
     return Remainder(block.name, own, unit, size, floor, kind, ranked, formula)
 
 
-def _rows(each: Judged, records: RecordSet, motion: str) -> _Rows:
+def _rows(each: Judged, records: RecordSet, motion: str, span: float) -> _Rows:
     trace, places = each.record.trace, each.floor.places
     signals = {s: trace[s][places] for s in records.signals}
-    signals[f"rate of {motion}"] = derivative(trace[motion], each.record.step, order=1)[places]
+    rate = derivative(trace[motion], each.record.step, order=1, span=span)
+    signals[f"rate of {motion}"] = rate[places]
     return _Rows(each.error, trace.time[places] - trace.time[0], signals, each.record.role == "fit")
 
 

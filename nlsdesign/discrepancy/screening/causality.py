@@ -23,6 +23,8 @@ from ..blocks.shown_values import shown_values
 Array = NDArray[np.float64]
 
 _QUICK_OVER_SLOW = 3.0
+_SPANS = 50
+"""Spans in a record over which its rate is taken: enough for thirty periods."""
 """Ratio of paces of records from which a constant delay can be told from another cause."""
 
 
@@ -77,7 +79,7 @@ def lagging_forces(assembly: Assembly, records: RecordSet) -> LaggingForces:
 
 def _pace(path: Array, step: float) -> float:
     """Return a typical angular frequency: rate over size, root mean squares."""
-    rate = derivative(path, step, order=1)
+    rate = derivative(path, step, order=1, span=len(path) * step / _SPANS)
     return float(np.sqrt(np.mean(rate**2)) / max(float(np.std(path)), 1e-300))
 
 

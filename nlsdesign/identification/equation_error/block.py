@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import casadi as ca
 
 from ...model import FlatModel
 
@@ -20,11 +22,19 @@ class Drive(NamedTuple):
         0 for its value, 1 for its rate, 2 for the derivative of that.
     late_by
         Names of the parameters whose sum says by how much the signal comes late.
+    stretched_by
+        Names of the parameters whose sum says by how much per time it becomes late.
     """
 
     signal: str
     order: int = 0
     late_by: tuple[str, ...] = ()
+    stretched_by: tuple[str, ...] = ()
+
+    @property
+    def shifted_by(self) -> tuple[str, ...]:
+        """Names of all parameters that shift the signal in time."""
+        return self.late_by + self.stretched_by
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +53,11 @@ class Block:
         Name of the model's only output.
     target
         Full name of the measured signal that the output must equal; ``None`` if it must vanish.
-    width
-        Standard deviation, in samples, of the zero-phase Gaussian filter that every term passes.
     moving
         Name of the input that must be well away from zero for the block to say anything (dry friction at
         rest can be anything); ``None`` if there is no such input.
+    effort_per_drive
+        Constant factor in the output, where that is the error of a measured signal shown as an effort.
     """
 
     name: str
@@ -55,8 +65,24 @@ class Block:
     drives: Mapping[str, Drive]
     output: str
     target: str | None
-    width: float
     moving: str | None = None
+    effort_per_drive: float = 1.0
+
+    def scaled_to(self, effort_per_drive: float) -> Block:
+        """Return the block with another constant factor in its output.
+
+        Parameters
+        ----------
+        effort_per_drive
+            That of the declared model, so that all hypotheses are judged in one scale.
+        """
+        if effort_per_drive == self.effort_per_drive:
+            return self
+        s, model = self.model.symbols(), self.model
+        columns = [s.time, s.state, s.input, s.parameter, s.table]
+        output = s.output * (effort_per_drive / self.effort_per_drive)
+        equations = ca.Function("equations", columns, [s.derivative, output, s.signal, s.residual])
+        return replace(self, model=replace(model, equations=equations), effort_per_drive=effort_per_drive)
 
     @property
     def unit(self) -> str:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
@@ -16,54 +15,25 @@ from ...quantity import with_unit
 from ...simulation import Trace
 from ..records.canonical_order import in_canonical_order
 from ..records.measurement import Record, RecordSet
-from ..statistics.filters import derivative, noise_gain, rate_noise_gain, smoothing
-from .block import Block
+from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
+from ..statistics.metrics import rmse
+from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
+from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces
+from .noise import Noise as Noise
+from .noise import estimate_noise as estimate_noise
 
 Array = NDArray[np.float64]
 
-STRIDE = 5
-"""Of so many filtered samples one is kept: the filters leave no more information."""
-SLOW = 10.0
-"""A moving block says nothing where its speed is below so many times the noise of the speed."""
+_NOISY, _SMEARED = 5.0, 0.04
+"""A moving block says nothing where its speed is below so many times the noise of the speed, and so much of
+its root mean square over the record: where friction bends the motion at a reversal, a rate over a span of
+1.5 radians misses by a twentieth of span and jump of the acceleration."""
+_SLOW_SHARE = 1e-2
+"""Of the filter of a row that may reach into a reversal."""
 _LEAST_ROWS = 20
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviation of the noise of each measured signal, in SI, and whether it is mere rounding."""
-
-    level: Mapping[str, float]
-    rounded: Mapping[str, bool]
-
-
-def estimate_noise(records: RecordSet) -> Noise:
-    """Estimate the noise of every channel from the records themselves.
-
-    Parameters
-    ----------
-    records
-        All of them; the median over the records is taken.
-
-    Returns
-    -------
-    Noise
-        At least that of rounding, quantum/√12. Declared noise is not used: it is a claim.
-    """
-    level, rounded = {}, {}
-    for column in records.columns:
-        resolutions = [r.resolution_of(column.signal) for r in records.records]
-        white = float(np.median([g.noise for g in resolutions]))
-        # The count of a resampled signal is that of its samples before, as it weighs on the new clock.
-        kept = any(column.signal in r.resolution for r in records.records)
-        declared = 0.0 if kept else column.quantum
-        quantum = declared or float(np.median([g.quantum for g in resolutions]))
-        rounding = quantum / np.sqrt(12.0)
-        level[column.signal] = max(white, rounding)
-        rounded[column.signal] = white < 2.0 * rounding
-    return Noise(level, rounded)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,19 +50,17 @@ class Floor:
         Noise floor of each unfiltered sample, shape (n,): only for blocks with a target.
     """
 
-    filter: scipy.sparse.csr_array
+    filter: Smoothing
     sigma: Array
     raw_sigma: Array
 
     @property
     def places(self) -> NDArray[np.int64]:
         """Index of the sample in the middle of each row."""
-        first, behind = self.filter.indptr[:-1], self.filter.indptr[1:]
-        result: NDArray[np.int64] = self.filter.indices[(first + behind) // 2].astype(np.int64)
-        return result
+        return self.filter.places
 
 
-def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
+def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) -> Floor:
     """Return filter and noise floor of a block on a record.
 
     The noise of each input is carried to the output by the slope of the output with respect to it.
@@ -105,66 +73,53 @@ def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
         Holds all signals that drive the block.
     noise
         Of the measured signals.
+    filters
+        Of the block.
     """
-    n = len(record.trace)
-    matrix = smoothing(n, block.width, STRIDE)
+    n, step, span = len(record.trace), record.step, filters.span
+    stride = max(1, round(filters.spacing / step))
+    margin = max(len(difference(d.order, span / step)) // 2 for d in block.drives.values())
+    matrix = smoothing(n, filters.width / step, stride, margin=margin)
     masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
-    matrix = matrix[np.flatnonzero((matrix != 0.0) @ masked.astype(float) == 0.0)]
-    inputs = measured_inputs(block, record)
+    matrix = matrix[~matrix.touched_by(masked)]
+    inputs = measured_inputs(block, record, span)
     if block.moving is not None:
         speed = np.abs(inputs[[v.name for v in block.model.inputs].index(block.moving)])
-        level = noise.level[block.drives[block.moving].signal] * rate_noise_gain() / record.step
+        noisy = _NOISY * _rate_noise(block.drives[block.moving], noise, record.step, span)
         # The filter smears what happens at a reversal; so its whole reach must be in motion.
-        slow = (speed < SLOW * level).astype(float)
-        matrix = matrix[np.flatnonzero(matrix @ slow < 1e-3)]
-    variance, raw = _variances(block, record, noise, inputs)
-    floor = Floor(matrix, np.zeros(0), np.sqrt(raw))
-    return replace(floor, sigma=np.sqrt(variance[floor.places]))
+        slow = (speed < math.hypot(noisy, _SMEARED * rmse(speed))).astype(float)
+        matrix = matrix[np.flatnonzero(matrix @ slow < _SLOW_SHARE)]
+    variance, raw = _variances(block, record, noise, filters, inputs)
+    return Floor(matrix, np.sqrt(variance[matrix.places]), np.sqrt(raw))
 
 
-def measured_inputs(block: Block, record: Record) -> Array:
-    """Return the inputs of a block's model from a record, shape (inputs, n); those not measured rest.
-
-    Parameters
-    ----------
-    block
-        As declared.
-    record
-        Holds all signals that drive the block.
-    """
-    model = block.model
-    inputs = np.repeat(model.start(model.inputs)[:, None], len(record.trace), axis=1)
-    for i, variable in enumerate(model.inputs):
-        if variable.name in block.drives:
-            drive = block.drives[variable.name]
-            inputs[i] = derivative(record.trace[drive.signal], record.step, order=drive.order)
-    return inputs
+def _rate_noise(drive: Drive, noise: Noise, step: float, span: float) -> float:
+    """Return the noise of a rate, measured itself or the derivative of a motion."""
+    return noise.behind(drive.signal, filter_weights(0.0, drive.order, step, span), step)
 
 
-def _variances(block: Block, record: Record, noise: Noise, inputs: Array) -> tuple[Array, Array]:
-    s, model = block.model.symbols(), block.model
-    slope = ca.Function(
-        "slope", [s.state, s.input, s.parameter, s.table], [ca.densify(ca.jacobian(s.output, s.input))]
-    )
-    places = np.arange(0, inputs.shape[1], STRIDE)
-    start, values = model.start(model.states), model.start(model.parameters)
-    flat = slope.map(len(places))(start, inputs[:, places], values, np.zeros(0)).full()
-    gains = flat.reshape(len(places), -1).T
-    own = noise.level[block.target] if block.target else 0.0
-    variance = np.full(len(places), (own * noise_gain(block.width, 0)) ** 2)
-    raw = np.full(len(places), own**2)
+def _variances(
+    block: Block, record: Record, noise: Noise, filters: Filters, inputs: Array
+) -> tuple[Array, Array]:
+    model, step = block.model, record.step
+    stride = max(1, round(filters.spacing / step))
+    gains = output_slopes(block, inputs, stride)
+    own = noise.behind(block.target, filter_weights(filters.width, 0, step), step) if block.target else 0.0
+    variance = np.full(gains.shape[1], own**2)
+    raw = np.full(gains.shape[1], noise.deviation(block.target) ** 2 if block.target else 0.0)
     for i, variable in enumerate(model.inputs):
         drive = block.drives.get(variable.name)
         if drive is None:
             continue
-        level = noise.level[drive.signal]
         # Rounding of a signal at rest is a constant error that no filter takes away.
         constant = noise.rounded[drive.signal] and drive.order == 0
-        gain = 1.0 if constant else noise_gain(block.width, drive.order) / record.step**drive.order
-        variance += (gains[i] * level * gain) ** 2
-        raw += (gains[i] * level) ** 2 if drive.order == 0 else 0.0
-    every = np.minimum(np.arange(inputs.shape[1]) // STRIDE, len(places) - 1)
-    return variance[every], raw[every]
+        weights = filter_weights(filters.width, drive.order, step, filters.span)
+        deviation = noise.deviation(drive.signal)
+        behind = deviation if constant else noise.behind(drive.signal, weights, step)
+        variance += (gains[i] * behind) ** 2
+        raw += (gains[i] * deviation) ** 2 if drive.order == 0 else 0.0
+    every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
+    return variance[every_row], raw[every_row]
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +172,10 @@ class Bench:
         All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
     blocks
         Of the declared model; they fix rows and noise floor.
+    noise
+        Of the measured signals, where it is known from other records of the same bench.
+    filters
+        By name of the block, where they were chosen for other records of the same bench.
 
     Raises
     ------
@@ -224,17 +183,31 @@ class Bench:
         If no record moves enough to say anything about a block.
     """
 
-    def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
+    def __init__(
+        self,
+        records: RecordSet,
+        blocks: Sequence[Block],
+        *,
+        noise: Noise | None = None,
+        filters: Mapping[str, Filters] | None = None,
+    ) -> None:
+        self._blocks = tuple(blocks)
         self.records = in_canonical_order(records)
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
-        self.noise = estimate_noise(self.records)
+        self.noise = noise or estimate_noise(self.records, {b.target for b in blocks if b.target})
+        self.filters: dict[str, Filters] = dict(filters or {})
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
+        self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
+        new = [block for block in blocks if block.name not in self.filters]
+        pace = paces(new, self._seen, self.noise)
         for block in blocks:
             self._check_alive(block)
+            if block.name not in self.filters:
+                self.filters[block.name] = chosen_filters(block, self._seen, self.noise, pace)
             for record in self.records.records:
-                floor = noise_floor(block, record, self.noise)
+                floor = noise_floor(block, record, self.noise, self.filters[block.name])
                 if len(floor.sigma) >= _LEAST_ROWS:
                     self.floors[block.name, record.name] = floor
             if not any(name == block.name for name, _ in self.floors):
@@ -244,8 +217,23 @@ class Bench:
                     next_step=self._what_would(block),
                 )
 
+    @property
+    def _seen(self) -> tuple[Record, ...]:
+        """Records that may decide on filters: those held out only where there are no others."""
+        return self.records.of("fit", "selection") or self.records.records
+
+    def with_records(self, records: RecordSet) -> Bench:
+        """Return other records of the same bench as they are seen with the same noise and filters.
+
+        Parameters
+        ----------
+        records
+            All records.
+        """
+        return Bench(records, self._blocks, noise=self.noise, filters=self.filters)
+
     def _check_alive(self, block: Block) -> None:
-        if block.target is None or self.noise.level[block.target] > 0.0:
+        if block.target is None or self.noise.deviation(block.target) > 0.0:
             return
         head = self.records.column(block.target).name
         reasons = [
@@ -260,13 +248,14 @@ class Bench:
     def _what_would(self, block: Block) -> str:
         """Return which motion would say something about a block."""
         if block.moving is None:
-            return f"records need at least {STRIDE * _LEAST_ROWS} samples; record for longer"
-        signal = block.drives[block.moving].signal
-        step = min(r.step for r in self.records.records)
-        least = SLOW * self.noise.level[signal] * rate_noise_gain() / step
-        unit = self.records.records[0].trace.units[signal]
-        rate = with_unit(f"{least:.3g}", f"{unit}/s")
-        return f"record a motion in which {signal} changes faster than {rate}, for seconds on end"
+            least = _LEAST_ROWS * self.filters[block.name].spacing
+            return f"records need at least {least:.2g} s; record for longer"
+        drive, span = block.drives[block.moving], self.filters[block.name].span
+        least = min(_NOISY * _rate_noise(drive, self.noise, r.step, span) for r in self.records.records)
+        unit = self.records.records[0].trace.units[drive.signal]
+        rate = with_unit(f"{least:.3g}", f"{unit}/s" if drive.order else unit)
+        moves = "changes faster" if drive.order else "is larger"
+        return f"record a motion in which {drive.signal} {moves} than {rate}, for seconds on end"
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
@@ -279,8 +268,11 @@ class Bench:
             As for :class:`~.block_response.DrivenBlock`. The records that fits may see decide what is stiff;
             if there are none, as where a finished model is only looked at, all do.
         """
+        filters = self.filters.get(block.name)
+        span = filters.span if filters else 0.0
         records = self.records.of("fit") or self.records.records
-        return DrivenBlock(block, free, records=records, values=values)
+        block = block.scaled_to(self._scales.get(block.name, block.effort_per_drive))
+        return DrivenBlock(block, free, records=records, values=values, span=span)
 
     def evidence(
         self,
@@ -334,13 +326,13 @@ class Bench:
             trace = record.trace
             counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
             raw = self.floors[block, record.name].raw_sigma[::k][counted]
-            one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr")[::k])
+            one = every(len(trace), k)
             masked = record.masked
             if not whole:
                 trace = Trace(
                     trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
                 )
-                one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr"))
+                one = every(len(trace), 1)
                 masked = {n: m[::k] for n, m in masked.items()}
             self._thin[key] = replace(record, trace=trace, masked=masked), Floor(one[counted], raw, raw)
         return self._thin[key]

@@ -18,14 +18,12 @@ from ...errors import ConvergenceError, unknown_name
 from ...model import FlatModel
 from ...model.structure import body_moved_by
 from ...symbolic import Expression
+from ..equation_error.filter_choice import rate_span
 from ..records.measurement import Record
 from ..statistics.filters import derivative
 from .wiring import Wiring
 
 Array = NDArray[np.float64]
-
-_BEYOND = 20
-"""Samples by which a record is continued before its rate is taken: the reach of the filter."""
 
 
 class Shot(NamedTuple):
@@ -77,7 +75,9 @@ class Windows:
         for i, variable in enumerate(model.inputs):
             if variable.name in wiring.inputs:
                 drive = wiring.inputs[variable.name]
-                inputs[i] = derivative(record.trace[drive.signal], record.step, order=drive.order)
+                span = rate_span([record], drive.signal) if drive.order else 0.0
+                values = record.trace[drive.signal]
+                inputs[i] = derivative(values, record.step, order=drive.order, span=span)
         padded = np.minimum(np.arange(self.number * self.count + 1), n - 1)
         filled = inputs[:, padded]
         self.ends = ca.DM(np.vstack([filled[:, :-1], filled[:, 1:]]))
@@ -129,15 +129,10 @@ def _seen(model: FlatModel, wiring: Wiring, record: Record) -> dict[int, Array]:
             seen[names.index(output)] = record.trace[signal]
             body = body_moved_by(model.bodies, output)
             if body and body.rate in names and body.rate not in wiring.outputs.values():
-                seen[names.index(body.rate)] = _speed(record.trace[signal], record.step)
+                span = rate_span([record], signal)
+                rate = derivative(record.trace[signal], record.step, order=1, span=span)
+                seen[names.index(body.rate)] = rate
     return seen
-
-
-def _speed(motion: Array, step: float) -> Array:
-    """Return the smoothed rate; beyond the ends the motion goes on as it came, mirrored through the end."""
-    beyond = min(_BEYOND, len(motion) - 1)
-    longer = np.pad(motion, beyond, mode="reflect", reflect_type="odd")
-    return derivative(longer, step, order=1)[beyond:-beyond]
 
 
 class Shooter:

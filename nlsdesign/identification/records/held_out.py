@@ -1,4 +1,4 @@
-"""Which records to hold out by default: those that the others surround, whatever the files are called."""
+"""Which records to hold out by default: those most like another one, whatever the files are called."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
 
     A record is described by its length and, for every signal, by its smallest and largest value, its usual
     rate, and how unevenly it moves: the root mean square of the rate over its mean size, large where motion
-    alternates with rest.
-    Held out, one after the other, is the record nearest to the middle of the range of those that are left,
-    so that it is predicted by interpolation. Among equals it is the one of the smallest motion.
+    alternates with rest. Held out, one after the other, is a record of the pair that is most alike among those
+    that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of all, so
+    that it is predicted by interpolation, and among equals the one of the smaller motion.
 
     Parameters
     ----------
@@ -41,7 +41,8 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     chosen: list[int] = []
     while len(chosen) < (len(traces) + 1) // _SHARE:
         distance = dict(zip(left, _distance(marks[left]), strict=True))
-        rank = {k: (distance[k], _extent(marks, k), content_digest(traces[k])) for k in left}
+        apart = dict(zip(left, _to_nearest(marks[left]), strict=True))
+        rank = {k: (apart[k], distance[k], _extent(marks, k), content_digest(traces[k])) for k in left}
         best = min(left, key=rank.__getitem__)
         chosen.append(best)
         left.remove(best)
@@ -93,6 +94,15 @@ def _distance(marks: Array) -> list[float]:
     low, high = marks.min(axis=0), marks.max(axis=0)
     share = (marks - low) / np.where(high > low, high - low, 1.0)
     return [round(float(d), _DIGITS) for d in np.mean((share - 0.5) ** 4, axis=1)]
+
+
+def _to_nearest(marks: Array) -> list[float]:
+    """Return the distance of each record to the one most like it, marks counted in their ranges."""
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    share = (marks - low) / np.where(high > low, high - low, 1.0)
+    apart = np.sqrt(np.mean((share[:, None] - share[None]) ** 2, axis=2))
+    np.fill_diagonal(apart, np.inf)
+    return [round(float(d), _DIGITS) for d in apart.min(axis=1)]
 
 
 def _extent(marks: Array, row: int) -> float:

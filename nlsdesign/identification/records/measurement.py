@@ -140,6 +140,30 @@ class RecordSet:
         """
         return tuple(r for r in self.records if r.role in roles)
 
+    def without_held_out(self) -> RecordSet:
+        """Return the records that may choose anything, with the findings about them.
+
+        Raises
+        ------
+        MeasurementError
+            If all records are held out.
+        """
+        kept = tuple(r for r in self.records if r.role != "held_out")
+        if not kept:
+            raise MeasurementError(
+                "records",
+                "are all held out, so nothing can be fitted",
+                next_step="hold out some of them only",
+            )
+        held = [r.source or r.name for r in self.records if r.role == "held_out"]
+        others = [r.source or r.name for r in kept]
+        findings = tuple(
+            f
+            for f in self.findings
+            if not any(f.place.startswith(s) for s in held) or any(f.place.startswith(s) for s in others)
+        )
+        return replace(self, records=kept, findings=findings)
+
     def column(self, signal: str) -> Column:
         """Return the column that measures a signal.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -10,22 +11,37 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_ORDERS, _PLAINLY = (4, 8, 12), 0.6
 _MEDIAN_OF_NORMAL = 0.6744897501960817
 
 
 def noise_of(signal: Array) -> float:
     """Estimate the standard deviation of the white noise in a sampled signal.
 
-    The fourth difference removes everything smooth; its median size is that of the noise. Source:
+    The fourth difference removes everything smooth; its median size is that of the noise. Where differences
+    of higher order are plainly smaller, the signal moves fast for its sampling, and these are taken. Source:
     von Neumann et al. 1941 (the idea); Gasser et al. 1986 (a robust form).
 
     Parameters
     ----------
     signal
-        Shape (n,), sampled much faster than it moves.
+        Shape (n,), sampled faster than ten times a period.
     """
-    differences = np.convolve(signal, _DIFFERENCE, mode="valid") / np.sqrt(np.sum(_DIFFERENCE**2))
+    level = _difference_level(signal, _ORDERS[0])
+    for order in _ORDERS[1:]:
+        higher = _difference_level(signal, order)
+        if higher >= _PLAINLY * level:
+            break
+        level = higher
+    return level
+
+
+def _difference_level(signal: Array, order: int) -> float:
+    """Return the standard deviation of white noise whose differences of an order have this median size."""
+    weights = np.array([(-1.0) ** k * math.comb(order, k) for k in range(order + 1)])
+    if len(signal) <= order:
+        return 0.0
+    differences = np.convolve(signal, weights, mode="valid") / np.linalg.norm(weights)
     return float(np.median(np.abs(differences)) / _MEDIAN_OF_NORMAL)
 
 

@@ -1,0 +1,283 @@
+"""How wide the filter of a block is: in seconds, from the motion and its noise, the same for all hypotheses.
+
+All terms of a balance pass one filter, so what it takes from the motion biases nothing; noise does. A noisy
+acceleration a + n in a balance J·a = T makes the inertia too small by the share var(n)/var(a), which no
+number of samples removes, while the standard error falls with their root. So the filter is widened until
+that bias is below a fifth of the standard error, but not beyond half the power of the motion.
+Source: Fuller 1987 (attenuation by errors in variables).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import MeasurementError
+from ..records.measurement import Record
+from ..statistics.filters import derivative, filter_weights, filtered
+from .block import Block
+from .noise import Noise
+
+Array = NDArray[np.float64]
+
+READING, BALANCE = 0.1, 0.2
+"""Least widths, as radians of the typical motion. A balance holds a second derivative."""
+SPAN = 1.5
+"""Span of a rate in radians of the typical motion, of which it keeps all but a thousandth."""
+SPACING = 1.25
+"""Widths from one row to the next, of the filter of a balance: there is no more information."""
+_TYPICAL = 0.01
+"""Share of noise in the power of the acceleration below which the pace of a motion can be told."""
+_BIAS = 0.2
+"""Standard errors of which a bias is let pass: it takes a share of 0.6 % from a 95 % interval."""
+_LEFT = 0.5
+"""Share of the power of the motion that a filter leaves at least."""
+_COARSEST = 6.0
+"""Samples per period of the typical motion below which derivatives are not known."""
+_STEP = 2.0**0.25
+_PROBES = 2000
+"""Rows of a record on which the power of a motion is estimated at most."""
+
+
+class Filters(NamedTuple):
+    """How a block reads its records.
+
+    Parameters
+    ----------
+    width
+        Standard deviation in s of the zero-phase Gaussian filter that every term passes.
+    span
+        Time in s over which rates are taken.
+    spacing
+        Time in s from one row to the next.
+    """
+
+    width: float
+    span: float
+    spacing: float
+
+
+def pace_of(signals: Sequence[tuple[Array, float]], noise: float) -> float:
+    """Return the typical angular frequency of a motion in rad/s: acceleration over rate, root mean squares.
+
+    Both behind the narrowest filter that makes the noise of the acceleration small; zero where none does.
+
+    Parameters
+    ----------
+    signals
+        Of each record, shape (n,), with the time between samples in s.
+    noise
+        Standard deviation of its white noise.
+    """
+    for width in _widths(0.5 * min(step for _, step in signals), signals):
+        power, share = _power(signals, width, (2, 0.0), noise)
+        rate, _ = _power(signals, width, (1, 0.0), noise)
+        if power > 0.0 and rate > 0.0 and share <= _TYPICAL * (power + share):
+            return math.sqrt(power / rate)
+    return 0.0
+
+
+def rate_span(records: Sequence[Record], signal: str) -> float:
+    """Return the time in s over which the rate of a measured signal is taken; zero where it does not move.
+
+    Parameters
+    ----------
+    records
+        All that are compared.
+    signal
+        Full name.
+    """
+    resolutions = [r.resolution_of(signal) for r in records]
+    noise = float(np.median([max(g.noise, g.quantum / math.sqrt(12.0)) for g in resolutions]))
+    pace = pace_of([(r.trace[signal], r.step) for r in records], noise)
+    return SPAN / pace if pace else 0.0
+
+
+def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> dict[str, float]:
+    """Return the pace in rad/s of every signal that decides on a filter.
+
+    Parameters
+    ----------
+    blocks
+        As declared.
+    records
+        Those that fits may see.
+    noise
+        Of the measured signals.
+    """
+    signals = dict.fromkeys(signal for block in blocks for signal in _deciding(block))
+    return {s: pace_of([(r.trace[s], r.step) for r in records], noise.deviation(s)) for s in signals}
+
+
+def _deciding(block: Block) -> list[str]:
+    """Return the motions whose rates drive a block; all that drives it where there are none."""
+    drives = block.drives.values()
+    return [d.signal for d in drives if d.order > 0] or [d.signal for d in drives]
+
+
+def chosen_filters(
+    block: Block, records: Sequence[Record], noise: Noise, pace_by_signal: Mapping[str, float]
+) -> Filters:
+    """Return the filters of a block for all records of a set and all hypotheses.
+
+    Parameters
+    ----------
+    block
+        As declared.
+    records
+        Those that fits may see.
+    noise
+        Of the measured signals.
+    pace_by_signal
+        From :func:`paces`.
+
+    Raises
+    ------
+    MeasurementError
+        If the motion is sampled too coarsely for derivatives.
+    """
+    moving = any(d.order > 0 for d in block.drives.values())
+    seen = dict.fromkeys(_deciding(block))
+    pace = max((pace_by_signal[signal] for signal in seen), default=0.0)
+    shortest = min(r.step for r in records)
+    if pace == 0.0:
+        return Filters(0.0, 0.0, shortest)
+    if moving and 2.0 * math.pi < _COARSEST * pace * max(r.step for r in records):
+        raise _too_coarse(block, list(seen), pace, records)
+    least, span = (READING if block.target else BALANCE) / pace, SPAN / pace
+    spacing = SPACING * BALANCE / pace
+    width = _unbiased_width(block, records, noise, (least, span)) if moving else least
+    return Filters(width, span, max(spacing, SPACING * width))
+
+
+def output_slopes(block: Block, inputs: Array, stride: int) -> Array:
+    """Return the derivative of a block's output with respect to each input, shape (inputs, rows).
+
+    Parameters
+    ----------
+    block
+        As declared.
+    inputs
+        Shape (inputs, n).
+    stride
+        Of so many samples one is looked at.
+    """
+    s, model = block.model.symbols(), block.model
+    slope = ca.Function(
+        "slope", [s.state, s.input, s.parameter, s.table], [ca.densify(ca.jacobian(s.output, s.input))]
+    )
+    some = inputs[:, ::stride]
+    start, values = model.start(model.states), model.start(model.parameters)
+    flat = slope.map(some.shape[1])(start, some, values, np.zeros(0)).full()
+    return np.asarray(flat.reshape(some.shape[1], -1).T, dtype=np.float64)
+
+
+def measured_inputs(block: Block, record: Record, span: float) -> Array:
+    """Return the inputs of a block's model from a record, shape (inputs, n); those not measured rest.
+
+    Parameters
+    ----------
+    block
+        As declared.
+    record
+        Holds all signals that drive the block.
+    span
+        Time in s over which rates are taken.
+    """
+    model = block.model
+    inputs = np.repeat(model.start(model.inputs)[:, None], len(record.trace), axis=1)
+    for i, variable in enumerate(model.inputs):
+        if variable.name in block.drives:
+            drive = block.drives[variable.name]
+            inputs[i] = derivative(record.trace[drive.signal], record.step, order=drive.order, span=span)
+    return inputs
+
+
+def _unbiased_width(
+    block: Block, records: Sequence[Record], noise: Noise, least_and_span: tuple[float, float]
+) -> float:
+    """Return the narrowest width at which no derivative biases its factor, or the widest that is allowed."""
+    least, span = least_and_span
+    gains = _mean_square_slopes(block, records, span)
+    drives = {n: d for n, d in block.drives.items() if n in gains}
+    sloped = {n: d for n, d in drives.items() if d.order > 0}
+    runs = {d.signal: [(r.trace[d.signal], r.step) for r in records] for d in drives.values()}
+    duration = sum(r.step * len(r.trace) for r in records)
+    step = float(np.median([r.step for r in records]))
+    whole: dict[str, float] = {}
+    best = least
+    for width in _widths(least, [run for each in runs.values() for run in each]):
+        rows = duration / max(2.0 * math.sqrt(math.pi) * width, step)
+        noises = {
+            n: noise.behind(d.signal, filter_weights(width, d.order, step, span), step) ** 2
+            for n, d in drives.items()
+        }
+        total = sum(gains[n] * noises[n] for n in drives)
+        if block.target:
+            total += noise.behind(block.target, filter_weights(width, 0, step), step) ** 2
+        bias = 0.0
+        for name, drive in sloped.items():
+            seen = _power(runs[drive.signal], width, (drive.order, span), 0.0)[0]
+            power = max(seen - noises[name], 0.0)
+            whole.setdefault(name, power)
+            if power <= _LEFT * whole[name] and width > least:
+                return best
+            if power > 0.0 and total > 0.0:
+                bias = max(bias, noises[name] * math.sqrt(gains[name] * rows / (power * total)))
+        best = width
+        if bias <= _BIAS:
+            return width
+    return best
+
+
+def _mean_square_slopes(block: Block, records: Sequence[Record], span: float) -> dict[str, float]:
+    """Return the mean square of the slope of the output with respect to each driven input."""
+    squares = []
+    for record in records:
+        stride = max(1, len(record.trace) // _PROBES)
+        slopes = output_slopes(block, measured_inputs(block, record, span), stride)
+        squares.append(np.nanmean(np.where(np.isfinite(slopes), slopes, np.nan) ** 2, axis=1))
+    mean = np.nan_to_num(np.mean(squares, axis=0))
+    names = [v.name for v in block.model.inputs]
+    return {name: float(mean[i]) for i, name in enumerate(names) if name in block.drives}
+
+
+def _widths(least: float, signals: Sequence[tuple[Array, float]]) -> Iterator[float]:
+    """Yield widths from the least to those whose reach a record hardly holds."""
+    most = max(step * len(signal) for signal, step in signals) / 40.0
+    width = least
+    yield width
+    while (width := width * _STEP) < most:
+        yield width
+
+
+def _power(
+    signals: Sequence[tuple[Array, float]], width: float, kind: tuple[int, float], noise: float
+) -> tuple[float, float]:
+    """Return the mean square of a filtered derivative without that of its noise, and that of its noise."""
+    order, span = kind
+    squares, count, own = 0.0, 0, 0.0
+    for signal, step in signals:
+        weights = filter_weights(width, order, step, span)
+        stride = max(1, int(width / step), len(signal) // _PROBES)
+        rows = filtered(signal, weights, stride)
+        squares += float(rows @ rows)
+        count += len(rows)
+        own += len(rows) * noise**2 * float(weights @ weights)
+    return (squares - own) / max(count, 1), own / max(count, 1)
+
+
+def _too_coarse(block: Block, signals: Sequence[str], pace: float, records: Sequence[Record]) -> Exception:
+    now = 1.0 / max(r.step for r in records)
+    frequency = pace / (2.0 * math.pi)
+    return MeasurementError(
+        f"block '{block.name}'",
+        f"the motion of {' and '.join(signals)}, typically {frequency:.3g} Hz, is sampled too coarsely at "
+        f"{now:.3g} Hz",
+        next_step=f"sample at {2.0 * _COARSEST * frequency:.2g} Hz or more, or move more slowly",
+    )
