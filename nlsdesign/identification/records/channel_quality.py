@@ -230,7 +230,7 @@ def _changes(values: Array, run: NDArray[np.intp]) -> bool:
     """Tell whether a channel goes on while another one rests: by more than its noise and counts."""
     thirds = np.array_split(values[run[0] : run[-1] + 1], 3)
     changes = float(np.ptp([part.mean() for part in thirds]))
-    return changes > _DRIFT * max(noise_of(values) / np.sqrt(len(thirds[-1])), quantum_of(values))
+    return bool(changes > _DRIFT * max(noise_of(values) / np.sqrt(len(thirds[-1])), quantum_of(values)))
 
 
 def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:

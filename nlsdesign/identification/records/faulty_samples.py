@@ -55,7 +55,9 @@ _FREE_SIGNS = 0.6
 _JUMP, _JUMP_OVER_ALL = 10.0, 3.0
 """A position jumps where it changes by more than these times the largest change nearby, and anywhere else."""
 _CONFIRMS = 4.0
-_REACH = (12, 50)
+_NEARBY, _BETTER = (-8, -4, 4, 8), 0.95
+"""Samples off a group at which a turn of its own is looked for; it leaves less than this share."""
+_REACH = 12
 """Samples on either side over which another channel is asked whether something happened."""
 
 
@@ -116,7 +118,18 @@ class Witness:
         whole = np.concatenate([left, right])
         joint = _sum_of_squares(self.values, whole, 5)
         apart = _sum_of_squares(self.values, left, 2) + _sum_of_squares(self.values, right, 2)
-        return joint > _CONFIRMS * max(apart, len(whole) * self.least**2)
+        least = max(apart, len(whole) * self.least**2)
+        return joint > _CONFIRMS * least and not self._turns_nearby(left[0], first, right[-1] + 1, least)
+
+    def _turns_nearby(self, begin: int, place: int, end: int, apart: float) -> bool:
+        """Tell whether a turn a few samples off a place describes the samples better than one there."""
+        for split in (place + shift for shift in _NEARBY):
+            sides = np.arange(begin, split), np.arange(split, end)
+            if min(map(len, sides)) < 3:
+                continue
+            if sum(_sum_of_squares(self.values, side, 2) for side in sides) < _BETTER * apart:
+                return True
+        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,13 +216,16 @@ class _Course(NamedTuple):
     def through(values: Array, places: NDArray[np.intp], origin: int, order: int = 3) -> _Course:
         """Return the polynomial through samples by least squares."""
         powers = np.vander((places - origin) / _SIDE, order + 1)
-        coefficients = np.linalg.lstsq(powers, values[places], rcond=None)[0]
+        coefficients: Array = np.asarray(
+            np.linalg.lstsq(powers, values[places], rcond=None)[0], dtype=np.float64
+        )
         left = values[places] - powers @ coefficients
         freedom = max(len(places) - order - 1, 1)
         return _Course(coefficients, origin, float(np.sqrt(left @ left / freedom)))
 
     def __call__(self, places: NDArray[np.intp]) -> Array:
-        result: Array = np.polyval(self.coefficients, (places - self.origin) / _SIDE)
+        at = (places - self.origin) / _SIDE
+        result: Array = np.asarray(np.polyval(self.coefficients, at), dtype=np.float64)
         return result
 
 
@@ -341,8 +357,8 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
     for first, behind in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
         at_an_end = first == 0 or behind == len(values)
         pairs = () if at_an_end else ((first - 1, first), (behind - 1, behind))
-        ends = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
-        if values[first] in extremes and min(ends) < abrupt:
+        edges = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
+        if values[first] in extremes and min(edges) < abrupt:
             continue  # it may be clipped, or slack
         length = behind - first
         span = max(_SCATTER_SPAN, 2 * length)
@@ -353,7 +369,7 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
         sides = values[max(first - span, 0) : first + 1], values[behind - 1 : behind + span]
         goes_on = not around.others or any(np.ptp(each.values[first:behind]) > 0.0 for each in around.others)
         if goes_on and all(_is_noise(side) for side in sides):
-            yield Group(first, behind, "stuck", max(ends))
+            yield Group(first, behind, "stuck", max(edges))
 
 
 def _is_noise(side: Array) -> bool:
@@ -381,7 +397,7 @@ def _overlaps(group: Group, groups: Sequence[Group]) -> bool:
 
 def _confirmed(first: int, behind: int, others: Sequence[Witness]) -> bool:
     """Tell whether another channel changes its course where a group is."""
-    return any(each.turns(first, behind, reach) for each in others for reach in _REACH)
+    return any(each.turns(first, behind, _REACH) for each in others)
 
 
 def _sum_of_squares(values: Array, places: NDArray[np.intp], order: int) -> float:
