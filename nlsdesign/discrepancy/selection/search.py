@@ -103,6 +103,11 @@ class Tried:
     objections: tuple[str, ...]
     undecided: bool = False
 
+    @property
+    def candidate(self) -> Candidate:
+        """The effect at its place."""
+        return self.hypothesis.newest
+
 
 @dataclass(frozen=True)
 class Skipped:
