@@ -120,11 +120,10 @@ def _gravity(assembly: Assembly, body: str) -> Iterator[Edit]:
     weight = HorizontalTorque(horizontal_torque=number(0.01, "N*m"))
     load = GravityLoad(weight=weight, hanging_angle=number(0.0, "rad"))
     edited, part = tied(assembly, "weight", body, load)
-    quarter = math.pi / 2.0
     unknowns = (
-        Unknown(f"{part}.horizontal_torque", (0.2,), 1e-4, 3.0, efforts_on(body)),
-        # All directions; the bounds overlap, so that none of them stands at a bound.
-        Unknown(f"{part}.hanging_angle", (-2.0 * quarter, -quarter, 0.0, quarter), -5.0, 5.0, null=None),
+        # A torque of either sign with two directions begins near any; the bounds overlap.
+        Unknown(f"{part}.horizontal_torque", (0.1,), -3.0, 3.0, efforts_on(body)),
+        Unknown(f"{part}.hanging_angle", (0.0, math.pi / 2.0), -5.0, 5.0, null=None),
     )
     yield Edit(edited, unknowns)
 
