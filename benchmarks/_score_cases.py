@@ -1,12 +1,19 @@
-"""Cases of the score: which effects are hidden in the records of which actuator, drawn from which seed."""
+"""Cases of the score: which effects are hidden in which records of which machine, drawn from which seed."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle, islice, zip_longest
 
-from tests.rig import ACTUATORS, EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS
+import numpy as np
 
+from nlsdesign.discrepancy.effects import ALL
+from tests.rig import ACTUATORS, COUNTS, EFFECTS, LATER_EFFECTS, OUTSIDE_ANY_CATALOGUE, Conditions
+from tests.rig.machines import MACHINES
+
+CATALOGUE = frozenset(effect.__name__ for effect in ALL)
 PAIRS = (
     ("coulomb_friction", "second_relaxation"),
     ("torque_ripple", "cable_compliance"),
@@ -21,7 +28,42 @@ PAIRS = (
     ("coulomb_friction", "stress_softening"),
     ("current_sensor_bias", "self_heating"),
 )
-KINDS = ("single", "clean", "outside", "pair")
+TRIPLES = (
+    ("coulomb_friction", "second_relaxation", "force_sensor_bias"),
+    ("torque_ripple", "rate_independent_hysteresis", "force_sensor_gain"),
+    ("coulomb_friction", "cable_compliance", "current_sensor_bias"),
+    ("stribeck_friction", "second_relaxation", "torque_ripple"),
+    ("backlash", "second_relaxation", "force_sensor_bias"),
+    ("quadratic_drag", "cable_slack", "force_sensor_delay"),
+    ("load_dependent_friction", "strain_stiffening", "torque_ripple"),
+    ("drive_delay", "coulomb_friction", "stress_softening"),
+)
+ACCEPTED: Mapping[str, frozenset[str]] = {
+    "rubbing_spot": frozenset({"position_dependent_friction"}),
+    "winding_heat": frozenset({"winding_heat", "torque_constant_drift"}),
+    "sensor_lowpass": frozenset({"force_sensor_delay"}),
+    "constant_torque": frozenset({"constant_torque", "constant_force", "current_sensor_bias"}),
+    "current_sensor_bias": frozenset({"current_sensor_bias", "constant_torque", "constant_force"}),
+}
+"""Names that describe a hidden thing truly although they are not its own: equal laws, or a wider one."""
+NOISES: Mapping[str, Conditions] = {
+    "white": Conditions(),
+    "coloured": Conditions(coloured=1.5),
+    "flicker": Conditions(flicker=1.5),
+    "spikes": Conditions(spikes=3),
+    **{f"counts {n}": Conditions(counts=n) for n in COUNTS},
+}
+STRONG, HALF = 1.0, 0.5
+TIERS = (
+    "single", "single half", "pair", "pair half", "triple", "triple half",
+    "clean white", "clean coloured", "clean flicker", "clean coarse", "clean spikes",
+    "disturbed", "three records", "wrong number", "outside", "machine", "machine half", "machine clean",
+)  # fmt: skip
+"""
+``disturbed`` hides one effect in records with coloured noise, spikes or coarse counts; ``three records``
+leaves two to fit; ``wrong number`` hides nothing, one declared number is wrong; ``machine`` and the like
+have no cam.
+"""
 
 
 @dataclass(frozen=True)
@@ -30,95 +72,117 @@ class Case:
 
     Parameters
     ----------
-    kind
-        ``single``, ``pair``, ``clean`` or ``outside``.
-    actuator
-        Name of the rig's actuator.
+    tier
+        One of :data:`TIERS`.
+    machine
+        Name of the rig's machine.
     effects
         What is hidden.
     strength
-        Word of :data:`tests.rig.STRENGTHS`; clean sets have none.
+        Of all that is hidden.
     seed
         Of the rig.
+    noise
+        Name in :data:`NOISES`.
     """
 
-    kind: str
-    actuator: str
+    tier: str
+    machine: str
     effects: tuple[str, ...]
-    strength: str
+    strength: float
     seed: int
+    noise: str = "white"
 
     @property
     def name(self) -> str:
         """Unique name, by which a run goes on where it was interrupted."""
-        hidden = "+".join(self.effects) or "clean"
-        return ":".join(filter(None, [hidden, self.strength, self.actuator, str(self.seed)]))
+        hidden = "+".join(self.effects) or "nothing"
+        noise = "" if self.noise == "white" else self.noise
+        return ":".join(
+            filter(None, [self.tier, hidden, f"{self.strength:g}", noise, self.machine, str(self.seed)])
+        )
 
     @property
     def hidden(self) -> Mapping[str, float]:
-        """What the rig is told to hide."""
-        return {effect: STRENGTHS[self.strength] for effect in self.effects}
+        """What the rig hides, and how strong."""
+        return {effect: self.strength for effect in self.effects}
 
 
-def cases(
-    seeds: Sequence[int], *, strengths: Sequence[str] = tuple(STRENGTHS), kinds: Sequence[str] = KINDS
-) -> list[Case]:
-    """Return every case of some seeds; from case to case the actuator changes, and the pair with the seed.
-
-    Parameters
-    ----------
-    seeds
-        Each gives every effect at every strength; of each of the other kinds, one case per strength.
-    strengths
-        Words of :data:`tests.rig.STRENGTHS`.
-    kinds
-        Some of :data:`KINDS`.
-    """
-    found = [case for seed in seeds for case in _of_seed(seed, strengths)]
-    return [case for case in found if case.kind in kinds]
+def known_effects() -> tuple[str, ...]:
+    """Return what the rig can hide behind a cam and the catalogue knows."""
+    return tuple(e for e in (*EFFECTS, *LATER_EFFECTS) if e in CATALOGUE)
 
 
-def _of_seed(seed: int, strengths: Sequence[str]) -> Iterator[Case]:
-    actuators = list(ACTUATORS)
-    singles = [e for e in EFFECTS if e != "none"]
-    for s, strength in enumerate(strengths):
-        turn = seed * len(strengths) + s
-        for i, effect in enumerate(singles):
-            yield Case("single", actuators[(turn + i) % 2], (effect,), strength, seed)
-        yield Case("clean", actuators[turn % 2], (), "", seed) if s < 2 else _nothing(seed)
-        outside = OUTSIDE_ANY_CATALOGUE[turn % len(OUTSIDE_ANY_CATALOGUE)]
-        yield Case("outside", actuators[(turn + 1) % 2], (outside,), strength, seed)
-        yield Case("pair", actuators[turn % 2], PAIRS[turn % len(PAIRS)], strength, seed)
-
-
-def _nothing(seed: int) -> Case:
-    raise ValueError(f"seed {seed}: more than two strengths need more than two actuators for clean sets")
-
-
-def sample(seeds: Sequence[int], strength: str, others: int) -> list[Case]:
-    """Return each effect once, and so many cases of each other kind, spread over seeds and actuators.
+def cases(seeds: Sequence[int], tiers: Sequence[str] = TIERS) -> list[Case]:
+    """Return every case of some seeds; machine, pair, triple and noise change from case to case.
 
     Parameters
     ----------
     seeds
-        Used in turn.
-    strength
-        Of everything that is hidden.
-    others
-        Number of clean sets, of sets with an effect outside the catalogue, and of pairs.
+        Each gives every effect at two strengths on one machine each, and some of every other tier.
+    tiers
+        Some of :data:`TIERS`.
     """
-    actuators = list(ACTUATORS)
-    chosen = [("single", (effect,)) for effect in EFFECTS if effect != "none"]
-    # The other kinds stand in between, so that a run that is broken off has some of each.
-    apart = max(len(chosen) // (others + 1), 1)
-    for i in reversed(range(others)):
-        outside = (OUTSIDE_ANY_CATALOGUE[i % len(OUTSIDE_ANY_CATALOGUE)],)
-        place = (i + 1) * apart
-        chosen[place:place] = [("clean", ()), ("outside", outside), ("pair", PAIRS[i % len(PAIRS)])]
-    found, n, clean = [], len(seeds), 0
-    for i, (kind, effects) in enumerate(chosen):
-        k = i if effects else clean
-        clean += not effects
-        actuator = actuators[(k + (k // n if n % 2 == 0 else 0)) % 2]
-        found.append(Case(kind, actuator, effects, strength if effects else "", seeds[k % n]))
-    return found
+    return [case for seed in seeds for case in _of_seed(seed) if case.tier in tiers]
+
+
+def _of_seed(seed: int) -> Iterator[Case]:
+    known, actuators = known_effects(), list(ACTUATORS)
+    noises = [n for n in NOISES if n != "white"]
+
+    def actuator(number: int) -> str:
+        return actuators[(seed + number) % len(actuators)]
+
+    def turn(options: Sequence[tuple[str, ...]], each: int) -> Iterator[tuple[str, ...]]:
+        return islice(cycle(options), seed * each % len(options), seed * each % len(options) + each)
+
+    for i, effect in enumerate(known):
+        yield Case("single", actuator(i), (effect,), STRONG, seed)
+        yield Case("single half", actuator(i + 1), (effect,), HALF, seed)
+    for i, pair in enumerate(turn(PAIRS, 4)):
+        yield Case("pair", actuator(i), pair, STRONG, seed)
+        yield Case("pair half", actuator(i + 1), pair, HALF, seed)
+    for i, triple in enumerate(turn(TRIPLES, 3)):
+        yield Case("triple", actuator(i), triple, STRONG, seed)
+        yield Case("triple half", actuator(i + 1), triple, HALF, seed)
+    for i, noise in enumerate(NOISES):
+        tier = "clean coarse" if noise.startswith("counts") else f"clean {noise}"
+        yield Case(tier, actuator(i), (), 0.0, seed, noise)
+    for i in range(6):
+        effect = known[(6 * seed + i) % len(known)]
+        yield Case("disturbed", actuator(i), (effect,), STRONG, seed, noises[i])
+        effect = known[(6 * seed + i + 3) % len(known)]
+        yield Case("three records", actuator(i), (effect,), STRONG, seed)
+    yield Case("wrong number", actuator(0), (), 0.0, seed)
+    for i, effect in enumerate(e for e in OUTSIDE_ANY_CATALOGUE if e not in CATALOGUE):
+        yield Case("outside", actuator(i), (effect,), STRONG, seed)
+    for machine in MACHINES.values():
+        for effect in (e for e in machine.effects if e in CATALOGUE):
+            yield Case("machine", machine.name, (effect,), STRONG, seed)
+            yield Case("machine half", machine.name, (effect,), HALF, seed)
+        yield Case("machine clean", machine.name, (), 0.0, seed)
+
+
+def sample(pool: Sequence[Case], count: int) -> list[Case]:
+    """Return so many cases, spread evenly over the tiers, and in each over what is hidden; always the same.
+
+    Parameters
+    ----------
+    pool
+        To draw from.
+    count
+        How many; more than there are give all.
+    """
+    draw = np.random.default_rng(2026)
+    queues = []
+    for tier in dict.fromkeys(case.tier for case in pool):
+        own = [case for case in pool if case.tier == tier]
+        times: Counter[tuple[str, ...]] = Counter()
+        ranked = []
+        for i in draw.permutation(len(own)):
+            times[own[i].effects] += 1
+            ranked.append((times[own[i].effects], own[i]))
+        # What this tier has hidden less often comes first.
+        queues.append([case for _, case in sorted(ranked, key=lambda row: row[0])])
+    spread = [case for row in zip_longest(*queues) for case in row if case is not None]
+    return spread[:count]

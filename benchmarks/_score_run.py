@@ -1,4 +1,4 @@
-"""One case: make records, let each method decide on the files alone, then compare with what was hidden."""
+"""One case: make records, let the diagnosis decide on the files alone, then compare with what was hidden."""
 
 from __future__ import annotations
 
@@ -7,45 +7,32 @@ import signal
 import tempfile
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from benchmarks._score_cases import Case
+from benchmarks._score_cases import NOISES, Case
+from benchmarks._score_truth import covered, true_numbers
 from benchmarks._score_yardsticks import YARDSTICKS, MissingError, table_of
 from models.test_rig import test_rig_deck
 from nlsdesign.components import Assembly
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import Verdict, diagnose
 from nlsdesign.identification import RecordSet, load_records
 from nlsdesign.model import flatten
-from tests.rig import ACTUATORS, Hidden, make_records, truth, write_set
-
-TRUE_SIZES: dict[str, tuple[str, Callable[[Hidden], float]]] = {
-    "coulomb_friction": ("sliding_effort", lambda h: h.friction),
-    "load_dependent_friction": ("ratio", lambda h: h.load_friction),
-    "quadratic_drag": ("drag", lambda h: h.drag),
-    "torque_ripple": ("order", lambda h: h.ripple_order),
-    "backlash": ("gap", lambda h: h.gap),
-    "drive_delay": ("delay", lambda h: h.drive_delay),
-    "cable_compliance": ("stiffness", lambda h: h.cable_stiffness),
-    "cable_slack": ("length", lambda h: h.slack),
-    "cam_angle_offset": ("offset", lambda h: h.cam_offset),
-    "second_relaxation": ("modulus", lambda h: h.branch_modulus),
-    "current_sensor_bias": ("bias", lambda h: h.current_bias),
-    "force_sensor_bias": ("bias", lambda h: h.force_bias),
-    "force_sensor_gain": ("gain", lambda h: h.force_gain),
-    "force_sensor_delay": ("delay", lambda h: h.force_delay),
-}
-"""Numbers that mean the same in the package and in the rig: only these have a true value."""
-_INTERVAL = 1.96
+from tests.rig import ACTUATORS, THREE_RECORDS, make_records, mistaken, write_set
+from tests.rig.commands import RECORDS
+from tests.rig.machines import MACHINES, write_machine_set
+from tests.rig.records import stream_of_mistakes
 
 
 class TooLongError(Exception):
     """A case took longer than it may."""
 
 
-def run(case: Case, limit: int, yardsticks: bool) -> dict[str, Any]:
+def run(case: Case, limit: int = 0, yardsticks: bool = False) -> dict[str, Any]:
     """Return the result of one case; one that fails gives the reason.
 
     Parameters
@@ -53,30 +40,30 @@ def run(case: Case, limit: int, yardsticks: bool) -> dict[str, Any]:
     case
         What to hide.
     limit
-        Seconds after which it is given up; 0 for never.
+        Seconds of the processor after which it is given up; 0 for never.
     yardsticks
         Whether the yardsticks decide on the same records.
     """
     result: dict[str, Any] = {
-        "case": case.name, "kind": case.kind, "actuator": case.actuator, "hidden": list(case.effects),
-        "strength": case.strength, "seed": case.seed,
+        "case": case.name, "tier": case.tier, "machine": case.machine, "hidden": list(case.effects),
+        "strength": case.strength, "seed": case.seed, "noise": case.noise,
     }  # fmt: skip
     if limit:
-        signal.signal(signal.SIGALRM, _give_up)
-        signal.alarm(limit)
+        signal.signal(signal.SIGPROF, _give_up)
+        signal.setitimer(signal.ITIMER_PROF, limit)
     begin, worked = time.perf_counter(), _worked()
     try:
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            actuator = ACTUATORS[case.actuator]
-            write_set(folder, actuator, make_records(actuator, case.hidden, case.seed))
+            if wrong := write_case(folder, case):
+                result["wrong"] = wrong
             begin, worked = time.perf_counter(), _worked()
             declared, records = opened(folder)
             verdict = diagnose(declared, records)
             result["seconds"] = time.perf_counter() - begin
             result["cpu_seconds"] = _worked() - worked
-            result |= _said(verdict)
-            result["covered"] = _covered(case, verdict)
+            result |= content(verdict)
+            result["covered"] = covered(verdict, true_numbers(case))
             result["yardsticks"] = _yardsticks(declared, records) if yardsticks else {}
     except Exception as error:
         result["seconds"] = time.perf_counter() - begin
@@ -85,8 +72,71 @@ def run(case: Case, limit: int, yardsticks: bool) -> dict[str, Any]:
         result["trace"] = traceback.format_exc(limit=-4)
     finally:
         if limit:
-            signal.alarm(0)
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
     return result
+
+
+def write_case(folder: Path, case: Case) -> str:
+    """Write the files that a bench would leave, and return which declared number is wrong, if any.
+
+    Parameters
+    ----------
+    folder
+        Becomes the set of records with its declaration.
+    case
+        What to hide.
+    """
+    conditions = NOISES[case.noise]
+    if case.machine in MACHINES:
+        write_machine_set(folder, MACHINES[case.machine], case.hidden, case.seed, conditions=conditions)
+        return ""
+    actuator, wrong = ACTUATORS[case.machine], ""
+    only = THREE_RECORDS if case.tier == "three records" else RECORDS
+    records = make_records(actuator, case.hidden, case.seed, only=only, conditions=conditions)
+    if case.tier == "wrong number":
+        actuator, wrong = mistaken(actuator, stream_of_mistakes(case.seed))
+    write_set(folder, conditions.declared(actuator), records)
+    return wrong
+
+
+def opened(folder: Path) -> tuple[Assembly, RecordSet]:
+    """Return what a folder declares and the records in it; that is all that a method gets to see.
+
+    Parameters
+    ----------
+    folder
+        With ``rig.toml`` and ``cam.csv``, or with ``deck.toml``, and the records.
+    """
+    deck = folder / "deck.toml"
+    if deck.exists():
+        declared = declare(load_deck(deck))
+    else:
+        declared = test_rig_deck(folder / "rig.toml", folder / "cam.csv")
+    return declared, load_records(folder, flatten(declared))
+
+
+def content(verdict: Verdict) -> dict[str, Any]:
+    """Return what a verdict says, as far as it says it.
+
+    Parameters
+    ----------
+    verdict
+        Of one case.
+    """
+    remainder = getattr(verdict, "remainder", None)
+    return {
+        "verdict": verdict.verdict,
+        "complete": getattr(verdict, "complete", None),
+        "remainder": None if remainder is None else str(getattr(remainder, "block", "somewhere")),
+        "named": [effect.name for effect in verdict.effects],
+        "probabilities": [getattr(effect, "probability", None) for effect in verdict.effects],
+        "aliases": [list(effect.aliases) for effect in verdict.effects],
+        "closed": verdict.closed,
+        "ratio": verdict.held_out_ratio,
+        "before": verdict.rms("before", "held_out") / verdict.rms("noise_floor", "held_out"),
+        "where": list(verdict.where),
+        "runners_up": [[name, round(share, 3)] for name, share in verdict.runners_up],
+    }
 
 
 def _worked() -> float:
@@ -98,50 +148,12 @@ def _give_up(number: int, frame: FrameType | None) -> None:
     raise TooLongError("longer than the limit")
 
 
-def opened(folder: Path) -> tuple[Assembly, RecordSet]:
-    """Return what a folder declares and the records in it; that is all that a method gets to see.
-
-    Parameters
-    ----------
-    folder
-        With ``rig.toml``, ``cam.csv`` and the records.
-    """
-    declared = test_rig_deck(folder / "rig.toml", folder / "cam.csv")
-    return declared, load_records(folder, flatten(declared))
-
-
-def _said(verdict: Verdict) -> dict[str, Any]:
-    return {
-        "verdict": verdict.verdict,
-        "named": [effect.name for effect in verdict.effects],
-        "aliases": [list(effect.aliases) for effect in verdict.effects],
-        "closed": verdict.closed,
-        "ratio": verdict.held_out_ratio,
-        "where": list(verdict.where),
-        "runners_up": [[name, round(share, 3)] for name, share in verdict.runners_up],
-    }
-
-
-def _covered(case: Case, verdict: Verdict) -> dict[str, list[Any]]:
-    """Return for each effect named rightly: value, standard error, truth, whether the interval holds it."""
-    hidden = truth(ACTUATORS[case.actuator], case.hidden, case.seed)[1]
-    found = {}
-    for effect in verdict.effects:
-        if effect.name in case.effects and effect.name in TRUE_SIZES:
-            last, size_of = TRUE_SIZES[effect.name]
-            own = [(v, s) for n, (v, _, s) in effect.parameters.items() if n.endswith(f".{last}")]
-            if own:
-                (value, error), true = own[0], size_of(hidden)
-                found[effect.name] = [value, error, true, bool(abs(value - true) <= _INTERVAL * error)]
-    return found
-
-
-def _yardsticks(declared: Assembly, records: RecordSet) -> dict[str, list[str] | str]:
-    found: dict[str, list[str] | str] = {}
+def _yardsticks(declared: Assembly, records: RecordSet) -> Mapping[str, list[str] | str]:
+    names: dict[str, list[str] | str] = {}
     table = table_of(declared, records)
     for name, decide in YARDSTICKS.items():
         try:
-            found[name] = decide(table)
+            names[name] = decide(table)
         except MissingError as error:
-            found[name] = f"skipped: {error}"
-    return found
+            names[name] = f"skipped: {error}"
+    return names

@@ -1,14 +1,16 @@
 """Score of the diagnosis on records of the rig in ``tests/rig``, with yardsticks on the same records.
 
 The rig shares no model code with the package. A method gets the files that a bench would leave and nothing
-else; labels are read after it has decided. Set thresholds on seeds below 100 and report seeds from 100 on.
+else; labels are read after it has decided. Criteria are calibrated on seeds 200 to 299; seeds from 300 on are
+counted once.
 
-    python -m benchmarks.discrepancy_score --seeds 100-110 --out score.jsonl
-    python -m benchmarks.discrepancy_score --sample 4 --strengths strong --seeds 100-104 --out score.jsonl
+    python -m benchmarks.discrepancy_score --seeds 200-219 --sample 60 --out calibration.jsonl
+    python -m benchmarks.discrepancy_score --seeds 300-309 --processes 2 --limit 300 --out score.jsonl
+    python -m benchmarks.discrepancy_score --seeds 300-309 --tier pair --tier triple --out score.jsonl
     python -m benchmarks.discrepancy_score --out score.jsonl --table docs/discrepancy.md
 
 Each result is one line of JSON, written as soon as it is there; a run goes on where it was interrupted. A
-case that fails is a line with the reason.
+case that fails is a line with the reason. Every case runs in one process.
 """
 
 from __future__ import annotations
@@ -17,22 +19,25 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
+import sys
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks._score_cases import Case, cases, sample
+from benchmarks._score_cases import TIERS, Case, cases, sample
 from benchmarks._score_run import run
-from benchmarks._score_table import table
-from tests.rig import STRENGTHS
+from benchmarks._score_table import Result, table
 
 
 def main() -> None:
     """Run the cases that have no result yet, and write the table."""
     given = _arguments()
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))  # and the pool ends with it
     results = _read(given.out)
-    todo = [case for case in _wanted(given) if case.name not in {r["case"] for r in results}]
+    done = {r["case"] for r in results}
+    todo = [case for case in _wanted(given) if case.name not in done]
     if todo:
         print(f"{len(todo)} cases to run, {len(results)} are there", flush=True)
     with given.out.open("a", encoding="utf8") as file:
@@ -40,8 +45,8 @@ def main() -> None:
             file.write(json.dumps(result) + "\n")
             file.flush()
             results.append(result)
-            said = result.get("error") or f"{result['verdict']} {'+'.join(result['named'])}"
-            print(f"{result['case']}: {said} ({result['seconds']:.0f} s)", flush=True)
+            outcome = result.get("error") or f"{result['verdict']} {'+'.join(result['named'])}"
+            print(f"{result['case']}: {outcome} ({result['seconds']:.0f} s)", flush=True)
     text = table(results)
     if given.table:
         head = given.table.read_text(encoding="utf8") if given.table.exists() else ""
@@ -57,53 +62,62 @@ MARK = "<!-- written by benchmarks.discrepancy_score from here on -->"
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seeds", type=_seeds, default=[], help="for instance 100-110 or 100,105")
-    parser.add_argument("--cases", nargs="*", default=[], help="kinds, or effects that must be hidden; all")
-    parser.add_argument("--strengths", nargs="*", default=list(STRENGTHS), choices=list(STRENGTHS))
-    parser.add_argument("--sample", type=int, help="each effect once, and so many of each other kind")
+    parser.add_argument("--seeds", type=seeds_of, default=[], help="for instance 200-210 or 200,205")
+    parser.add_argument("--tier", action="append", choices=TIERS, help="may be repeated; all")
+    parser.add_argument("--effect", action="append", help="only what hides this; may be repeated")
+    parser.add_argument("--machine", action="append", help="only this machine; may be repeated")
+    parser.add_argument("--sample", type=int, help="so many cases, spread evenly over all that is asked for")
     parser.add_argument("--out", type=Path, required=True, help="results, one JSON a line")
     parser.add_argument("--table", type=Path, help="Markdown file for the table; its head is kept")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--limit", type=int, default=0, help="seconds after which a case is given up")
+    parser.add_argument(
+        "--limit", type=int, default=0, help="seconds of the processor after which a case is given up"
+    )
     parser.add_argument("--no-yardsticks", action="store_true")
     return parser.parse_args()
 
 
-def _seeds(text: str) -> list[int]:
-    found: list[int] = []
+def seeds_of(text: str) -> list[int]:
+    """Return the seeds that a text like ``200-202,7`` means.
+
+    Parameters
+    ----------
+    text
+        Numbers and ranges, separated by commas.
+    """
+    seeds: list[int] = []
     for piece in text.split(","):
         first, _, last = piece.partition("-")
-        found += range(int(first), int(last or first) + 1)
-    return found
+        seeds += range(int(first), int(last or first) + 1)
+    return seeds
 
 
 def _wanted(given: argparse.Namespace) -> list[Case]:
-    if not given.seeds:
-        return []
-    if given.sample is not None:
-        found = sample(given.seeds, given.strengths[-1], given.sample)
-    else:
-        found = cases(given.seeds, strengths=given.strengths)
-    words = set(given.cases)
-    return [c for c in found if not words or words & {c.kind, *c.effects}]
+    pool = cases(given.seeds, given.tier or TIERS)
+    if given.effect:
+        pool = [case for case in pool if set(given.effect) & set(case.effects)]
+    if given.machine:
+        pool = [case for case in pool if case.machine in given.machine]
+    return pool if given.sample is None else sample(pool, given.sample)
 
 
-def _read(file: Path) -> list[dict[str, Any]]:
+def _read(file: Path) -> list[Result]:
     if not file.exists():
         return []
     return [json.loads(line) for line in file.read_text(encoding="utf8").splitlines() if line.strip()]
 
 
 def _results(todo: list[Case], given: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    ask = given.limit, not given.no_yardsticks
-    if given.processes == 1:
-        for case in todo:
-            yield run(case, *ask)
+    work = partial(run, limit=given.limit, yardsticks=not given.no_yardsticks)
+    if given.processes < 1:
+        yield from map(work, todo)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(given.processes, mp_context=context) as pool:
-        for done in as_completed([pool.submit(run, case, *ask) for case in todo]):
-            yield done.result()
+    # One case is one core: numerical libraries of the workers start no threads, and
+    for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
+    # workers of a pool are daemons, in which the package starts no processes of its own.
+    with multiprocessing.get_context("spawn").Pool(given.processes, maxtasksperchild=25) as pool:
+        yield from pool.imap_unordered(work, todo)
 
 
 if __name__ == "__main__":

@@ -371,6 +371,53 @@ def to_resolution(value: float, error: float) -> float:
     return round(value, 3 - math.floor(math.log10(error))) + 0.0
 
 
+def three_digits(value: float) -> str:
+    """Return a number with three significant digits as text for people.
+
+    Parameters
+    ----------
+    value
+        Any number.
+
+    Examples
+    --------
+    >>> three_digits(26.0), three_digits(0.011422), three_digits(12345.6), three_digits(2e-7)
+    ('26.0', '0.0114', '12300', '2.00·10⁻⁷')
+    """
+    mantissa, _, exponent = f"{value:.2e}".partition("e")
+    if not math.isfinite(value) or -5 < int(exponent) < 6:
+        text = f"{float(f'{value:.3g}'):.{max(0, 2 - int(exponent or 0))}f}"
+    else:
+        text = f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return text.replace("-", "−")
+
+
+def with_error(value: float, error: float) -> str:
+    """Return a number with its standard error as text for people, both to the same digit.
+
+    Parameters
+    ----------
+    value
+        In any unit.
+    error
+        Standard error in the same unit, shown to two digits; left out where it is zero or not finite.
+
+    Examples
+    --------
+    >>> with_error(0.374817, 4.3e-4), with_error(1.5e-7, 2e-9), with_error(12345.0, 678.0)
+    ('0.37482 ± 0.00043', '(1.500 ± 0.020)·10⁻⁷', '12340 ± 680')
+    """
+    if not (math.isfinite(error) and error > 0.0):
+        return f"{value:.4g}".replace("-", "−")
+    exponent = math.floor(math.log10(max(abs(value), error)))
+    small = not -5 <= exponent < 6
+    scale = 10.0**exponent if small else 1.0
+    digit = 1 - math.floor(math.log10(error / scale))
+    pair = [f"{round(number / scale, digit):.{max(0, digit)}f}" for number in (value, error)]
+    text = " ± ".join(pair).replace("-", "−")
+    return f"({text})·10{str(exponent).translate(_SUPERSCRIPTS)}" if small else text
+
+
 def degrees(value: float) -> float:
     """Return an angle in rad from degrees.
 

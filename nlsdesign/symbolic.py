@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TypeAlias
 
 import casadi as ca
@@ -118,10 +119,8 @@ def uniform_spline(
     at
         Argument in [lower, lower + (n − 3)·step]; beyond, the polynomial of the last span continues.
     """
-    number, r = _span(coefficients, (at - lower) / step)
-    a, b, c, d = _windows(coefficients, 4, number)
-    q = 1 - r
-    return (a * q**3 + b * (4 - 3 * r * r * (2 - r)) + c * (4 - 3 * q * q * (2 - q)) + d * r**3) / 6
+    value: Expression = _spline(len(coefficients))(ca.vertcat(*coefficients), (at - lower) / step)
+    return value
 
 
 def uniform_spline_integral(
@@ -134,7 +133,32 @@ def uniform_spline_integral(
     coefficients, lower, step, at
         As for :func:`uniform_spline`.
     """
-    number, r = _span(coefficients, (at - lower) / step)
+    integral = _spline_integral(len(coefficients))
+    value: Expression = step * integral(ca.vertcat(*coefficients), (at - lower) / step)
+    return value
+
+
+# CasADi writes a function into an expression hundreds of times as fast as it is written term by term.
+
+
+@cache
+def _spline(count: int) -> ca.Function:
+    """Return a spline of so many coefficients and unit step as a function of these and of the place."""
+    column, u = ca.SX.sym("coefficient", count), ca.SX.sym("u")
+    coefficients = ca.vertsplit(column)
+    number, r = _span(coefficients, u)
+    a, b, c, d = _windows(coefficients, 4, number)
+    q = 1 - r
+    value = (a * q**3 + b * (4 - 3 * r * r * (2 - r)) + c * (4 - 3 * q * q * (2 - q)) + d * r**3) / 6
+    return ca.Function("spline", [column, u], [value])
+
+
+@cache
+def _spline_integral(count: int) -> ca.Function:
+    """Return the integral of such a spline from its first knot, likewise."""
+    column, u = ca.SX.sym("coefficient", count), ca.SX.sym("u")
+    coefficients = ca.vertsplit(column)
+    number, r = _span(coefficients, u)
     a, b, c, d = _windows(coefficients, 4, number)
     q = 1 - r
     # Sums of the coefficients whose basis functions lie completely to the left of the span.
@@ -144,7 +168,7 @@ def uniform_spline_integral(
     (left,) = _windows(sums, 1, number)
     inside = a * (24 - q**4) + b * (12 + _half_bump(r)) + c * (12 - _half_bump(q)) + d * r**4
     before = 23 * coefficients[0] + 12 * coefficients[1] + coefficients[2]
-    return step * (left + (inside - before) / 24)
+    return ca.Function("spline_integral", [column, u], [left + (inside - before) / 24])
 
 
 def _half_bump(r: Expression) -> Expression:

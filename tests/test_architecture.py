@@ -17,7 +17,10 @@ BASE = {"bibliography", "errors", "quantity", "symbolic", "locations", "processe
 # What the floors above the waist stand on: they see the flat model and never the components it came from.
 WAIST = {"deck", "model"}
 SIMULATED = WAIST | {"simulation"}
-MIDDLE = {"design", "analysis", "observer", "control", "identification", "discrepancy", "export"}
+MIDDLE = {
+    *("design", "analysis", "observer", "control"),
+    *("identification", "discrepancy", "export", "regeneration"),
+}
 
 # room: the rooms it may import, besides itself and BASE
 MAY_IMPORT: dict[str, set[str]] = {
@@ -33,6 +36,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "identification": SIMULATED,
     "discrepancy": SIMULATED | {"identification"},
     "export": SIMULATED,
+    "regeneration": SIMULATED | {"observer", "identification", "discrepancy", "export"},
     "figures": SIMULATED | MIDDLE,
     "report": SIMULATED | MIDDLE | {"figures"},
     "cli": SIMULATED | MIDDLE | {"components", "figures", "report"},
@@ -62,7 +66,8 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"statistics"}, {"records"}, {"equation_error"}, {"estimation"}, {"output_error"},
     ),
     "discrepancy": (
-        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening"}, {"reporting"}, {"diagnose"},
+        {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
+        {"diagnose"},
     ),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+import json
+import shlex
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..quantity import typeset_unit
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import (
+    deck_option,
+    json_option,
+    measured_option,
+    out_option,
+    show_json,
+    show_table,
+    spring_option,
+)
+from .units import Number
 
 if TYPE_CHECKING:
+    from ..discrepancy import Verdict
+    from ..identification import RecordSet
+    from ..model import FlatModel
+    from ..report.sections import Section
     from ..simulation import Trace
 
 _file = click.Path(path_type=Path, dir_okay=False)
@@ -22,35 +41,78 @@ _mapping = click.option("--mapping", type=_file, default=None, help="TOML that m
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of CSV files.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
 @_mapping
+@click.option(
+    "--regenerate",
+    "again",
+    is_flag=True,
+    help="Design the torque observer again from the better model, write it as C and FMU, and compare it.",
+)
+@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True, help="Of the observer.")
+@spring_option
+@measured_option
 @out_option("out/diagnosis")
 @json_option
-def diagnose(
-    deck_name: str, records: Path, hold_out: tuple[str, ...], mapping: Path | None, out: Path, as_json: bool
-) -> None:
+def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
+    from ..discrepancy import DiagnosisRun, records_of_run, write_verdict
     from ..discrepancy import diagnose as find_what_is_missing
-    from ..discrepancy import write_verdict
     from ..identification import load_records
+    from ..locations import version
     from ..model import flatten
     from ..progress import Steps
     from ..report import verdict_sections, write_report
 
+    command = shlex.join(["nlsdesign", *sys.argv[1:]])
+    date = datetime.now().astimezone().isoformat(" ", "minutes")
     actuator = declare(load_deck(deck_name))
+    mapping, hold_out = options["mapping"], options["hold_out"]
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
     with steps.step("diagnosis"):
         verdict = find_what_is_missing(actuator, measured, progress=steps.note)
+    run = DiagnosisRun(deck_name, str(records), date, command, version(), records_of_run(measured))
+    verdict = replace(verdict, run=run)
     out.mkdir(parents=True, exist_ok=True)
     write_verdict(verdict, out)
+    content, text = verdict.to_dict(str(out / "model.toml")), str(verdict)
+    sections = verdict_sections(verdict)
+    facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     title = f"{actuator.name}: what is missing"
-    report = write_report(out / "report.html", *verdict_sections(verdict), title=title)
+    write_report(out / "report.html", *sections, title=title, facts=facts)
+    if options["again"]:
+        # The diagnosis stands in its files already, whatever happens to the observer.
+        with steps.step("observer"):
+            data, words, chapter = _regenerated(flatten(actuator), verdict, measured, out, options)
+        content, text = {**content, "regeneration": data}, f"{text}\n{words}"
+        write_report(out / "report.html", *sections, *chapter, title=title, facts=facts)
     if as_json:
-        show_json(verdict.to_dict(str(out / "model.toml")))
+        show_json(content)
         return
-    click.echo(str(verdict))
-    click.echo(f"report: {report}")
+    click.echo(text)
+    click.echo(f"report: {out / 'report.html'}")
+
+
+def _regenerated(
+    declared: FlatModel, verdict: Verdict, records: RecordSet, out: Path, options: Mapping[str, Any]
+) -> tuple[dict[str, Any], str, list[Section]]:
+    """Design and write the observer of the better model; return data, text and sections on it."""
+    from ..model import flatten
+    from ..regeneration import ObserverChoice, regenerate, write_regeneration
+    from ..report import regeneration_sections
+    from ..writing import write_text
+
+    choice = ObserverChoice(options["sample_time"], options["spring"], options["measured"])
+    result = regenerate(declared, flatten(verdict.actuator), records, fits=verdict.fits, choice=choice)
+    files, lacking = write_regeneration(result, out)
+    result = replace(result, reasons=(*result.reasons, *lacking))
+    content = {**result.to_dict(), "files": [str(path) for path in files]}
+    write_text(out / "regeneration.json", json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    lines = [*result.words(), *result.reasons]
+    if files:
+        lines.append(f"written: {', '.join(content['files'])}")
+    return content, "\n".join(lines), regeneration_sections(result, files)
 
 
 @click.command()

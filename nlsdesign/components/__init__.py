@@ -54,6 +54,7 @@ from .mechanics.motor import CurrentDrivenMotor, ElectricMotor, ResistiveMotor, 
 from .mechanics.place_friction import SpotFriction, WavyFriction
 from .mechanics.ripple import TorqueRipple
 from .mechanics.stops import EndStop, RigidStop
+from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
 from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
@@ -173,6 +174,8 @@ __all__ = [
     "TransportDelay",
     "Turned",
     "TwoSidedCam",
+    "UnnamedFriction",
+    "UnnamedSpring",
     "ViscousHeat",
     "ViscousMaterial",
     "VoltageDrivenMotor",

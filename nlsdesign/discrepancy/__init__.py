@@ -3,6 +3,8 @@
 from .blocks.prediction_of_blocks import predict
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
+from .reporting.circumstances import DiagnosisRun, records_of_run
+from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 
@@ -11,7 +13,9 @@ __all__ = [
     "BlockError",
     "Candidate",
     "Course",
+    "DiagnosisRun",
     "Effect",
+    "EffectEvidence",
     "FittedNumber",
     "NamedEffect",
     "RecordGap",
@@ -20,6 +24,7 @@ __all__ = [
     "Verdict",
     "diagnose",
     "predict",
+    "records_of_run",
     "refit",
     "write_refit",
     "write_verdict",

@@ -1,8 +1,8 @@
 """The whole chain: refit, locate, name, add, refit, judge on records that no fit has seen, abstain.
 
-Each hypothesis is fitted to the same records in the same way; what decides is the share of a block's excess
-over the noise that an effect explains, on the fitted and on the held-out records. An effect that explains
-little is not added, however significant; if what remains is large, the verdict is ``unknown``.
+Each hypothesis is fitted to the same records in the same way; what decides is how well it predicts records
+that its numbers were not fitted to, in units of the noise, by one rule (``docs/decision.md``). Records with
+the role ``held_out`` take no part: they are read once, when the verdict stands, for the error it reports.
 
 To understand why an effect was named, read on in ``selection/search.py``, what is tried and in which order,
 and in ``selection/criteria.py``, which decides.
@@ -11,6 +11,7 @@ and in ``selection/criteria.py``, which decides.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ from .effects import ALL, EffectFunction
 from .fitting.unpredictable import Key
 from .reporting.advice import advice, more_excitation, where_they_differ
 from .reporting.gap import course_of, gaps_of, shapes_of
+from .reporting.named_effect import EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict
@@ -35,11 +37,13 @@ from .screening.causality import lagging_forces
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
 from .selection.comparison import Comparison
-from .selection.criteria import DECLARED, Excess, Excesses
+from .selection.criteria import DECLARED, Criteria, Excess, Excesses, Standing, is_complete
 from .selection.excess import excesses
 from .selection.hypothesis import Hypothesis
 from .selection.search import Outcome, Step, search
+from .selection.standing import standing_of
 
+_CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 """So many of each are shown; a longer list is not read."""
 
@@ -61,6 +65,7 @@ def diagnose(
     records: RecordSet,
     *,
     catalogue: Sequence[EffectFunction] = ALL,
+    criteria: Criteria = _CRITERIA,
     progress: Callable[[str], None] = _silent,
 ) -> Verdict:
     """Find out what a declared model lacks.
@@ -73,6 +78,8 @@ def diagnose(
         Bench records with their roles.
     catalogue
         Effects to try; functions from an assembly to candidates.
+    criteria
+        Numbers of the decision rule.
     progress
         Told what is being tried.
 
@@ -89,61 +96,92 @@ def diagnose(
         If the declared model cannot be refitted.
     """
     progress("refitting the declared model")
-    bench = Bench(records, blocks_of(flatten(actuator), records.signals))
-    records = bench.records
-    comparison = Comparison(bench, typical_sizes(actuator, records))
-    base = comparison.base(actuator)
-    findings = [*records.findings, *out_of_reach(actuator, records), *scale_findings(comparison, base)]
-    lagging = lagging_forces(actuator, records)
+    chosen_by = records.without_held_out()
+    bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
+    case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
+    base = case.comparison.base(actuator)
+    outcome, decision = _decided(case, base, catalogue, progress)
+    progress("reading the held-out records")
+    return _verdict(case, base, outcome, decision, records)
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """What a decision rests on: the declared assembly, the records that choose, and the rule."""
+
+    actuator: Assembly
+    bench: Bench
+    comparison: Comparison
+    criteria: Criteria
+
+    def excesses(self, hypothesis: Hypothesis) -> Excesses:
+        """Return the excess of each block on all samples."""
+        return excesses(hypothesis, self.bench, self.criteria)
+
+
+def _decided(
+    case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+) -> tuple[Outcome, _Decision]:
+    records = case.bench.records
+    findings = [
+        *records.findings,
+        *out_of_reach(case.actuator, records),
+        *scale_findings(case.comparison, base),
+    ]
+    lagging = lagging_forces(case.actuator, records)
     if findings or (lagging.findings and not lagging.testable):
         findings += lagging.findings
-        decision = _Decision("data_suspect", tuple(str(f) for f in findings))
-        return _verdict(comparison, base, Outcome(base), decision)
-    outcome = search(comparison, base, catalogue, progress)
+        return Outcome(base), _Decision("data_suspect", tuple(str(f) for f in findings))
+    outcome = search(case.comparison, base, catalogue, case.criteria, progress)
     if lagging.findings and not any(step.chosen.newest.explains_lag for step in outcome.steps):
-        decision = _Decision("data_suspect", tuple(str(f) for f in lagging.findings))
-    else:
-        decision = _decision(comparison, base, outcome)
-    return _verdict(comparison, base, outcome, decision)
+        return outcome, _Decision("data_suspect", tuple(str(f) for f in lagging.findings))
+    return outcome, _decision(case, base, outcome)
 
 
-def _decision(comparison: Comparison, base: Hypothesis, outcome: Outcome) -> _Decision:
+def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     """Return what is missing, unless other numbers of the rig explain the records better."""
     verdict: Literal["none", "named", "unknown"]
-    if not any(e.open for e in excesses(base, comparison.bench).values()):
+    if not any(e.open for e in case.excesses(base).values()):
         verdict = "none"
     else:
         verdict = "named" if outcome.steps and outcome.explained else "unknown"
-    other = other_numbers(comparison, base, outcome.last if verdict == "named" else base)
+    better = outcome.last if verdict == "named" else base
+    other = other_numbers(case.comparison, base, better, case.criteria)
     return _Decision("data_suspect" if other.decides else verdict, (other.words,) if other.words else ())
 
 
-def _verdict(comparison: Comparison, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Verdict:
+def _verdict(
+    case: _Case, base: Hypothesis, outcome: Outcome, decision: _Decision, records: RecordSet
+) -> Verdict:
     verdict = decision.verdict
     base = base.as_written()
     better = outcome.last.as_written() if verdict == "named" else base
     steps = outcome.steps if verdict == "named" else ()
-    before, after = excesses(base, comparison.bench), excesses(better, comparison.bench)
+    before, after = case.excesses(base), case.excesses(better)
     worst = _furthest([n for n in before if n != DECLARED], before)
-    unpredictable = [k for k in comparison.keys if k in better.unpredictable]
+    unpredictable = [k for k in case.comparison.keys if k in better.unpredictable]
+    # From here on, nothing is chosen any more.
+    every = case.comparison.with_records(records)
     return Verdict(
         verdict,
         tuple(_named(better, step, place) for place, step in enumerate(steps)),
-        tuple(_where(before[n], after[n]) for n in before if n != DECLARED or before[n].open)
+        ((_strained(before[DECLARED], after[DECLARED]),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
-        gaps_of(base, better, comparison),
+        gaps_of(base, better, every),
         worst,
         _runners_up(outcome, steps),
         sourced(better),
         sourced(base),
-        course_of(base, better, comparison, worst),
+        course_of(base, better, every, worst),
         tuple(text for fit in better.fits.values() for text in fit.unidentified()),
-        shapes_of(base, better, comparison, worst),
+        shapes_of(base, better, every, worst),
         tuple(better.fits.values()),
-        _remainder(comparison, better, after) if verdict in ("named", "unknown") else None,
-        _next_steps(comparison, steps, tuple(better.fits.values())),
+        _remainder(case.comparison, better, after) if verdict in ("named", "unknown") else None,
+        _next_steps(case.comparison, steps, tuple(better.fits.values())),
         outcome.skipped,
+        complete=is_complete(after),
+        criteria=case.criteria,
     )
 
 
@@ -152,12 +190,14 @@ def _furthest(names: Sequence[str], excesses: Excesses) -> str:
     return max(names, key=lambda name: excesses[name].mean_square)
 
 
-def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[str, float], ...]:
-    """Return what was tried first, with the share that it explains; what was named is always among it."""
+def _runners_up(outcome: Outcome, steps: Sequence[Step]) -> tuple[tuple[Any, ...], ...]:
+    """Return what was tried first: identifier, share that it explains alone, and why it is not named."""
     named = {step.effect for step in steps}
-    tried = [(c.effect, share) for c, share in outcome.ranking]
-    first = sorted(tried, key=lambda pair: pair[0] not in named)[:_RUNNERS_UP]
-    return tuple(sorted(first, key=lambda pair: -pair[1]))
+    first = sorted(outcome.tried, key=lambda each: each.candidate.effect not in named)[:_RUNNERS_UP]
+    return tuple(
+        (each.candidate.effect, each.share, *(("; ".join(each.objections),) if each.objections else ()))
+        for each in sorted(first, key=lambda each: -each.share)
+    )
 
 
 def _remainder(comparison: Comparison, better: Hypothesis, after: Excesses) -> Remainder | None:
@@ -183,16 +223,11 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     return (*sentences, *more_excitation(fits))
 
 
-def _where(before: Excess, after: Excess) -> str:
-    if before.block == DECLARED:
-        return (
-            f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
-            f"{after.fit:.1f} after"
-        )
-    ratio, later = before.held_out / before.floor, after.held_out / after.floor
-    state = "open" if before.open else "closed"
-    times = f"{ratio:.2f} times the noise floor on held-out records before, {later:.2f} after"
-    return f"{before.block} ({state}): {times}"
+def _strained(before: Excess, after: Excess) -> str:
+    return (
+        f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
+        f"{after.fit:.1f} after"
+    )
 
 
 def _not_predicted(key: Key) -> str:
@@ -218,10 +253,24 @@ def _named(last: Hypothesis, step: Step, place: int) -> NamedEffect:
         candidate.location,
         numbers,
         tuple(h.newest.effect for h in step.equals),
-        step.share_fit,
-        step.share_held_out,
+        step.share,
         candidate.signature,
         candidate.source,
+        evidence=_evidence(step, standing_of(candidate.unknowns, last.fits.values())),
+    )
+
+
+def _evidence(step: Step, standing: Standing) -> EffectEvidence:
+    # Half the gain in effective squares of the noise is the gain in predictive log density.
+    deciding = [n.name for n in standing.numbers if n.decides]
+    worst = min(step.gains, key=lambda record: step.gains[record], default="")
+    return EffectEvidence(
+        0.5 * step.gain.value,
+        0.5 * step.gain.error,
+        deciding[0] if deciding else "",
+        standing.exclusion if deciding else math.nan,
+        worst,
+        0.5 * step.gains[worst] if worst else math.nan,
     )
 
 

@@ -35,6 +35,8 @@ Curve = tuple[Floats, Floats]
 
 BEFORE, AFTER = VERMILLION, BLUE
 """Colours of the declared and of the completed model, the same in every figure."""
+UNCHANGED = "refitted model"
+"""What stands in place of ``before`` where nothing was added, so that there is no ``after``."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +88,14 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
     figure, (axes,) = panels(height=3.4)
     unit = typeset_unit(unit)
     positions = np.arange(len(ordered), dtype=float)
+    changed = any(e.before != e.after for e in ordered)
     bars = (("before", -0.2, BEFORE.light, "///"), ("after", 0.2, AFTER.light, ""))
-    for label, shift, tone, hatch in bars:
-        heights = [getattr(e, label) for e in ordered]
-        drawn = axes.bar(
-            positions + shift, heights, 0.38, color=tone, hatch=hatch, edgecolor=SURFACE.light, label=label
-        )
-        axes.bar_label(drawn, [significant(h, 2) for h in heights], padding=2, fontsize=8, color=INK.light)
+    for which, shift, tone, hatch in bars if changed else bars[:1]:
+        heights = [getattr(e, which) for e in ordered]
+        label = which if changed else UNCHANGED
+        places = positions + (shift if changed else 0.0)
+        drawn = axes.bar(places, heights, 0.38, color=tone, hatch=hatch, edgecolor=SURFACE.light, label=label)
+        axes.bar_label(drawn, [significant(h) for h in heights], padding=2, fontsize=8, color=INK.light)
     floors = [e.noise_floor for e in ordered]
     axes.hlines(
         floors, positions - 0.45, positions + 0.45, color=INK.light, linewidth=1.6, label="noise floor"
@@ -114,9 +117,7 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
     axes.set_ylabel(f"rms {quantity} in {unit}")
     legend(axes)
     held_out = [
-        f"{e.record} {significant(e.before, 2)} to {significant(e.after, 2)} {unit}"
-        for e in ordered
-        if e.held_out
+        f"{e.record} {significant(e.before)} to {significant(e.after)} {unit}" for e in ordered if e.held_out
     ]
     return described(
         figure, f"Error of each record before and after. Held out: {'; '.join(held_out) or 'none'}."
@@ -125,7 +126,7 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """One held-out record: measured and simulated; arrays of shape (n,).
+    """One record: measured and predicted, filtered alike; arrays of shape (n,).
 
     Parameters
     ----------
@@ -136,7 +137,9 @@ class HeldOut:
     quantity, unit
         Name and unit, for the axes.
     noise
-        Standard deviation of the measurement.
+        Standard deviation of the noise that passes the filter.
+    title
+        Above the upper panel.
     """
 
     time: Floats
@@ -146,11 +149,12 @@ class HeldOut:
     quantity: str
     unit: str
     noise: float = 0.0
+    title: str = "Held-out record"
 
 
 @styled
 def held_out_series(record: HeldOut) -> Figure:
-    """Draw a held-out record over time, measured and simulated; below, the residuals.
+    """Draw a record over time, measured and predicted; below, the errors, whose rms is that of the record.
 
     Parameters
     ----------
@@ -163,9 +167,10 @@ def held_out_series(record: HeldOut) -> Figure:
         *thinned(record.time, record.measured), color=INK.light, linewidth=2.6, alpha=0.4, label="measured"
     )
     errors = []
+    changed = not np.array_equal(record.before, record.after)
     for label, values, tone, dash in (
-        ("before", record.before, BEFORE.light, DASHES[1]),
-        ("after", record.after, AFTER.light, DASHES[0]),
+        ("before" if changed else UNCHANGED, record.before, BEFORE.light, DASHES[1]),
+        *([("after", record.after, AFTER.light, DASHES[0])] if changed else []),
     ):
         residual = record.measured - values
         rms = f"{significant(root_mean_square(residual))} {unit}"
@@ -186,11 +191,11 @@ def held_out_series(record: HeldOut) -> Figure:
             zorder=0.5,
             label="noise, ± 2 standard deviations",
         )
-    _finish(upper, f"{record.quantity} in {unit}", "Held-out record")
-    _finish(lower, f"residual in {unit}", "Measured minus simulated")
+    _finish(upper, f"{record.quantity} in {unit}", record.title)
+    _finish(lower, f"error in {unit}", "Measured minus predicted")
     lower.set_xlabel("time in s")
     return described(
-        figure, f"A held-out record of {record.quantity} over time. Remaining error: {', '.join(errors)}."
+        figure, f"{record.title}: {record.quantity} over time. Remaining error: {', '.join(errors)}."
     )
 
 
@@ -210,9 +215,10 @@ def binned_errors(before: Curve, after: Curve, *, across: str, unit: str, name: 
         What the error belongs to, for the alternative text.
     """
     figure, (axes,) = panels(height=3.0)
+    changed = not np.array_equal(before[1], after[1])
     for label, (x, y), tone, dash, marker in (
-        ("before", before, BEFORE.light, DASHES[1], "s"),
-        ("after", after, AFTER.light, DASHES[0], "o"),
+        ("before" if changed else UNCHANGED, before, BEFORE.light, DASHES[1], "s"),
+        *([("after", after, AFTER.light, DASHES[0], "o")] if changed else []),
     ):
         axes.plot(*thinned(x, y), color=tone, linestyle=dash, marker=marker, label=label, linewidth=1.4)
     axes.margins(x=0.02)

@@ -13,7 +13,7 @@ from ..components.core.element import MATERIAL, Domain, Element
 from ..components.core.part import Part, walk
 from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen
-from ..components.mechanics.bodies import Body, Free, GearedMotor
+from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
 from ..components.mechanics.motor import ElectricMotor
 from ..components.transmission.cam_drive import Through
 from .gear_train import trains
@@ -62,6 +62,11 @@ class MovingBody:
         Names of the bodies that move with it through rigid gears.
     motor
         The motor in it; ``None`` for a body without one.
+    commands
+        Names of the inputs and signals that command a drive in it, or in what is geared to it, such as a
+        voltage or current: whatever is not known of them was not zero. A load from outside is none.
+    goals
+        Names of the inputs that controllers in it follow.
     """
 
     name: str
@@ -72,6 +77,13 @@ class MovingBody:
     drives: tuple[str, ...]
     geared: tuple[str, ...] = ()
     motor: MotorNames | None = None
+    commands: tuple[str, ...] = ()
+    goals: tuple[str, ...] = ()
+
+    @property
+    def acceleration(self) -> str:
+        """Name of the signal of its acceleration; there is none where the motion is prescribed."""
+        return f"{self.name}.acceleration"
 
     @property
     def prescribed(self) -> bool:
@@ -275,10 +287,20 @@ def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
         drives = tuple(_declared_by([name], owners.inputs))
         inertia = f"{name}.{'train_inertia' if name in geared else part.inertia_name}"
         motor = _motor(name, part, drives) if isinstance(part, GearedMotor | ElectricMotor) else None
+        commands, goals = _commands(assembly, (name, *geared.get(name, ())))
         bodies.append(
-            MovingBody(name, part.domain, motion, rate, inertia, drives, geared.get(name, ()), motor)
+            MovingBody(
+                name, part.domain, motion, rate, inertia, drives, geared.get(name, ()), motor, commands, goals
+            )
         )
     return tuple(bodies)
+
+
+def _commands(assembly: Assembly, names: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what commands the drives in bodies that move together, and the goals of their controllers."""
+    free = [(name, part) for name in names if isinstance(part := assembly[name], Free)]
+    driven = [(n, p) for n, p in free if p.chain or not isinstance(p, Inertia | Mass)]
+    return tuple(f"{n}.{p.command[0]}" for n, p in driven), tuple(f"{n}.goal" for n, p in driven if p.loops)
 
 
 def _motor(name: str, part: GearedMotor | ElectricMotor, drives: Iterable[str]) -> MotorNames:

@@ -5,6 +5,7 @@ from .cam_section import CamSection
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
 from .page import report_text, write_report
+from .regeneration import regeneration_sections
 from .sections import (
     Chapter,
     FigureSection,
@@ -37,6 +38,7 @@ __all__ = [
     "comparison_table",
     "numbers_table",
     "range_table",
+    "regeneration_sections",
     "report_text",
     "verdict_sections",
     "write_report",

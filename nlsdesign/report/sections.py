@@ -18,7 +18,7 @@ from .html import Html
 
 Cell = str | int | float
 
-_NUMBER = re.compile(r"^[−-]?\d[\d.]*(·10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?( ?%)?$")
+_NUMBER = re.compile(r"^(± )?\(?[−+-]?\d[\d.]*( ± \d[\d.]*\)?)?(·10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)?( ?%)?$")
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,9 @@ class TableSection(Section):
             for i, row in enumerate(texts)
         ]
         head = list(zip(self.columns, right, strict=True))
-        return {"head": head, "rows": rows, "caption": self.caption, "folded": self.folded}
+        return {
+            "title": self.title, "head": head, "rows": rows, "caption": self.caption, "folded": self.folded,
+        }  # fmt: skip
 
 
 def _shown(cell: Cell) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
+from ..discrepancy.reporting.verdict import Gap
 from ..errors import unknown_name
 from .sections import PagePosition, Section
 
@@ -13,8 +14,12 @@ VERDICTS = {
     "none": "nothing is missing",
     "named": "effect named",
     "unknown": "an effect without a name",
+    "undecidable": "the records cannot tell",
     "data_suspect": "the data are suspect",
 }
+
+_WIDTH = 100.0
+"""Width of the longer bar of the gap, in units of the drawing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +29,13 @@ class VerdictSection(Section):
     Parameters
     ----------
     verdict
-        ``"none"``, ``"named"``, ``"unknown"`` or ``"data_suspect"``.
+        ``"none"``, ``"named"``, ``"unknown"``, ``"undecidable"`` or ``"data_suspect"``.
     words
         The findings, in sentences.
+    headline
+        The findings in one line.
+    gap
+        Error before and after; ``None`` where there is none to show.
     parts
         Sections with the evidence.
 
@@ -39,6 +48,8 @@ class VerdictSection(Section):
     verdict: str
     words: str
     _: KW_ONLY
+    headline: str = ""
+    gap: Gap | None = None
     parts: tuple[Section, ...] = ()
     template: ClassVar[str] = "verdict.html"
 
@@ -57,4 +68,25 @@ class VerdictSection(Section):
             }
             for i, part in enumerate(self.parts, start=1)
         ]
-        return {"verdict": self.verdict, "badge": VERDICTS[self.verdict], "words": self.words, "parts": parts}
+        return {
+            "verdict": self.verdict,
+            "badge": VERDICTS[self.verdict],
+            "headline": self.headline,
+            "gap": None if self.gap is None else _drawn(self.gap),
+            "words": self.words,
+            "parts": parts,
+        }
+
+
+def _drawn(gap: Gap) -> Mapping[str, Any]:
+    """Return the two bars of a gap and the numbers below them."""
+    longest = max(gap.before, gap.after) or 1.0
+    bars = {n: f"{_WIDTH * getattr(gap, n) / longest:.2f}" for n in ("before", "after")}
+    records = "records that no fit has seen" if gap.role == "held_out" else "the fitted records"
+    note = (
+        "before, the refitted declared model; after, with what was added. Both filtered alike."
+        if gap.changed
+        else "the refitted declared model; nothing was added."
+    )
+    note = f"Root mean square error of `{gap.block}` on {records}: {note}"
+    return {"bars": bars if gap.changed else None, "rows": gap.rows(), "note": note, "words": gap.words()}

@@ -9,18 +9,25 @@ sliders, the step is fixed at 20 kHz.  Only numpy and the standard library are u
 """
 
 from .actuators import ACTUATORS, Actuator, with_slack_cable
+from .conditions import COUNTS, PLAIN, THREE_RECORDS, Conditions, mistaken
 from .declaration import write_collection, write_declaration, write_records, write_set
-from .effects import EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS, Hidden
+from .effects import EFFECTS, LATER_EFFECTS, OUTSIDE_ANY_CATALOGUE, STRENGTHS, Hidden
 from .records import make_records, truth
 
 __all__ = [
     "ACTUATORS",
+    "COUNTS",
     "EFFECTS",
+    "LATER_EFFECTS",
     "OUTSIDE_ANY_CATALOGUE",
+    "PLAIN",
     "STRENGTHS",
+    "THREE_RECORDS",
     "Actuator",
+    "Conditions",
     "Hidden",
     "make_records",
+    "mistaken",
     "truth",
     "with_slack_cable",
     "write_collection",

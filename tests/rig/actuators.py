@@ -1,12 +1,16 @@
-"""Two made-up actuators with cam and rubber: what their makers declare, and what was really built.
+"""Four made-up actuators with cam and rubber: what their makers declare, and what was really built.
 
 All numbers are invented for the tests.  The cams are formulas, the tables written for the makers are samples
 of them:
 
-``arm``    δ(θ) = R (θ + α (1 − cos θ)),      h(θ) = R (1 + α sin θ):   lever arm jumps to R at θ = 0+
-``wrist``  δ(θ) = R θ₀ ln cosh(θ / θ₀),        h(θ) = R tanh(θ / θ₀):    lever arm starts at zero
+``arm``       δ(θ) = R (θ + α (1 − cos θ)),      h(θ) = R (1 + α sin θ):   lever arm jumps to R at θ = 0+
+``wrist``     δ(θ) = R θ₀ ln cosh(θ / θ₀),        h(θ) = R tanh(θ / θ₀):    lever arm starts at zero
+``elbow``     h(θ) = R (1 + a exp(−θ/w) + g sin²(cθ)): falls from its largest value, then grows again
+``shoulder``  δ(θ) = R (θ + β θ²/2),              h(θ) = R (1 + β θ):       lever arm grows with the angle
 
-Both have h > 0 for θ > 0, so the extension grows with the angle, and h = dδ/dθ exactly.
+All have h > 0 for θ > 0, so the extension grows with the angle, and h = dδ/dθ exactly.  ``elbow`` has the
+sensors, motions, forces and currents of the practice records; ``shoulder`` is slower, stronger and measured
+400 times a second by other sensors.
 """
 
 from __future__ import annotations
@@ -128,6 +132,35 @@ def _wrist_cam() -> Cam:
     )
 
 
+def _elbow_cam() -> Cam:
+    radius, peak, width, growth, turn = 0.0113, 0.32, 0.035, 0.40, 1.75
+    return Cam(
+        extension=lambda angle: (
+            radius
+            * (
+                angle
+                - peak * width * np.expm1(-angle / width)
+                + growth * (0.5 * angle - np.sin(2.0 * turn * angle) / (4.0 * turn))
+            )
+        ),
+        lever_arm=lambda angle: (
+            radius * (1.0 + peak * np.exp(-angle / width) + growth * np.sin(turn * angle) ** 2)
+        ),
+        last_angle=np.radians(56.0),
+        rows=201,
+    )
+
+
+def _shoulder_cam() -> Cam:
+    radius, growth = 0.018, 0.35
+    return Cam(
+        extension=lambda angle: radius * (angle + 0.5 * growth * angle**2),
+        lever_arm=lambda angle: radius * (1.0 + growth * angle),
+        last_angle=np.radians(60.0),
+        rows=121,
+    )
+
+
 ARM = Actuator(
     name="arm",
     rubber=Rubber(
@@ -164,7 +197,43 @@ WRIST = Actuator(
     ripple_order=27,
 )
 
-ACTUATORS = {actuator.name: actuator for actuator in (ARM, WRIST)}
+ELBOW = Actuator(
+    name="elbow",
+    rubber=Rubber(
+        area=1.05e-4,
+        length=0.0130,
+        k_star=(8.8e5, 6.2e5, 7.0e5, 7.4e5, 5.2e5, 1.1e6),
+        engage=(0.0, 2.5e-4, 1.2e-3, 2.8e-3, 7.5e-3, 9.2e-3),
+        k=6.2e5,
+        eta=2.1e4,
+    ),
+    drivetrain=Drivetrain(
+        inertia=0.0095, cam_share=0.1, gear_ratio=25.0, torque_constant=0.0310, viscosity=0.013
+    ),
+    cam=_elbow_cam(),
+    sensors=Sensors(),
+    ripple_order=14,
+)
+
+SHOULDER = Actuator(
+    name="shoulder",
+    rubber=Rubber(
+        area=3.2e-4,
+        length=0.040,
+        k_star=(4.5e5, 3.0e5, 5.5e5),
+        engage=(0.0, 2.0e-3, 8.0e-3),
+        k=3.0e5,
+        eta=2.4e4,
+    ),
+    drivetrain=Drivetrain(
+        inertia=0.030, cam_share=0.15, gear_ratio=48.0, torque_constant=0.042, viscosity=0.050
+    ),
+    cam=_shoulder_cam(),
+    sensors=Sensors(counts=4096, current_noise=0.02, force_noise=0.9, sample_rate=400.0),
+    ripple_order=21,
+)
+
+ACTUATORS = {actuator.name: actuator for actuator in (ARM, WRIST, ELBOW, SHOULDER)}
 
 
 def with_slack_cable(actuator: Actuator) -> Actuator:

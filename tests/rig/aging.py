@@ -7,6 +7,7 @@ step sees F* as  softness · F*(y − set).
                 rubber and rubber beyond y_max are untouched)
     set         s · y_max, at once
     heat        dϑ/dt = gain · (M₁²/(a η) + M₂²/(a η₂)) − ϑ/τ,  softness 1/(1 + ϑ)
+    warmer      softness 1 − s from a moment on
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from .effects import Hidden
 class Aging:
     """Softness and set of one piece of rubber, which starts virgin and cold."""
 
-    def __init__(self, rubber: Rubber, hidden: Hidden, step: float) -> None:
-        self._hidden, self._step = hidden, step
+    def __init__(self, rubber: Rubber, hidden: Hidden, step: float, warmer: int = 0) -> None:
+        self._hidden, self._step, self._left = hidden, step, warmer
         self._loss = 1.0 / (rubber.shape * rubber.eta)
         second = hidden.branch_modulus * hidden.branch_time
         self._second_loss = 1.0 / (rubber.shape * second) if second else 0.0
@@ -30,7 +31,7 @@ class Aging:
     def present(self) -> bool:
         """Whether anything ages at all."""
         hidden = self._hidden
-        return bool(hidden.softening or hidden.permanent_set or hidden.heating)
+        return bool(hidden.softening or hidden.permanent_set or hidden.heating or hidden.cold)
 
     def advance(self, extension: float, memory: float, second: float) -> None:
         """Take note of an extension (m) and the forces of both Maxwell branches (N)."""
@@ -44,4 +45,8 @@ class Aging:
             power = self._loss * memory * memory + self._second_loss * second * second
             self._heat += self._step * (hidden.heating * power - self._heat / hidden.cooling_time)
             softness /= 1.0 + self._heat
+        if hidden.cold:
+            self._left -= 1
+            if self._left < 0:
+                softness *= 1.0 - hidden.cold
         self.softness, self.set = softness, hidden.permanent_set * self._largest

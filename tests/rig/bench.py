@@ -75,12 +75,14 @@ def _cam_tables(cam: Cam, bump: float) -> tuple[list[float], list[float]]:
     return np.concatenate([[0.0], np.cumsum(steps)]).tolist(), lever_arm.tolist()
 
 
-def _friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | None:
+def friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | None:
     """Level of dry friction (N·m) from speed, angle and spring torque; None where there is none."""
-    if not (hidden.friction or hidden.breakaway or hidden.load_friction or hidden.spot_friction):
+    usual = hidden.friction or hidden.breakaway or hidden.load_friction or hidden.spot_friction
+    if not (usual or hidden.place_friction):
         return None
     base, rise, slow = hidden.friction, hidden.breakaway, hidden.stribeck_speed
     share, spot = hidden.load_friction, hidden.spot_friction
+    varying, phase = hidden.place_friction, hidden.place_phase
 
     def level(speed: float, angle: float, load: float) -> float:
         total = base + share * abs(load)
@@ -88,12 +90,14 @@ def _friction_level(hidden: Hidden) -> Callable[[float, float, float], float] | 
             total += rise * exp(-((speed / slow) ** 2))
         if spot:
             total += spot * exp(-(((angle - SPOT_PLACE) / SPOT_WIDTH) ** 2))
+        if varying:
+            total += varying * (1.0 + 0.8 * sin(2.0 * angle + phase))
         return total
 
     return level
 
 
-def _prox(speed: float, threshold: float) -> float:
+def prox(speed: float, threshold: float) -> float:
     """Speed after dry friction that can change it by at most the threshold."""
     if speed > threshold:
         return speed - threshold
@@ -115,13 +119,13 @@ def _gear_backlash(drive: Drivetrain, gap: float) -> Callable[..., tuple[float, 
     def advance(
         speed: float, cam_speed: float, lead: float, push: float, load: float, friction: float
     ) -> tuple[float, float]:
-        free = _prox(speed + STEP * push / motor_inertia, friction / motor_inertia)
+        free = prox(speed + STEP * push / motor_inertia, friction / motor_inertia)
         flight = cam_speed - STEP * load / cam_inertia
         closing = min(max(free - flight, (-half - lead) / STEP), (half - lead) / STEP)
         if closing == free - flight:
             return free, flight
         momentum = motor_inertia * speed + STEP * push + cam_inertia * (flight + closing)
-        together = _prox(momentum / drive.inertia, friction / drive.inertia)
+        together = prox(momentum / drive.inertia, friction / drive.inertia)
         return together, together - closing
 
     return advance
@@ -132,6 +136,10 @@ def _feeds(servo: Servo, hidden: Hidden, command: Command) -> Iterator[tuple[flo
     feed = servo.stiffness * command.angle + servo.damping * command.speed
     turns = hidden.disturbance_frequency * command.time
     push = hidden.disturbance * np.sin(2.0 * np.pi * turns + hidden.disturbance_phase)
+    slow = 2.0 * np.pi * hidden.slow_frequency * command.time + hidden.slow_phase
+    push += hidden.slow_load * np.sin(slow) + hidden.constant_torque
+    since = (command.time - hidden.push_place * command.time[-1]) / hidden.push_time
+    push += hidden.push * np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
     load = hidden.shake * np.sin(2.0 * np.pi * hidden.shake_frequency * command.time)
     return zip(feed.tolist(), push.tolist(), (load + hidden.cam_offset).tolist(), strict=True)
 
@@ -142,10 +150,11 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
     per_ampere, viscosity, inertia = drive.torque_per_ampere, drive.viscosity, drive.inertia
     k_p, k_d, limit = servo.stiffness, servo.damping, servo.limit
     delta, lever = _cam_tables(built.cam, hidden.profile_error)
-    pull = pull_of(built.rubber, hidden, STEP)
-    level = _friction_level(hidden)
+    pull = pull_of(built.rubber, hidden, STEP, round(hidden.cold_place * command.time.size))
+    level = friction_level(hidden)
     backlash = _gear_backlash(drive, hidden.gap) if hidden.gap else None
     ripple, order, phase = hidden.ripple, hidden.ripple_order, hidden.ripple_phase
+    stop, stop_place, weight = hidden.stop, hidden.stop_place, hidden.weight
     act, pass_on, drag, per_grid = acting_current(hidden), capstan(hidden), hidden.drag, 1.0 / CAM_GRID
     motor = cam = speed = cam_speed = friction = 0.0
     rows: list[tuple[float, ...]] = []
@@ -171,6 +180,11 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
             push -= drag * speed * abs(speed)
         if ripple:
             push -= ripple * sin(order * motor + phase)
+        if weight:
+            push -= weight * sin(motor)
+        if stop and abs(motor) > stop_place:
+            way = abs(motor) - stop_place
+            push -= stop * way * way if motor > 0.0 else -stop * way * way
         if level is not None:
             friction = STEP * level(speed, motor, load)
         if backlash is not None:
@@ -178,6 +192,6 @@ def simulate(built: Actuator, hidden: Hidden, servo: Servo, command: Command) ->
             motor += STEP * speed
             cam += STEP * cam_speed
         else:
-            speed = _prox(speed + STEP * (push - load) / inertia, friction / inertia)
+            speed = prox(speed + STEP * (push - load) / inertia, friction / inertia)
             cam = motor = motor + STEP * speed
     return History(command.time, *np.array(rows).T)

@@ -58,11 +58,16 @@ def sines(time: np.ndarray, amplitudes: np.ndarray, frequencies: np.ndarray, pha
 
 def hold(time: np.ndarray) -> Command:
     """Angles of `HOLDS` one after the other, each reached by a smooth rise."""
+    return steps(time, np.radians(HOLDS), HOLD_TIME, HOLD_RISE)
+
+
+def steps(time: np.ndarray, angles: np.ndarray, each: float, duration: float) -> Command:
+    """Angles (rad) one after the other, every so many seconds, each reached by a smooth rise."""
     angle, speed, before = np.zeros_like(time), np.zeros_like(time), 0.0
-    for i, target in enumerate(np.radians(HOLDS)):
-        rise, slope = _smooth((time - i * HOLD_TIME) / HOLD_RISE)
+    for i, target in enumerate(angles):
+        rise, slope = _smooth((time - i * each) / duration)
         angle += (target - before) * rise
-        speed += (target - before) * slope / HOLD_RISE
+        speed += (target - before) * slope / duration
         before = target
     return Command(time, angle, speed)
 
@@ -85,3 +90,17 @@ def commands(draw: np.random.Generator) -> dict[str, Command]:
     made["hold"] = hold(_clock(HOLD_TIME * len(HOLDS)))
     made["multisine"] = multisine(_clock(MULTISINE_TIME), draw)
     return made
+
+
+def command_of(time: np.ndarray, angle: np.ndarray) -> Command:
+    """A command from samples of the wanted angle, with a cubic spline through them."""
+    clock = np.arange(round((time[-1] - time[0]) / STEP)) * STEP
+    slope = np.gradient(angle, time)
+    step = time[1] - time[0]
+    place = np.minimum((clock / step).astype(int), len(time) - 2)
+    x = clock / step - place
+    left, right, into, out = angle[place], angle[place + 1], step * slope[place], step * slope[place + 1]
+    bend, more = 3.0 * (right - left) - 2.0 * into - out, into + out - 2.0 * (right - left)
+    return Command(
+        clock, left + x * (into + x * (bend + x * more)), (into + x * (2.0 * bend + 3.0 * x * more)) / step
+    )

@@ -68,11 +68,17 @@ def write_records(folder: Path, records: Mapping[str, np.ndarray]) -> None:
         np.savetxt(
             folder / f"{name}.csv",
             table,
-            fmt=("%.3f", "%.6f", "%.3f", "%.2f"),
+            fmt=(_clock(table[:, 0]), "%.6f", "%.3f", "%.2f"),
             delimiter=",",
             header="t_s,theta_rad,current_A,force_N",
             comments="",
         )
+
+
+def _clock(time: np.ndarray) -> str:
+    """Digits of the time: milliseconds unless the samples lie between them."""
+    between = np.any(np.abs(1e3 * time - np.round(1e3 * time)) > 1e-6)
+    return "%.4f" if between else "%.3f"
 
 
 def write_set(folder: Path, actuator: Actuator, records: Mapping[str, np.ndarray]) -> None:

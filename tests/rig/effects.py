@@ -31,10 +31,23 @@ permanent_set                     0.06 of the largest extension so far
 strain_stiffening                 0.2 F at δ, growing with the cube of the extension
 force_sensor_drift                0.004 F/s from the start of each record
 angle_sensor_eccentricity         0.02 rad · (sin(θ + phase) − sin(phase))
-winding_heat (no catalogue)       torque per ampere falls by 0.08/s at the current for T, cooling in 6 s
+winding_heat                      torque per ampere falls by 0.08/s at the current for T, cooling in 6 s
 cable_resonance (no catalogue)    force read through a weakly damped mass at about 18 Hz
 load_disturbance (no catalogue)   load side turns by 0.03 rad, about 3.3 Hz
 amplifier_dead_zone (no cat.)     0.10 of the current for T makes no torque
+temperature_step (no catalogue)   F* less by 0.12 from a moment in the middle of each record on
+time_varying_load (no catalogue)  0.12 T sin(2π f t + phase) on the motor side, f about 0.15 Hz
+external_push (no catalogue)      0.5 T half a sine of about 0.3 s, once in each record
+hardening_stop (no catalogue)     0.5 T at 0.7 rad, growing with the square of the angle from 0.45 rad on
+chirping_interference (no cat.)   0.03 F sin(2π (f + r t) t) on the force read, f about 3 Hz, r about 0.8 Hz/s
+sensor_lowpass (no catalogue)     force read through x'' + 1.4 ω x' + ω² x = ω² F, ω/2π about 9 Hz / strength
+asymmetric_friction               level 0.15 T against positive, 0.05 T against negative motion
+constant_torque                   0.06 T
+gravity_load                      0.10 T sin(θ)
+position_dependent_friction       level 0.10 T (1 + 0.8 sin(2θ + phase))
+torque_constant_drift             torque per ampere falls by 0.012/s from the start of each record
+force_sensor_nonlinearity         F (1 + 0.12 |F|/F₄₅)
+clock_drift                       force read at (1 + 0.004) t, angle and current at t
 ================================  ============================================================================
 
 "About" means: times 1.3ᵘ with u uniform in (−1, 1), drawn from the seed.  Strength multiplies the size.
@@ -99,6 +112,29 @@ class Hidden:
     shake: float = 0.0  # rad, of the load side
     shake_frequency: float = 1.0  # Hz
     dead_zone: float = 0.0  # A
+    cold: float = 0.0  # share of F* that a rise of temperature takes away at once
+    cold_place: float = 0.5  # when, as a share of the record
+    slow_load: float = 0.0  # N·m
+    slow_frequency: float = 0.15  # Hz
+    slow_phase: float = 0.0  # rad
+    push: float = 0.0  # N·m, largest of a half sine
+    push_place: float = 0.5  # when it begins, as a share of the record
+    push_time: float = 0.3  # s
+    stop: float = 0.0  # N·m/rad², on the square of the way beyond the place
+    stop_place: float = 0.45  # rad
+    chirp: float = 0.0  # N
+    chirp_frequency: float = 3.0  # Hz, at the start
+    chirp_rate: float = 0.8  # Hz/s
+    lowpass: float = 0.0  # s, 1/ω of a filter of second order
+    constant_torque: float = 0.0  # N·m
+    weight: float = 0.0  # N·m, with its arm level
+    weight_phase: float = 0.0  # rad
+    shaft_share: float = 0.0  # of the inertia of a machine, behind a shaft that twists
+    place_friction: float = 0.0  # N·m, mean of a level that goes with the angle
+    place_phase: float = 0.0  # rad
+    constant_drift: float = 0.0  # 1/s
+    force_curve: float = 0.0  # 1/N
+    clock_error: float = 0.0  # s/s
 
 
 @dataclass(frozen=True)
@@ -130,6 +166,10 @@ def _sizes(actuator: Actuator, draw: np.random.Generator) -> dict[str, dict[str,
     about = 1.3 ** draw.uniform(-1.0, 1.0, size=3)
     phase = draw.uniform(0.0, 2.0 * np.pi, size=2)
     later = 1.3 ** draw.uniform(-1.0, 1.0, size=3)
+    # Drawn after everything that was there before, so that older records stay as they are.
+    place = draw.uniform(0.35, 0.65, size=2)
+    last = 1.3 ** draw.uniform(-1.0, 1.0, size=5)
+    angle = draw.uniform(0.0, 2.0 * np.pi, size=2)
     current = s.torque / actuator.drivetrain.torque_per_ampere
     lever_arm = float(actuator.cam.lever_arm(np.radians(45.0)))
     return {
@@ -180,7 +220,24 @@ def _sizes(actuator: Actuator, draw: np.random.Generator) -> dict[str, dict[str,
         "cable_resonance": {"resonance": 1.0, "resonance_frequency": 18.0 * later[1]},
         "load_disturbance": {"shake": 0.03, "shake_frequency": 3.3 * later[2]},
         "amplifier_dead_zone": {"dead_zone": 0.10 * current},
-    }
+        "temperature_step": {"cold": 0.12, "cold_place": place[0]},
+        "time_varying_load": {
+            "slow_load": 0.12 * s.torque, "slow_frequency": 0.15 * last[0], "slow_phase": angle[0],
+        },
+        "external_push": {"push": 0.5 * s.torque, "push_place": place[1], "push_time": 0.3 * last[1]},
+        "hardening_stop": {"stop": 0.5 * s.torque / 0.25**2},
+        "chirping_interference": {
+            "chirp": 0.03 * s.force, "chirp_frequency": 3.0 * last[2], "chirp_rate": 0.8 * last[3],
+        },
+        "sensor_lowpass": {"lowpass": 1.0 / (2.0 * np.pi * 9.0 * last[4])},
+        "asymmetric_friction": {"friction": 0.10 * s.torque, "constant_torque": -0.05 * s.torque},
+        "constant_torque": {"constant_torque": 0.06 * s.torque},
+        "gravity_load": {"weight": 0.10 * s.torque},
+        "position_dependent_friction": {"place_friction": 0.10 * s.torque, "place_phase": angle[1]},
+        "torque_constant_drift": {"constant_drift": 0.012},
+        "force_sensor_nonlinearity": {"force_curve": 0.12 / s.force},
+        "clock_drift": {"clock_error": 0.004},
+    }  # fmt: skip
 
 
 EFFECTS = (
@@ -211,13 +268,29 @@ EFFECTS = (
     "force_sensor_drift",
     "angle_sensor_eccentricity",
 )
+LATER_EFFECTS = (
+    "asymmetric_friction",
+    "constant_torque",
+    "gravity_load",
+    "position_dependent_friction",
+    "torque_constant_drift",
+    "force_sensor_nonlinearity",
+    "clock_drift",
+    "winding_heat",
+)
+"""What a catalogue may know as well."""
 OUTSIDE_ANY_CATALOGUE = (
     "periodic_disturbance",
     "rubbing_spot",
-    "winding_heat",
     "cable_resonance",
     "load_disturbance",
     "amplifier_dead_zone",
+    "temperature_step",
+    "time_varying_load",
+    "external_push",
+    "hardening_stop",
+    "chirping_interference",
+    "sensor_lowpass",
 )
 STRENGTHS = {"weak": 0.5, "strong": 1.0}
 """The two strengths at which every effect is tried."""
@@ -236,6 +309,16 @@ _SHAPES = (
     "disc_phase",
     "resonance_frequency",
     "shake_frequency",
+    "cold_place",
+    "slow_frequency",
+    "slow_phase",
+    "push_place",
+    "push_time",
+    "stop_place",
+    "chirp_frequency",
+    "chirp_rate",
+    "place_phase",
+    "weight_phase",
 )
 
 
@@ -247,7 +330,11 @@ def hidden_effects(actuator: Actuator, effects: Mapping[str, float], draw: np.ra
     ValueError
         If an effect has no such name or a strength is negative or not finite.
     """
-    sizes = _sizes(actuator, draw)
+    return applied(_sizes(actuator, draw), effects)
+
+
+def applied(sizes: Mapping[str, Mapping[str, float]], effects: Mapping[str, float]) -> Hidden:
+    """Sizes of the named effects from the fields that each sets at strength 1; raises as `hidden_effects`."""
     hidden = Hidden()
     for name, strength in effects.items():
         if name not in sizes:

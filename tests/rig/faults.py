@@ -20,16 +20,19 @@ def acting_current(hidden: Hidden) -> Callable[[float], float] | None:
     dead zone    sign(I) ⟨|I| − zone⟩
     saturation   I_s arctan(I / I_s)
     hot winding  I / (1 + ϑ), dϑ/dt = gain I² − ϑ/τ
+    drift        I (1 − rate t)
     """
     late = round(hidden.drive_delay / STEP)
-    if not (late or hidden.dead_zone or hidden.saturation or hidden.winding_heat):
+    usual = late or hidden.dead_zone or hidden.saturation or hidden.winding_heat
+    if not (usual or hidden.constant_drift):
         return None
-    past, heat = deque([0.0] * late), 0.0
+    past, heat, constant = deque([0.0] * late), 0.0, 1.0
+    falling = hidden.constant_drift * STEP
     zone, softening, gain = hidden.dead_zone, hidden.saturation, hidden.winding_heat
     cooling = STEP / hidden.winding_time
 
     def act(current: float) -> float:
-        nonlocal heat
+        nonlocal heat, constant
         if late:
             past.append(current)
             current = past.popleft()
@@ -40,6 +43,9 @@ def acting_current(hidden: Hidden) -> Callable[[float], float] | None:
         if gain:
             heat += STEP * gain * current * current - cooling * heat
             current /= 1.0 + heat
+        if falling:
+            current *= constant
+            constant -= falling
         return current
 
     return act

@@ -52,16 +52,17 @@ def _equilibrium_table(rubber: Rubber, cubic: float) -> tuple[list[float], list[
     return force.tolist(), np.append(np.diff(force), 0.0).tolist(), float(origin)
 
 
-def pull_of(rubber: Rubber, hidden: Hidden, step: float) -> Pull:
+def pull_of(rubber: Rubber, hidden: Hidden, step: float, warmer: int = 0) -> Pull:
     """Make the stepper: extension asked for by the cam (m) → force of the cable (N), extension of the rubber.
 
     The rubber starts relaxed, at its natural length.  Calling the stepper advances it by `step` seconds.
+    A hidden rise of temperature comes after the step number `warmer`.
     """
     value, rise, origin = _equilibrium_table(rubber, hidden.cubic)
     per_grid = 1.0 / GRID
     q1, g1 = _maxwell(rubber.shape * rubber.k, rubber.relaxation_time, step)
     q2, g2 = _maxwell(rubber.shape * hidden.branch_modulus, hidden.branch_time, step)
-    sliders, aging = _Sliders(hidden), Aging(rubber, hidden, step)
+    sliders, aging = _Sliders(hidden), Aging(rubber, hidden, step, warmer)
     ageing = aging.present
     hysteretic = hidden.slider_force > 0.0
     rigid = bool(np.isinf(hidden.cable_stiffness))

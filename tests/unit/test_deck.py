@@ -317,7 +317,7 @@ mass = {value = 1, unit = "kg", source = "sheet"}
 component = "Spring"
 stiffness = {value = 1, unit = "N/m", source = "sheet"}
 """,
-        "does not lie between current and torque",
+        "does not lie between a command and its effort",
         "motor",
     ),
     "no body": ("""[deck]\nname = "none"\n""", "has no body", "deck"),

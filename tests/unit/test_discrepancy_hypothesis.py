@@ -16,7 +16,7 @@ from nlsdesign.discrepancy.effects.candidate import Candidate, Unknown
 from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.screening.other_rig import numbers_explain, other_numbers
 from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.criteria import DECLARED
+from nlsdesign.discrepancy.selection.criteria import DECLARED, Criteria
 from nlsdesign.discrepancy.selection.excess import excesses
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.identification import Fit, Parameter
@@ -72,6 +72,7 @@ class BenchByHand:
 
 
 BENCH = cast(Bench, BenchByHand())
+RULE = Criteria()
 
 
 def with_mean_squares(**records: float) -> Hypothesis:
@@ -108,32 +109,31 @@ def test_an_unpredictable_record_counts_as_the_others_in_a_hypothesis() -> None:
 # --- excess ---------------------------------------------------------------------------------------
 
 
-def test_an_excess_sums_over_the_records_of_a_role_and_is_shown_in_the_unit_of_the_block() -> None:
-    found = excesses(with_mean_squares(a=4.0, b=2.0, c=1.0, d=9.0), BENCH)["spring"]
-    assert (found.chi2, found.rows) == ((600.0, 1000.0), (200, 200))
-    assert (found.fit, found.held_out) == (
+def test_an_excess_sums_over_the_records_as_predicted_and_is_shown_in_the_unit_of_the_block() -> None:
+    plain = with_mean_squares(a=4.0, b=2.0)
+    tallies = {key: t._replace(segments=(t.squares, 0.5 * t.squares)) for key, t in plain.tallies.items()}
+    found = excesses(replace(plain, tallies=tallies), BENCH, RULE)["spring"]
+    assert (found.chi2, found.rows) == (900.0, 200)
+    assert (found.fit, found.predicted) == (
         pytest.approx(0.1 * math.sqrt(3)),
-        pytest.approx(0.1 * math.sqrt(5)),
+        pytest.approx(0.1 * math.sqrt(4.5)),
     )
+    assert found.pieces == {"a": (400.0, 200.0), "b": (200.0, 100.0)}
     assert found.unit == "N*m"
     assert found.open
 
 
-def test_a_block_is_open_if_either_role_is_and_closed_if_no_role_is() -> None:
+def test_a_block_is_open_beyond_what_its_independent_residuals_allow() -> None:
     """With 100 independent residuals noise stays below 1 + 5·√(2/100) = 1.71."""
-    assert excesses(with_mean_squares(a=1.0, b=1.0, c=1.8, d=1.8), BENCH)["spring"].open
-    assert excesses(with_mean_squares(a=1.8, b=1.8, c=1.0, d=1.0), BENCH)["spring"].open
-    assert not excesses(with_mean_squares(a=1.6, b=1.6, c=1.6, d=1.6), BENCH)["spring"].open
-    nothing_held_out = excesses(with_mean_squares(a=1.0, b=1.0), BENCH)["spring"]
-    assert not nothing_held_out.open
-    assert nothing_held_out.rows == (200, 0)
+    assert excesses(with_mean_squares(a=1.8, b=1.8), BENCH, RULE)["spring"].open
+    assert not excesses(with_mean_squares(a=1.6, b=1.6), BENCH, RULE)["spring"].open
 
 
 def test_the_declared_numbers_are_open_beyond_the_edge_of_their_ranges() -> None:
     for factor, is_open in ((1.15, False), (1.25, True)):
         fit = fitted(spring_stiffness=factor, wheel_inertia=factor)
         hypothesis = replace(with_mean_squares(a=1.0), fits={("spring",): fit})
-        found = excesses(hypothesis, BENCH)[DECLARED]
+        found = excesses(hypothesis, BENCH, RULE)[DECLARED]
         assert found.open is is_open
         assert found.fit == pytest.approx(math.sqrt(3.0) * math.log(factor) / RANGE)
 
@@ -161,7 +161,7 @@ def refitted(mean_square: float, fit: Fit = STUCK) -> Hypothesis:
 
 
 def asked(base: Hypothesis, better: Hypothesis, free: Fit = FAR, left: float = 1.0) -> tuple[bool, str]:
-    found = other_numbers(cast(Comparison, Freed(free, left)), base, better)
+    found = other_numbers(cast(Comparison, Freed(free, left)), base, better, RULE)
     return found.decides, found.words
 
 

@@ -9,8 +9,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nlsdesign.components import Assembly, Dashpot, Encoder, Inertia, Spring, tie
+from nlsdesign.components import (
+    ROTATION,
+    Assembly,
+    Dashpot,
+    Encoder,
+    Fixed,
+    GearedMotor,
+    Inertia,
+    Spring,
+    tie,
+)
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.blocks.tearing import blocks_of
+from nlsdesign.discrepancy.reporting.acting_effort import Acting
 from nlsdesign.discrepancy.reporting.advice import where_they_differ
 from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
 from nlsdesign.discrepancy.reporting.refit import refit
@@ -20,7 +32,7 @@ from nlsdesign.discrepancy.selection.comparison import Comparison, Judged
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Column, Record, RecordSet
-from nlsdesign.identification.equation_error.evidence import Floor
+from nlsdesign.identification.equation_error.evidence import Bench, Floor
 from nlsdesign.identification.records.measurement import Role
 from nlsdesign.identification.statistics.filters import smoothing
 from nlsdesign.model import flatten
@@ -52,7 +64,11 @@ def judged(record: Record, error: Array, *, name: str = "motor", target: str | N
     floor = Floor(matrix, np.full(matrix.shape[0], SIGMA), np.full(len(TIME), SIGMA))
     output = SimpleNamespace(unit="N*m", description="torque")
     block = SimpleNamespace(
-        name=name, target=target, output="motor.unbalanced", model=SimpleNamespace(outputs=(output,))
+        name=name,
+        target=target,
+        output="motor.unbalanced",
+        drives={},
+        model=SimpleNamespace(outputs=(output,), inputs=()),
     )
     return Judged(block, record, floor, np.zeros(len(TIME)), matrix @ error / SIGMA)  # type: ignore[arg-type]
 
@@ -146,8 +162,8 @@ class Known:
         self._said = {"before": before, "after": after}
         self.bench = SimpleNamespace(given_order={name: k for k, name in enumerate(given)})
 
-    def judged(self, hypothesis: str) -> list[Judged]:
-        return self._said[hypothesis]
+    def judged(self, hypothesis: SimpleNamespace) -> list[Judged]:
+        return self._said[hypothesis.when]
 
 
 def compared() -> Comparison:
@@ -162,7 +178,8 @@ def compared() -> Comparison:
     return cast(Comparison, Known(of(0.4), of(0.2), ["r4", "r2", "r0", "r1", "r3"]))
 
 
-BEFORE, AFTER = cast(Hypothesis, "before"), cast(Hypothesis, "after")
+RESTING = assembly("resting", load=Fixed())
+BEFORE, AFTER = (cast(Hypothesis, SimpleNamespace(when=when, fitted=RESTING)) for when in ("before", "after"))
 
 
 def test_gaps_are_errors_in_the_unit_of_the_block_by_block_and_record_in_the_order_given() -> None:
@@ -176,13 +193,69 @@ def test_gaps_are_errors_in_the_unit_of_the_block_by_block_and_record_in_the_ord
 
 def test_the_course_is_that_of_the_held_out_record_with_the_largest_error() -> None:
     course = course_of(BEFORE, AFTER, compared(), "spring")
-    assert (course.record, course.quantity) == ("r4", "encoder.reading")
-    np.testing.assert_array_equal(course.measured, RECORDS.records[4].trace["encoder.reading"])
+    assert (course.record, course.role, course.quantity) == ("r4", "held_out", "encoder.reading")
+    seen = judged(RECORDS.records[4], np.zeros(len(TIME)), target="encoder.reading").floor
+    measured = seen.filter @ RECORDS.records[4].trace["encoder.reading"]
+    np.testing.assert_array_equal(course.measured, measured)
+    np.testing.assert_array_equal(course.time, TIME[seen.places])
     balance = course_of(BEFORE, AFTER, compared(), "motor")
-    assert balance.quantity == "torque"
-    assert np.all(balance.measured == 0.0)
     np.testing.assert_allclose(balance.before, -2.0)
     np.testing.assert_allclose(balance.after, -1.0)
+
+
+@pytest.mark.parametrize("block", ["spring", "motor"])
+def test_the_error_of_the_course_is_that_of_its_record_in_the_table(block: str) -> None:
+    course = course_of(BEFORE, AFTER, compared(), block)
+    (gap,) = (g for g in gaps_of(BEFORE, AFTER, compared()) if (g.block, g.record) == (block, course.record))
+    for when in ("before", "after"):
+        error = course.measured - getattr(course, when)
+        assert float(np.sqrt(np.mean(error**2))) == pytest.approx(getattr(gap, when))
+    assert course.noise == pytest.approx(gap.noise_floor)
+
+
+def driven_wheel(*, with_current: bool) -> tuple[Comparison, Assembly]:
+    """A motor against a spring, whose angle and perhaps current are measured while it swings by 0.5 rad."""
+    source = "by hand"
+    wheel = assembly(
+        "wheel",
+        motor=GearedMotor(
+            inertia=Quantity(0.01, "kg*m^2", source),
+            gear_ratio=20.0,
+            torque_constant=Quantity(0.05, "N*m/A", source),
+            current_limit=Quantity(50.0, "A", source),
+        ),
+        load=Fixed(),
+        spring=tie(Spring(stiffness=Quantity(2.0, "N*m/rad", source), domain=ROTATION), "motor", "load"),
+        encoder=Encoder(of="motor.angle", quantum=Quantity(1e-5, "rad", source)),
+    )
+    current = (2.0 - 0.01 * 9.0**2) * 0.5 * np.sin(9.0 * TIME) / (20.0 * 0.05)
+    draw = np.random.default_rng(0)
+    signals = {
+        "encoder.reading": 0.5 * np.sin(9.0 * TIME) + 1e-5 * draw.standard_normal(len(TIME)),
+        "motor.current": current + 1e-4 * draw.standard_normal(len(TIME)),
+    }
+    columns = COLUMNS if with_current else COLUMNS[:1]
+    trace = Trace(TIME, {c.signal: signals[c.signal] for c in columns}, {c.signal: c.unit for c in columns})
+    records = RecordSet((Record("r", trace, "fit"),), columns)
+    bench = Bench(records, blocks_of(flatten(wheel), records.signals))
+    return Comparison(bench, {}), wheel
+
+
+def test_the_error_of_a_balance_stands_beside_the_torque_of_the_drive() -> None:
+    comparison, wheel = driven_wheel(with_current=True)
+    (seen,) = comparison.judged(comparison.declared(wheel))
+    acting = Acting(comparison.bench, flatten(wheel))
+    torque = 20.0 * 0.05 * seen.record.trace["motor.current"]
+    assert acting.name(seen.block) == "torque of the drive"
+    np.testing.assert_allclose(acting.filtered(seen), seen.floor.filter @ torque, atol=1e-9)
+
+
+def test_the_error_of_a_balance_without_a_drive_stands_beside_the_inertia() -> None:
+    comparison, wheel = driven_wheel(with_current=False)
+    (seen,) = comparison.judged(comparison.declared(wheel))
+    acting = Acting(comparison.bench, flatten(wheel))
+    assert acting.name(seen.block) == "torque of the inertia"
+    assert float(np.std(acting.filtered(seen))) == pytest.approx(0.01 * 81.0 * 0.5 / np.sqrt(2.0), rel=0.03)
 
 
 def apart(floors: float) -> str:

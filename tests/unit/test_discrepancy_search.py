@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import pytest
 
@@ -15,6 +14,7 @@ from nlsdesign.discrepancy.effects.candidate import Candidate, EffectFunction, U
 from nlsdesign.discrepancy.fitting.strategies import Continuation, Plain
 from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.selection.comparison import Comparison
+from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.discrepancy.selection.search import Outcome, Skipped, search
 from nlsdesign.errors import ConvergenceError
@@ -33,15 +33,11 @@ def effect(name: str, numbers: int = 1, *, strategy: Plain | Continuation | None
     return of
 
 
-class Records:
-    """One fitted and one held-out record."""
-
-    def of(self, *roles: str) -> list[SimpleNamespace]:
-        return [SimpleNamespace(name=role) for role in ("fit", "held_out") if role in roles]
+SEGMENTS = 5
 
 
 class Bench:
-    records, units = Records(), {"motor": "N*m", "spring": "N"}
+    units: ClassVar = {"motor": "N*m", "spring": "N"}
 
     def typical_floor(self, block: str) -> float:
         return 1.0
@@ -62,9 +58,9 @@ class Table:
         if left is None:
             raise ConvergenceError("fit", "has no response", next_step="give up")
         tallies = {
-            (block, role): Tally(ROWS + each, ROWS, ROWS)
+            (block, record): Tally(ROWS + each, ROWS, ROWS, ((ROWS + each) / SEGMENTS,) * SEGMENTS)
             for block, each in zip(("motor", "spring"), left, strict=False)
-            for role in ("fit", "held_out")
+            for record in ("one", "other")
         }
         return Hypothesis(BLANK, added, tallies=tallies, **cast(Any, self.flags))
 
@@ -94,7 +90,7 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def outcome(table: Table, *effects: EffectFunction) -> Outcome:
     base = table.hypothesis(())
-    return search(cast(Comparison, table), base, effects, lambda text: None)
+    return search(cast(Comparison, table), base, effects, Criteria(), lambda text: None)
 
 
 def names(found: Outcome) -> list[str]:
@@ -112,8 +108,9 @@ def test_the_one_effect_that_explains_is_named_and_fitted_to_all_samples() -> No
     assert names(found) == ["b"]
     assert found.explained
     assert found.last.values == {"polished": 1.0}
-    assert [(c.effect, round(share, 2)) for c, share in found.ranking] == [("b", 1.0), ("a", 0.1)]
-    assert found.steps[0].share_fit == pytest.approx(1.0, abs=1e-3)
+    assert [(e.candidate.effect, round(e.share, 2)) for e in found.tried] == [("b", 1.0), ("a", 0.1)]
+    assert [bool(e.objections) for e in found.tried] == [False, True]
+    assert found.steps[0].share == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_second_effect_is_sought_while_a_block_is_open() -> None:
@@ -172,12 +169,14 @@ def test_no_more_than_two_effects_are_named_in_free_flight() -> None:
     assert names(outcome(Table(table, has_free_flight=True), *effects)) == ["a", "b"]
 
 
-def test_what_takes_long_is_begun_first_but_the_order_of_the_catalogue_decides() -> None:
+def test_what_takes_long_is_tried_only_where_nothing_else_closes_the_block() -> None:
     table = Table({(): (1e5,), ("a",): (10.0,), ("slow",): (10.0,)})
     found = outcome(table, effect("a"), effect("slow", strategy=LONG))
-    assert table.asked[:2] == [("slow",), ("a",)]
-    assert names(found) == ["a"]
-    assert [h.newest.effect for h in found.steps[0].equals] == ["slow"]
+    assert (table.asked, names(found)) == ([("a",)], ["a"])
+    reason = "takes long, and a explains the block down to its noise"
+    assert found.skipped == (Skipped("slow", "motor", (), reason),)
+    table = Table({(): (1e5,), ("a",): (4e4,), ("slow",): (10.0,)})
+    assert names(outcome(table, effect("a"), effect("slow", strategy=LONG))) == ["slow"]
 
 
 def test_what_could_not_be_compared_is_in_the_outcome_with_its_reason() -> None:
@@ -207,4 +206,4 @@ def test_what_only_all_samples_show_is_judged_on_all_samples() -> None:
 
     found = outcome(Coarse({(): (100.0,), ("a",): (50.0,), ("b",): (60.0,)}), effect("a"), effect("b"))
     assert names(found) == ["b"]
-    assert found.steps[0].share_fit == pytest.approx(1.0, abs=1e-3)
+    assert found.steps[0].share == pytest.approx(1.0, abs=1e-3)

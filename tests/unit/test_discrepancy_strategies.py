@@ -19,7 +19,6 @@ from nlsdesign.discrepancy.effects.candidate import Candidate, Unknown
 from nlsdesign.discrepancy.fitting import strategies
 from nlsdesign.discrepancy.fitting.strategies import (
     EXPENSIVE_STEP,
-    LEAST_GAIN,
     LONG_STEP,
     MOST_STARTS,
     Continuation,
@@ -50,6 +49,9 @@ def start(value: float, name: str = "spring.gap") -> Start:
     return (Parameter(name, "rad", value, value, np.inf, 0.0, 10.0, "linear"),)
 
 
+ENDED = Fit(start(0.1), {"spring.gap": 0.1}, np.eye(1), 1.0, {}, True)
+
+
 @dataclass
 class Notebook:
     """Stands for the least squares: ends where it began, at a cost that is a table of starts."""
@@ -65,7 +67,8 @@ class Notebook:
         if cost == np.inf:
             raise ConvergenceError("block 'spring'", "its response is not finite", next_step="give up")
         values = {p.name: p.start for p in parameters}
-        return Fit(tuple(parameters), values, np.eye(len(parameters)), cost, {}, True)
+        known = tuple(replace(p, sigma=p.sigma or 1.0) for p in parameters)
+        return Fit(known, values, np.eye(len(parameters)), cost, {}, True)
 
     def predicted_cost(self, evidence: Sequence[Evidence], parameters: Start) -> float:
         return self.costs.get(parameters[0].start, 1.0)
@@ -113,11 +116,11 @@ def problem(*, stiff: bool = False, size: int = 100, **changes: Any) -> FitProbl
 
 
 def test_a_first_look_ends_earlier_than_a_fit_to_all_samples() -> None:
+    assert problem().limits == Limits(20, 1e-3, 0.0)
     # Half of the squares of the four fitted records; the held-out one is not looked at.
-    assert problem().limits == Limits(20, 3e-4, LEAST_GAIN * 0.5 * 4 * 2100.0)
+    assert problem().cost_before == 0.5 * 4 * 2100.0
     assert problem(coarse=False).limits == Limits(40, 2e-5, 0.0)
     assert problem(coarse=False, effects=0).limits == Limits(40, 0.0, 0.0)
-    assert problem(new=()).limits.least == 0.0
     assert problem(size=LONG_STEP + 1).limits.evaluations == 6
     assert problem(size=LONG_STEP + 1, effects=0).limits.evaluations == 20
 
@@ -159,7 +162,7 @@ def test_a_fit_does_not_follow_what_is_unpredictable_unless_nothing_else_is_left
     Smooth().fit(everything, Plain())
     assert notebook.fits[-1]["records"] == ["a", "b", "c", "d"]
     after = {("spring", n): Tally(1e9, 100, 50.0) for n in "abcde"}
-    assert Smooth().set_aside(set_aside, after) == {("spring", "d")}
+    assert Smooth().set_aside(set_aside, ENDED, after) == {("spring", "d")}
 
 
 # --- free flight ----------------------------------------------------------------------------------
@@ -223,16 +226,28 @@ def test_a_held_number_stands_at_a_multiple_within_its_bounds_and_the_others_whe
     assert strategies._held(bounded, "spring.gap", 0.5)[0].start == 1.5, "the lower bound"
 
 
-def test_a_new_effect_may_leave_the_quickest_record_unpredicted() -> None:
+def test_a_new_effect_may_leave_a_quick_record_unpredicted_whose_neighbours_diverge(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[str] = []
+
+    def diverging(evidence: Evidence, best: Fit) -> bool:
+        asked.append(evidence.record.name)
+        return True
+
+    monkeypatch.setattr(strategies, "diverges", diverging)
     flying = problem(stiff=True)
     after: dict[Key, Tally] = {("spring", n): Tally(110.0, 100, 50.0) for n in "abce"}
     after["spring", "d"] = Tally(9e3, 100, 50.0)
     method = RobustOverFreeFlight()
-    assert method.set_aside(flying, after) == {("spring", "d")}
-    assert method.set_aside(replace(flying, new=()), after) == frozenset()
-    assert method.set_aside(replace(flying, coarse=False), after) == frozenset()
+    assert method.set_aside(flying, ENDED, after) == {("spring", "d")}
+    assert asked == ["d"]
+    assert method.set_aside(replace(flying, new=()), ENDED, after) == frozenset()
+    assert method.set_aside(replace(flying, coarse=False), ENDED, after) == frozenset()
     earlier = replace(flying, new=(), unpredictable=frozenset({("spring", "a"), ("motor", "a")}))
-    assert method.set_aside(earlier, after) == {("spring", "a")}
+    assert method.set_aside(earlier, ENDED, after) == {("spring", "a")}
+    monkeypatch.setattr(strategies, "diverges", lambda evidence, best: False)
+    assert method.set_aside(flying, ENDED, after) == frozenset(), "failing alone proves nothing"
 
 
 def test_backlash_alone_brings_a_continuation_and_it_keeps_what_means_the_same() -> None:
@@ -261,7 +276,8 @@ class BenchOfOne:
 
     def evidence(self, driven: str, records: Any, values: Any, *, coarse: bool) -> list[Evidence]:
         one = evidence("a", "fit", 1.0, size=self.size)
-        residual = lambda values: (np.array([3.0, 4.0]), None)  # noqa: E731
+        one.driven.free = ()
+        residual = lambda values: (np.array([3.0, 4.0]), np.zeros((2, 0)))  # noqa: E731
         return [cast(Evidence, SimpleNamespace(driven=one.driven, record=one.record, residual=residual))]
 
 

@@ -78,8 +78,10 @@ def test_shares_are_said_in_percent() -> None:
     named = Verdict(
         "named", (effect,), (), GAPS, "spring", (), BLANK, BLANK, cast(Course, None), remainder=left
     )
-    assert "gap = 0.001 ± 2e-05 m. It explains 82 % of the excess" in named.words()
-    assert "As good an explanation" not in named.words()
+    assert (
+        "gap = 0.001000 ± 0.000020 m. What it leaves in records: late. It explains 82 % of" in named.words()
+    )
+    assert "do not tell it from" not in named.words()
     assert "2·[q] (in N, signals in SI) explains 64 % of it on records" in named.words()
     written = named.to_dict()["remainder"]
     assert (written["rms"], written["shape"]) == (4.5, [{"over": "time", "share": 0.333333}]), "six digits"

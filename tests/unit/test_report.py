@@ -11,7 +11,6 @@ import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import matplotlib.figure
@@ -22,7 +21,9 @@ import sympy
 from nlsdesign import report
 from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.reporting.verdict import Course, RecordGap, Verdict
 from nlsdesign.errors import ExportError, UnknownNameError, ValueRangeError
+from nlsdesign.identification.statistics.residuals import Binned
 from nlsdesign.model import flatten
 from nlsdesign.model.equations import equations
 from nlsdesign.quantity import quantity
@@ -481,20 +482,17 @@ def test_a_report_on_a_diagnosis_has_units_on_every_axis() -> None:
     wheel = assembly(
         "wheel", load=Inertia(inertia=1e-3), spring=tie(Spring(stiffness=2.0, domain=ROTATION), "load")
     )
-    bins = SimpleNamespace(centre=np.linspace(0.0, 1.0, 5), mean=np.linspace(0.1, 0.2, 5))
+    before, after = (
+        Binned(np.linspace(0.0, 1.0, 5), size * np.linspace(0.1, 0.2, 5), np.zeros(5)) for size in (1.0, 0.5)
+    )
     time = np.linspace(0.0, 1.0, 50)
-    diagnosis = SimpleNamespace(
-        verdict="named", block="load", where=("load",), effects=(), runners_up=(), skipped=(), next_steps=(),
-        declared=wheel, rows=list, words=lambda: "Named.",
-        gaps=[SimpleNamespace(block="load", record="a", role="held_out", before=2.0, after=1.0,
-                              noise_floor=0.5, unit="N*m")],
-        course=SimpleNamespace(record="a", time=time, measured=time, before=time, after=time,
-                               quantity="torque", unit="N*m", noise=0.1),
-        shapes={"over load.angle": (bins, bins), "over time": (bins, bins)},
-    )  # fmt: skip
-    sections = report.verdict_sections(diagnosis)  # type: ignore[arg-type]
+    shapes = {"over load.angle": (before, after), "over speed": (before, after)}
+    gaps = (RecordGap("load", "a", "held_out", 2.0, 1.0, 0.5, 50, "N*m", 4.0, "torque of the drive"),)
+    course = Course("a", "torque of the drive", "N*m", time, time, 0.5 * time, time, 0.1)
+    diagnosis = Verdict("named", (), ("load",), gaps, "load", (), wheel, wheel, course, shapes=shapes)
+    sections = report.verdict_sections(diagnosis)
     drawn = [part.figure for part in sections[1].parts if isinstance(part, report.FigureSection)]  # type: ignore[attr-defined]
     labels = [axes.get_xlabel() for figure in drawn for axes in figure.axes[-1:]]
-    assert labels == ["", "time in s", "load.angle in rad", "time in s"]
+    assert labels == ["", "time in s", "load.angle in rad", "speed of the motion in rad/s"]
     for figure in drawn:
         assert [axes.get_ylabel().endswith(" in N·m") for axes in figure.axes] == [True] * len(figure.axes)

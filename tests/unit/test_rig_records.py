@@ -13,6 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 from tests.rig import (
     ACTUATORS,
     EFFECTS,
+    LATER_EFFECTS,
     OUTSIDE_ANY_CATALOGUE,
     Hidden,
     make_records,
@@ -39,12 +40,13 @@ def test_sensors_add_what_they_say(actuator: Actuator) -> None:
     command = sines(time, np.radians([25.0]), np.array([2.0]), np.zeros(1))
     history = simulate(actuator, Hidden(), Servo.for_actuator(actuator), command)
     plain = measure(history, actuator.sensors, Hidden(), None)
-    np.testing.assert_array_equal(plain[:, 3], history.force[::40])
-    np.testing.assert_array_equal(plain[:, 0], history.time[::40])
+    every = {500.0: 40, 400.0: 50}[actuator.sensors.sample_rate]
+    np.testing.assert_array_equal(plain[:, 3], history.force[::every])
+    np.testing.assert_array_equal(plain[:, 0], history.time[::every])
     wrong = Hidden(force_delay=0.010, force_gain=1.15, force_bias=3.0, current_bias=0.2)
     table = measure(history, actuator.sensors, wrong, None)
     late = round(0.010 * actuator.sensors.sample_rate)
-    assert late == 5
+    assert late == 200 // every
     np.testing.assert_allclose(table[late:, 3], 1.15 * plain[:-late, 3] + 3.0, rtol=1e-12)
     np.testing.assert_array_equal(table[:late, 3], 3.0)
     np.testing.assert_allclose(table[:, 2], plain[:, 2] + 0.2, rtol=1e-12)
@@ -52,7 +54,7 @@ def test_sensors_add_what_they_say(actuator: Actuator) -> None:
 
     noisy = measure(history, actuator.sensors, Hidden(), np.random.default_rng(1))
     quantum = actuator.sensors.angle_quantum
-    assert quantum == pytest.approx(7.66990e-4, rel=1e-6)
+    assert quantum * actuator.sensors.counts == pytest.approx(2.0 * np.pi, rel=1e-12)
     np.testing.assert_allclose(noisy[:, 1] / quantum, np.round(noisy[:, 1] / quantum), atol=1e-9)
     assert np.max(np.abs(noisy[:, 1] - plain[:, 1])) <= 0.5 * quantum * (1.0 + 1e-9)
     for column, spread in ((2, actuator.sensors.current_noise), (3, actuator.sensors.force_noise)):
@@ -99,7 +101,9 @@ def clean_swing() -> np.ndarray:
     return make_records(ACTUATORS["wrist"], {"none": 1.0}, 9, noise=False, only=[WIDEST])[WIDEST]
 
 
-@pytest.mark.parametrize("effect", [name for name in (*EFFECTS, *OUTSIDE_ANY_CATALOGUE) if name != "none"])
+@pytest.mark.parametrize(
+    "effect", [name for name in (*EFFECTS, *LATER_EFFECTS, *OUTSIDE_ANY_CATALOGUE) if name != "none"]
+)
 def test_every_effect_shows_above_the_noise(clean_swing: np.ndarray, effect: str) -> None:
     wrist = ACTUATORS["wrist"]
     wrong = make_records(wrist, {effect: 1.0}, 9, noise=False, only=[WIDEST])[WIDEST]
@@ -138,7 +142,8 @@ def test_files_hold_what_was_declared_and_measured(
     assert declared["rubber"]["delta_i_m"] == list(actuator.rubber.engage)
     assert declared["drivetrain"]["J_kg_m2"] == actuator.drivetrain.inertia
     assert declared["cam"] == {"table": "cam.csv"}
-    assert declared["sensors"]["sample_rate_Hz"] == 500.0
+    assert declared["sensors"]["sample_rate_Hz"] == actuator.sensors.sample_rate
+    assert declared["sensors"]["theta_quantum_rad"] == pytest.approx(actuator.sensors.angle_quantum, abs=1e-9)
     with (tmp_path / "cam.csv").open(encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     assert header == ["theta_rad", "delta_m", "lever_arm_m"]

@@ -20,7 +20,7 @@ from ...identification.estimation.least_squares import Fit, fit, predicted_cost
 from ...identification.estimation.parameters import Parameter
 from ...model import flatten
 from ..blocks.tearing import blocks_of
-from .unpredictable import Key, Tally, quickest, unpredictable
+from .unpredictable import Key, Tally, diverges, quickest, unpredictable
 
 Start: TypeAlias = tuple[Parameter, ...]
 """The free numbers of a group of blocks, each with a value to begin at."""
@@ -31,12 +31,13 @@ EVALUATIONS, COARSE_EVALUATIONS = 40, 20
 """Bounds of evaluations; fits of laws that suit the records end well below them by themselves."""
 LONG_EVALUATIONS = 6
 """The same where a step takes so many operations that each evaluation lasts seconds."""
-COARSE_TOLERANCE = 3e-4
+COARSE_TOLERANCE = 1e-3
 """A coarse fit ends where it promises to gain less than this share of the cost: enough to compare."""
 POLISHED_TOLERANCE = 2e-5
 """The same for a fit to all samples of a hypothesis with effects; the declared model is fitted to the end."""
 LEAST_GAIN = 1e-3
-"""A coarse fit ends too where it promises to gain less than this share of the cost without the effect."""
+"""Where a body flies freely, a coarse fit ends too where it promises to gain less than this share of the cost
+without the effect: more is not known there."""
 LONG_STEP = 30_000
 """Operations per step beyond which evaluations are few."""
 EXPENSIVE_STEP = 100_000
@@ -133,15 +134,18 @@ class FitProblem:
         return max((e.driven.instructions for e in self.fitted), default=0)
 
     @property
+    def cost_before(self) -> float:
+        """Half the sum of squares without the newest effect, on the records that fits may see."""
+        names = {e.record.name for e in self.fitted}
+        return 0.5 * sum(t.squares for (b, r), t in self.before.items() if b in self.blocks and r in names)
+
+    @property
     def limits(self) -> Limits:
         """Where a plain fit may stop."""
-        names = {e.record.name for e in self.fitted}
-        now = 0.5 * sum(t.squares for (b, r), t in self.before.items() if b in self.blocks and r in names)
-        least = LEAST_GAIN * now if self.coarse and self.new else 0.0
         if self.coarse:
-            limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE, least)
+            limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE)
         else:
-            limits = Limits(EVALUATIONS, POLISHED_TOLERANCE if self.effects else 0.0, least)
+            limits = Limits(EVALUATIONS, POLISHED_TOLERANCE if self.effects else 0.0)
         if self.effects and self.instructions > LONG_STEP:
             limits = replace(limits, evaluations=LONG_EVALUATIONS)
         return limits
@@ -246,13 +250,15 @@ class Method(ABC):
         """
 
     @abstractmethod
-    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return which blocks and records are to be judged by the others.
 
         Parameters
         ----------
         problem
             That was fitted.
+        best
+            The fitted numbers.
         after
             What the fit left over.
         """
@@ -265,7 +271,7 @@ class Smooth(Method):
         """Fit to all records that are predictable."""
         return best_fit(problem.predictable, problem.starts, problem.limits)
 
-    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
+    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
         """Return what was set aside before."""
         return frozenset(key for key in problem.unpredictable if key in after)
 
@@ -288,7 +294,7 @@ class RobustOverFreeFlight(Smooth):
             starts = [begun[costs.index(min(costs))]]
             if not self._explains_enough(problem.before, slow, min(costs)):
                 limits = replace(limits, evaluations=0)
-        least = limits.least
+        least = LEAST_GAIN * problem.cost_before if problem.new else 0.0
         best = best_fit(slow, starts, replace(limits, least=0.1 * least), known={})
         known = {key: tally.squares for key, tally in problem.before.items()}
         return fit(
@@ -300,11 +306,13 @@ class RobustOverFreeFlight(Smooth):
             known=known,
         )
 
-    def set_aside(self, problem: FitProblem, after: Mapping[Key, Tally]) -> frozenset[Key]:
-        """Return the quick records that a new effect leaves unpredicted."""
+    def set_aside(self, problem: FitProblem, best: Fit, after: Mapping[Key, Tally]) -> frozenset[Key]:
+        """Return the quick records that a new effect leaves unpredicted and whose neighbours diverge."""
         if not (problem.coarse and problem.new):
-            return super().set_aside(problem, after)
-        return unpredictable(problem.before, after, quickest(problem.evidence))
+            return super().set_aside(problem, best, after)
+        suspects = unpredictable(problem.before, after, quickest(problem.evidence))
+        by_key = {(e.driven.block.name, e.record.name): e for e in problem.evidence}
+        return frozenset(key for key in suspects if diverges(by_key[key], best))
 
     def _limits(self, problem: FitProblem) -> Limits:
         whole = problem.coarse and problem.effects < 2

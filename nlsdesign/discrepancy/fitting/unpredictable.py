@@ -7,10 +7,15 @@ first look is at the slower records, and a quick record that is not predicted is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
+from ...errors import ConvergenceError
 from ...identification.equation_error.evidence import Evidence
+from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.metrics import rmse
 
@@ -25,6 +30,12 @@ _STANDS_OUT = 2.0
 less."""
 
 
+_MEMBERS, _NEIGHBOURHOOD = 4, 0.01
+"""Size of an ensemble, and how far its members differ at most on the fitted scale."""
+_DIVERGING = 0.5
+"""Share of the squares of a record by which neighbours must differ; independent courses differ by one."""
+
+
 class Tally(NamedTuple):
     """What one block leaves over on one record.
 
@@ -36,11 +47,20 @@ class Tally(NamedTuple):
         Number of residuals.
     effective_size
         How many independent residuals these are equivalent to, coloured as they are.
+    segments
+        Sum of squares where the numbers come from the other records, one for each piece of the record in
+        time. Empty where no record was left out.
     """
 
     squares: float
     rows: int
     effective_size: float
+    segments: tuple[float, ...] = ()
+
+    @property
+    def predicted(self) -> float:
+        """Sum of squares where the numbers come from the other records."""
+        return math.fsum(self.segments) if self.segments else self.squares
 
 
 def quickest(evidence: Sequence[Evidence]) -> frozenset[str]:
@@ -87,6 +107,36 @@ def unpredictable(
     return frozenset(key for key in after if key[1] in quick and (is_worse(key) or stands_out(key)))
 
 
+def diverges(evidence: Evidence, best: Fit) -> bool:
+    """Tell whether neighbours of the fitted numbers predict a record as differently as it is mispredicted.
+
+    Only that proves a record unpredictable: a wrong law that fails on it fails in its neighbourhood too. The
+    members of the ensemble differ by a standard error of each number, a hundredth at most, in directions
+    drawn once for all.
+
+    Parameters
+    ----------
+    evidence
+        Of the record.
+    best
+        The fitted numbers.
+    """
+    random = np.random.default_rng(0)
+    error = np.minimum(np.sqrt(np.diag(best.covariance)), _NEIGHBOURHOOD)
+    residual = evidence.residual(best.values)[0]
+    spread = []
+    for _ in range(_MEMBERS):
+        moved = {
+            p.name: p.outward(p.inward(best.values[p.name]) + step)
+            for p, step in zip(best.parameters, error * random.standard_normal(len(error)), strict=True)
+        }
+        try:
+            spread.append(float(np.sum((evidence.residual(moved)[0] - residual) ** 2)))
+        except ConvergenceError:
+            spread.append(math.inf)
+    return float(np.median(spread)) >= _DIVERGING * float(residual @ residual)
+
+
 def like_the_others(tallies: Mapping[Key, Tally], unpredictable: Collection[Key]) -> dict[Key, Tally]:
     """Return tallies in which an unpredictable record is as well predicted as the others of its block.
 
@@ -102,5 +152,8 @@ def like_the_others(tallies: Mapping[Key, Tally], unpredictable: Collection[Key]
         others = [tallies[k] for k in tallies if k[0] == block and k not in unpredictable]
         share = sum(t.squares for t in others) / max(sum(t.rows for t in others), 1)
         own = tallies[block, record]
-        result[block, record] = own._replace(squares=min(own.squares, share * own.rows))
+        factor = min(1.0, share * own.rows / max(own.squares, 1e-300))
+        result[block, record] = own._replace(
+            squares=factor * own.squares, segments=tuple(factor * s for s in own.segments)
+        )
     return result

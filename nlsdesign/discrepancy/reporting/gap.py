@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from ...identification.equation_error.evidence import STRIDE
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.residuals import Binned, shapes
+from ...model import flatten
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
+from .acting_effort import Acting
 from .verdict import Course, RecordGap
 
 
@@ -24,19 +26,24 @@ def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tu
         Knows the records.
     """
     gaps = []
+    acting = Acting(comparison.bench, flatten(before.fitted))
     for then, now in zip(comparison.judged(before), comparison.judged(after), strict=True):
         first, last, floor = (
             float(np.sqrt(np.mean(np.square(r)))) for r in (then.error, now.error, then.floor.sigma)
         )
         name, record, unit = then.block.name, then.record, then.block.model.outputs[0].unit
-        count = len(then.residual)
-        gaps.append(RecordGap(name, record.name, record.role, first, last, floor, count, unit))
+        size = float(np.std(acting.filtered(then)))
+        rows, beside = len(then.residual), acting.name(then.block)
+        gap = RecordGap(name, record.name, record.role, first, last, floor, rows, unit, size, beside)
+        gaps.append(gap)
     blocks, given = list(dict.fromkeys(g.block for g in gaps)), comparison.bench.given_order
     return tuple(sorted(gaps, key=lambda gap: (blocks.index(gap.block), given[gap.record])))
 
 
 def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, block: str) -> Course:
     """Return a held-out record of a block over time; the one with the largest error before.
+
+    Everything passes the filter of the block, so that the errors are those of :func:`gaps_of`.
 
     Parameters
     ----------
@@ -49,29 +56,18 @@ def course_of(before: Hypothesis, after: Hypothesis, comparison: Comparison, blo
     own = [(a, b) for a, b in pairs if a.block.name == block]
     held = [pair for pair in own if pair[0].record.role == "held_out"] or own
     then, now = max(held, key=lambda pair: float(np.mean(np.square(pair[0].error))))
-    target, trace, output = then.block.target, then.record.trace, then.block.model.outputs[0]
-    if target is None:
-        # A balance holds a second derivative: only filtered does it show more than noise.
-        places = then.floor.places
-        return Course(
-            then.record.name,
-            output.description,
-            output.unit,
-            trace.time[places],
-            np.zeros(len(places)),
-            -then.error,
-            -now.error,
-            float(np.mean(then.floor.sigma)),
-        )
+    acting = Acting(comparison.bench, flatten(before.fitted))
+    measured = acting.filtered(then)
     return Course(
         then.record.name,
-        target,
-        output.unit,
-        trace.time,
-        trace[target],
-        then.predicted,
-        now.predicted,
-        float(np.mean(then.floor.raw_sigma)),
+        acting.name(then.block),
+        then.block.model.outputs[0].unit,
+        then.record.trace.time[then.floor.places],
+        measured,
+        measured - then.error,
+        measured - now.error,
+        float(np.sqrt(np.mean(np.square(then.floor.sigma)))),
+        then.record.role,
     )
 
 

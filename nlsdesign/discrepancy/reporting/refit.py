@@ -16,17 +16,17 @@ from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.evidence import Bench
 from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...model import flatten
-from ...quantity import to_resolution
 from ..blocks.tearing import blocks_of
 from ..screening.other_rig import out_of_reach
 from ..screening.scale_check import scale_findings, typical_sizes
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
 from .advice import more_excitation
+from .fitted_numbers import FittedNumber as FittedNumber
+from .fitted_numbers import fitted_numbers
 from .gap import gaps_of
 from .verdict import RecordGap
 from .window_refit import fitted_over_windows, window_gaps
@@ -35,28 +35,6 @@ _FROM_SPREAD = 0.8
 """Share of the variance of a declared spread above which the records have added next to nothing."""
 _AT_END = 1.96
 """Declared ranges from the declared value; a refit is stopped at two."""
-
-
-class FittedNumber(NamedTuple):
-    """One refitted number.
-
-    Parameters
-    ----------
-    name, unit
-        Full name and SI unit.
-    declared, fitted, standard_error
-        In SI.
-    strain
-        How far it went, in declared ranges (spreads): 1 is the edge of what was declared, 2 where the fit
-        stops.
-    """
-
-    name: str
-    unit: str
-    declared: float
-    fitted: float
-    standard_error: float
-    strain: float
 
 
 class BlockError(NamedTuple):
@@ -205,20 +183,10 @@ def refit(
         values, fit = fitted_over_windows(actuator, records, fitted.values, window)
         fitted = comparison.on_all_samples(replace(fitted, values=values))
         fits, window_errors = (fit,), window_gaps(actuator, values, records, window)
-    numbers = tuple(_number(fit, p) for fit in fits for p in fit.parameters)
+    numbers = fitted_numbers(fits)
     fitted = fitted.as_written()
     gaps = gaps_of(comparison.declared(actuator), fitted, comparison)
     return Refit(sourced(fitted), fits, numbers, (*gaps, *window_errors), findings)
-
-
-def _number(fit: Fit, parameter: Parameter) -> FittedNumber:
-    value = fit.values[parameter.name]
-    moved = parameter.inward(value) - parameter.inward(parameter.centre)
-    # The prior of a range of half width w has the standard deviation w/√3.
-    strain = moved / (math.sqrt(3.0) * parameter.sigma)
-    error = fit.standard_error(parameter.name)
-    written = to_resolution(value, error)
-    return FittedNumber(parameter.name, parameter.unit, parameter.centre, written, error, strain)
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,39 +13,89 @@ from numpy.typing import NDArray
 from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
-from ...quantity import significant, to_resolution, with_unit
+from ...quantity import significant, three_digits, typeset_unit, with_unit
+from ..effects.plain_names import capitalised, simpler_forms, title
 from ..selection.search import Skipped
+from .circumstances import DiagnosisRun, settings_of
+from .fitted_numbers import FittedNumber, fitted_numbers
+from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
 
 Array = NDArray[np.float64]
 
+HEADLINES: Mapping[str, str] = {
+    "none": "Nothing is missing",
+    "unknown": "Something is missing that has no name in the catalogue",
+    "undecidable": "These records cannot tell what is missing",
+    "data_suspect": "The records are suspect",
+}
+"""What a verdict says in one line, where it names no effect."""
+EXPLANATIONS: Mapping[str, str] = {
+    "none": "The refitted model explains the records down to their noise; nothing is missing.",
+    "unknown": "Something is missing that no effect of the catalogue explains.",
+    "undecidable": "Several effects explain these records equally well; the proposed record would tell.",
+    "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
+}
+_NOT_NAMED = "too little, or not surely enough, to be named under the criteria of this diagnosis"
+_HELPS = 0.005
+"""Share of the excess below which an effect helps by less than half a per cent and is not listed."""
 
-@dataclass(frozen=True)
-class NamedEffect:
-    """An effect that was added.
+
+class Gap(NamedTuple):
+    """Error of the summed-up block before and after, root mean square, all in one unit.
 
     Parameters
     ----------
-    name, location
-        Identifier of the catalogue, and the path of the part.
-    parameters
-        Value, unit and standard error by full name.
-    aliases
-        Effects of the catalogue that explain the records as well.
-    share_fit, share_held_out
-        Share of the excess over the noise that it explained when it was added.
-    signature, source
-        What it leaves in records, and where its law comes from.
+    block, role
+        Which block, on the records of which role.
+    before, after, noise_floor, signal
+        Errors, noise floor, and standard deviation of what the error is a part of.
+    unit
+        Of the four.
+    beside
+        Name of what the error is a part of.
     """
 
-    name: str
-    location: str
-    parameters: Mapping[str, tuple[float, str, float]]
-    aliases: tuple[str, ...]
-    share_fit: float
-    share_held_out: float
-    signature: str
-    source: str
+    block: str
+    role: str
+    before: float
+    after: float
+    noise_floor: float
+    signal: float
+    unit: str
+    beside: str
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """Errors over the noise floor, before and after."""
+        return self.before / self.noise_floor, self.after / self.noise_floor
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Errors as shares of what they are a part of, before and after."""
+        return self.before / self.signal, self.after / self.signal
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything was added that changes the error."""
+        return self.before != self.after
+
+    def rows(self) -> tuple[tuple[str, str, str], ...]:
+        """Return before, after and in what: times the noise, in the unit, as a share."""
+        before, after = (three_digits(each) for each in self.times)
+        result = [(before, after, "times the noise")]
+        result.append((three_digits(self.before), three_digits(self.after), typeset_unit(self.unit) or "1"))
+        if math.isfinite(self.signal) and self.signal > 0.0:
+            before, after = (f"{three_digits(100.0 * each)} %" for each in self.shares)
+            name = self.beside if "." in self.beside else f"the {self.beside}"
+            result.append((before, after, f"of {name}"))
+        return tuple(result)
+
+    def words(self) -> str:
+        """Return the error in one sentence, before and after where something was added."""
+        which = "held-out" if self.role == "held_out" else "fitted"
+        steps = ", ".join(f"{a} → {b} {u}" if self.changed else f"{a} {u}" for a, b, u in self.rows())
+        return f"Error of `{self.block}` on {which} records{', before → after' * self.changed}: {steps}."
 
 
 @dataclass(frozen=True)
@@ -63,6 +113,9 @@ class RecordGap:
         Samples that count.
     unit
         Of the three.
+    signal, beside
+        Standard deviation of what the error is a part of, filtered alike, and its name: the measured signal,
+        or the effort of the drive.
     """
 
     block: str
@@ -73,11 +126,27 @@ class RecordGap:
     noise_floor: float
     rows: int
     unit: str
+    signal: float = math.nan
+    beside: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """One held-out record over time: measured, predicted before and after."""
+    """One record over time: measured, predicted before and after, all through the filter of the block.
+
+    Parameters
+    ----------
+    record, role
+        Which.
+    quantity, unit
+        What is shown: a measured signal, or the effort of the drive beside the one that the model needs.
+    time
+        In s, shape (n,).
+    measured, before, after
+        In the unit, shape (n,) each; the rms of the differences are those of :class:`RecordGap`.
+    noise
+        Standard deviation of the filtered noise, in the unit.
+    """
 
     record: str
     quantity: str
@@ -87,6 +156,7 @@ class Course:
     before: Array
     after: Array
     noise: float
+    role: str = "held_out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +166,7 @@ class Verdict:
     Parameters
     ----------
     verdict
-        ``none``, ``named``, ``unknown`` or ``data_suspect``.
+        ``none``, ``named``, ``unknown``, ``undecidable`` or ``data_suspect``.
     effects
         In the order in which they were added.
     where
@@ -106,7 +176,8 @@ class Verdict:
     block
         The block that was furthest from its noise floor; errors are summed up for it.
     runners_up
-        Effect and share of the excess that it would have explained, best first.
+        Effect and share of the excess that it would have explained, best first; perhaps with a third entry,
+        why it was not named.
     actuator
         The refitted assembly with the effects.
     declared
@@ -126,6 +197,14 @@ class Verdict:
         What to measure next to tell apart what these records cannot.
     skipped
         Effects that were left out of the comparison, and why: too expensive, or not converged.
+    complete
+        Whether what was named explains all; otherwise there is a remainder.
+    criteria
+        The rule that decided, a frozen dataclass.
+    remarks
+        What was done to the records or left out, in sentences.
+    run
+        Records, deck, day and command; ``None`` where a program asked.
     """
 
     verdict: str
@@ -133,7 +212,7 @@ class Verdict:
     where: tuple[str, ...]
     gaps: tuple[RecordGap, ...]
     block: str
-    runners_up: tuple[tuple[str, float], ...]
+    runners_up: tuple[tuple[Any, ...], ...]
     actuator: Assembly
     declared: Assembly
     course: Course
@@ -143,6 +222,10 @@ class Verdict:
     remainder: Remainder | None = None
     next_steps: tuple[str, ...] = ()
     skipped: tuple[Skipped, ...] = ()
+    complete: bool = True
+    criteria: Any = None
+    remarks: tuple[str, ...] = ()
+    run: DiagnosisRun | None = None
 
     def rms(self, which: str, role: str) -> float:
         """Return the rms error of the summed-up block over the records of a role.
@@ -150,15 +233,11 @@ class Verdict:
         Parameters
         ----------
         which
-            ``before``, ``after`` or ``noise_floor``.
+            ``before``, ``after``, ``noise_floor`` or ``signal``.
         role
             ``fit`` or ``held_out``.
         """
-        gaps = [g for g in self.gaps if g.block == self.block and g.role == role]
-        total = sum(g.rows for g in gaps)
-        # An exact sum, so that the order of the records makes no difference.
-        squares = math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps)
-        return math.sqrt(squares / total) if total else float("nan")
+        return rms_over([g for g in self.gaps if g.block == self.block and g.role == role], which)
 
     @property
     def held_out_ratio(self) -> float:
@@ -172,32 +251,102 @@ class Verdict:
         before, after = (max(0.0, self.rms(w, "held_out") ** 2 - floor) for w in ("before", "after"))
         return 1.0 - after / before if before > 0.0 else 0.0
 
-    def words(self) -> str:
-        """Return the verdict in a few sentences."""
-        text = {
-            "none": "The refitted model explains the records down to their noise; nothing is missing.",
-            "unknown": "Something is missing that no effect of the catalogue explains.",
-            "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
-            "named": "",
-        }[self.verdict]
+    @property
+    def assessed(self) -> str:
+        """Role of the records whose error is told: those that no fit has seen, where there are any."""
+        return "held_out" if any(g.role == "held_out" for g in self.gaps if g.block == self.block) else "fit"
+
+    @property
+    def numbers(self) -> tuple[FittedNumber, ...]:
+        """The declared numbers after the refit, with how far each moved."""
+        return fitted_numbers(self.fits)
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """Names of the blocks."""
+        return tuple(dict.fromkeys(g.block for g in self.gaps))
+
+    def gap(self, block: str = "") -> Gap:
+        """Return the error of a block before and after, on the records that are assessed.
+
+        Parameters
+        ----------
+        block
+            Name; by default that of the summed-up block.
+        """
+        name, role = block or self.block, self.assessed
+        own = [g for g in self.gaps if g.block == name]
+        seen = [g for g in own if g.role == role] or own
+        before, after, floor, signal = (
+            rms_over(seen, which) for which in ("before", "after", "noise_floor", "signal")
+        )
+        return Gap(name, seen[0].role, before, after, floor, signal, seen[0].unit, seen[0].beside)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What was noticed besides the errors of the blocks, in sentences."""
+        errors = tuple(f"{name} ({state})" for name in self.blocks for state in ("open", "closed"))
+        return tuple(text for text in self.where if not text.startswith(errors))
+
+    def headline(self) -> str:
+        """Return the verdict in one line."""
+        if self.verdict == "named":
+            effects = " and ".join(e.headline(self.actuator) for e in self.effects)
+            return capitalised(effects)
+        return HEADLINES[self.verdict]
+
+    def paragraphs(self) -> tuple[str, ...]:
+        """Return the verdict in words: what was found, each effect, what is left."""
+        sentences = [] if self.verdict == "named" else [EXPLANATIONS[self.verdict]]
         if self.verdict == "none" and self.unidentified:
-            text += (
-                f" They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
+            sentences.append(
+                f"They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
                 "would not show all that could be missing."
             )
-        for effect in self.effects:
-            numbers = ", ".join(
-                f"{name.rpartition('.')[2]} = {with_unit(f'{value:.4g} ± {error:.2g}', unit)}"
-                for name, (value, unit, error) in effect.parameters.items()
+        sentences += [effect.words(self.actuator) + self._richer(effect) for effect in self.effects]
+        if self.effects and not self.complete:
+            sentences.append(
+                "That is not all: an error beyond the noise is left, for which there is no name."
             )
-            text += f"`{effect.name}` at `{effect.location}`: {numbers}. "
-            text += f"It explains {100 * effect.share_held_out:.0f} % "
-            text += "of the excess over the noise on records that no fit has seen. "
-            if effect.aliases:
-                text += f"As good an explanation: {', '.join(effect.aliases)}. "
         if self.remainder is not None:
-            text = f"{text.strip()} {self.remainder.words()}"
-        return text.strip()
+            sentences.append(self.remainder.words())
+        return tuple(sentences)
+
+    def words(self) -> str:
+        """Return the verdict in a few sentences."""
+        return " ".join(self.paragraphs())
+
+    def tried_words(self) -> tuple[str, ...]:
+        """Return a sentence for each effect that helps and is not named: how much, and why not."""
+        named = {effect.name for effect in self.effects}
+        sentences = []
+        for name, share, *why in self.runners_up:
+            if name in named or not share > _HELPS:
+                continue
+            alone = (
+                f"{title(name)} alone explains {three_digits(100.0 * share)} % of the excess over the noise"
+            )
+            reason = why[0] if why else self._why_not(name, named)
+            sentences.append(f"{capitalised(alone)}: {reason}.")
+        return tuple(sentences)
+
+    def _why_not(self, name: str, named: Collection[str]) -> str:
+        nested = [simple for simple in simpler_forms(self.declared, name) if simple in named]
+        if nested:
+            return f"{title(nested[0])}, its simpler form, predicts as well"
+        return "what was named accounts for it" if named and self.complete else _NOT_NAMED
+
+    def _richer(self, effect: NamedEffect) -> str:
+        """Return why an effect was named and not its simpler form, from what each explains alone."""
+        shares = {name: share for name, share, *_ in self.runners_up}
+        simple = next((s for s in simpler_forms(self.declared, effect.name) if s in shares), None)
+        if simple is None or effect.name not in shares:
+            return ""
+        left, own = (three_digits(100.0 * (1.0 - shares[n])) for n in (simple, effect.name))
+        return (
+            f" {capitalised(title(simple))}, its simpler form, alone leaves {left} % of the excess over the "
+            f"noise, {title(effect.name)} {own} %."
+        )
 
     def skipped_words(self) -> tuple[str, ...]:
         """Return a sentence for each effect that was left out of the comparison."""
@@ -211,51 +360,48 @@ class Verdict:
         model
             Path of the deck of the better model.
         """
-        unit = next(g.unit for g in self.gaps if g.block == self.block)
-        return {
-            "verdict": self.verdict,
-            "effects": [
-                {
-                    "name": e.name,
-                    "location": e.location,
-                    "parameters": [
-                        {
-                            "name": n,
-                            "value": to_resolution(v, s),
-                            "unit": u,
-                            "standard_error": significant([s], 4)[0],
-                        }
-                        for n, (v, u, s) in e.parameters.items()
-                    ],
-                    "aliases": list(e.aliases),
-                    "evidence": {
-                        "share_fit": _six_digits(e.share_fit),
-                        "share_held_out": _six_digits(e.share_held_out),
-                        "signature": e.signature,
-                    },
-                }
-                for e in self.effects
-            ],
-            "where": list(self.where),
+        gap = self.gap()
+        measured = {
             "error": {
-                "unit": unit,
+                "unit": gap.unit,
                 "block": self.block,
-                "noise_floor": _six_digits(self.rms("noise_floor", "held_out")),
+                "noise_floor": self.rms("noise_floor", "held_out"),
                 **{
-                    role: {when: _six_digits(self.rms(when, role)) for when in ("before", "after")}
+                    role: {when: self.rms(when, role) for when in ("before", "after")}
                     for role in ("fit", "held_out")
                 },
+                "signal": {"name": gap.beside, "rms": gap.signal},
             },
-            "runners_up": [{"name": n, "share": _six_digits(s)} for n, s in self.runners_up],
+            "runners_up": [
+                dict(zip(("name", "share", "reason"), each, strict=False)) for each in self.runners_up
+            ],
+            "remainder": None if self.remainder is None else self.remainder.to_dict(),
+            "records": [asdict(each) for each in self.gaps],
+        }
+        content = {
+            "verdict": self.verdict,
+            "headline": self.headline(),
+            "complete": self.complete,
+            "effects": [{**e.to_dict(), "title": e.headline(self.actuator)} for e in self.effects],
+            "where": [*(self.gap(name).words() for name in self.blocks), *self.findings],
+            **_rounded(measured, 6),
             "skipped": [
                 {"name": s.effect, "location": s.location, "beside": list(s.beside), "reason": s.reason}
                 for s in self.skipped
             ],
+            "remarks": list(self.remarks),
             "unidentified": list(self.unidentified),
-            "remainder": None if self.remainder is None else _six_digits(self.remainder.to_dict()),
             "next": list(self.next_steps),
+            "numbers": [n._asdict() for n in self.numbers],
+            "criteria": {
+                each.name: {"value": each.value, "meaning": each.meaning}
+                for each in settings_of(self.criteria)
+            },
+            "run": None if self.run is None else self.run.to_dict(),
             "model": model,
         }
+        written: dict[str, Any] = _rounded(content, 9)
+        return written
 
     def rows(self) -> Sequence[tuple[str, ...]]:
         """Return a table of the gap: block, record, role, before, after, noise floor."""
@@ -272,14 +418,41 @@ class Verdict:
         ]
 
     def __str__(self) -> str:
-        sentences = (self.words(), *self.where, *self.skipped_words(), *self.next_steps)
-        return "\n".join([f"verdict: {self.verdict}", *sentences])
+        return "\n".join(
+            [
+                f"verdict: {self.verdict}",
+                f"{self.headline()}.",
+                *(self.gap(name).words() for name in self.blocks),
+                *self.paragraphs(),
+                *self.findings,
+                *(self.tried_words() if self.verdict != "named" or not self.complete else ()),
+                *self.remarks,
+                *self.skipped_words(),
+                *self.next_steps,
+            ]
+        )
 
 
-def _six_digits(content: Any) -> Any:
-    """Return numbers in any nest of mappings and lists as they are written: the last digits mean nothing."""
+def rms_over(gaps: Sequence[RecordGap], which: str) -> float:
+    """Return the root mean square over several records, each sample counted once.
+
+    Parameters
+    ----------
+    gaps
+        Of one block.
+    which
+        ``before``, ``after``, ``noise_floor`` or ``signal``.
+    """
+    total = sum(g.rows for g in gaps)
+    # An exact sum, so that the order of the records makes no difference.
+    squares = math.fsum(getattr(g, which) ** 2 * g.rows for g in gaps)
+    return math.sqrt(squares / total) if total else math.nan
+
+
+def _rounded(content: Any, digits: int) -> Any:
+    """Return numbers in any nest as they are written: the last digits mean nothing, JSON has no infinity."""
     if isinstance(content, float):
-        return significant([content], 6)[0]
-    if isinstance(content, dict):
-        return {key: _six_digits(value) for key, value in content.items()}
-    return [_six_digits(each) for each in content] if isinstance(content, list) else content
+        return significant([content], digits)[0] if math.isfinite(content) else None
+    if isinstance(content, Mapping):
+        return {key: _rounded(value, digits) for key, value in content.items()}
+    return [_rounded(each, digits) for each in content] if isinstance(content, list | tuple) else content

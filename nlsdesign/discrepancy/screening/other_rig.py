@@ -19,7 +19,7 @@ from ...model import flatten
 from ...model.readings import reading_of
 from ...quantity import with_unit
 from ..selection.comparison import Comparison
-from ..selection.criteria import DECLARED
+from ..selection.criteria import DECLARED, Criteria
 from ..selection.excess import excesses
 from ..selection.hypothesis import Hypothesis
 
@@ -54,7 +54,9 @@ class OtherNumbers(NamedTuple):
     decides: bool
 
 
-def other_numbers(comparison: Comparison, base: Hypothesis, better: Hypothesis) -> OtherNumbers:
+def other_numbers(
+    comparison: Comparison, base: Hypothesis, better: Hypothesis, criteria: Criteria
+) -> OtherNumbers:
     """Let the declared numbers go where the records take them, if a refit has driven some to their ends.
 
     Parameters
@@ -65,14 +67,16 @@ def other_numbers(comparison: Comparison, base: Hypothesis, better: Hypothesis) 
         Refitted declared model.
     better
         With the effects that were added, if any.
+    criteria
+        Of the decision.
     """
-    before, after = _left(base, comparison.bench), _left(better, comparison.bench)
+    before, after = _left(base, comparison.bench, criteria), _left(better, comparison.bench, criteria)
     scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
     stuck = [n for n, z in scores.items() if abs(z) >= _AT_END]
     if len(stuck) < 2 or not before:
         return OtherNumbers("", False)
     free = comparison.freely(base)
-    left, far = _left(free, comparison.bench), _far_numbers(free, base)
+    left, far = _left(free, comparison.bench, criteria), _far_numbers(free, base)
     share = 1.0 - left / before
     if far and numbers_explain(share, left=left, after=after, before=before, named=better is not base):
         words = (
@@ -106,8 +110,8 @@ def numbers_explain(share: float, *, left: float, after: float, before: float, n
     return share >= _SHARE and left < 0.5 * after and not effect_is_simpler
 
 
-def _left(hypothesis: Hypothesis, bench: Bench) -> float:
-    return sum(sum(e.excess) for name, e in excesses(hypothesis, bench).items() if name != DECLARED)
+def _left(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> float:
+    return sum(e.excess for name, e in excesses(hypothesis, bench, criteria).items() if name != DECLARED)
 
 
 def _far_numbers(free: Hypothesis, base: Hypothesis) -> list[str]:

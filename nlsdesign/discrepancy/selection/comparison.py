@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -15,16 +15,14 @@ from ...errors import ConvergenceError, unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import fit
+from ...identification.estimation.least_squares import Fit, fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
-from ...identification.records.measurement import Record
-from ...identification.statistics.residuals import effective_size
+from ...identification.records.measurement import Record, RecordSet
 from ...model import Variable, flatten
 from ...processes import parallel_map
 from ...quantity import Quantity
 from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
-from ..fitting.unpredictable import Tally
 from .hypothesis import Hypothesis
 from .hypothesis_fit import FreeBlock, HypothesisFit
 
@@ -75,9 +73,19 @@ class Comparison:
     """
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
-        self.bench = bench
+        self.bench, self._sizes = bench, sizes
         self._fit = HypothesisFit(bench, sizes)
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
+
+    def with_records(self, records: RecordSet) -> Comparison:
+        """Return a comparison on more records, with the noise that was estimated before.
+
+        Parameters
+        ----------
+        records
+            All of them, with those that were held out.
+        """
+        return Comparison(self.bench.with_records(records), self._sizes)
 
     @property
     def keys(self) -> tuple[tuple[str, str], ...]:
@@ -103,7 +111,7 @@ class Comparison:
         assembly
             As declared.
         """
-        return self.on_all_samples(Hypothesis(assembly))
+        return Hypothesis(assembly)
 
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis as the coarse look sees it.
@@ -191,12 +199,9 @@ class Comparison:
         hypothesis
             Fitted.
         """
-        tallies = {
-            (each.block.name, each.record.name): Tally(
-                float(each.residual @ each.residual), len(each.residual), effective_size(each.residual)
-            )
-            for each in self.judged(hypothesis)
-        }
+        groups = self._groups(hypothesis)
+        results = parallel_map(lambda k: self._fit.judged(hypothesis, groups[k]), len(groups))
+        tallies = {key: tally for result in results for key, tally in result.items()}
         return replace(hypothesis.judged_by(tallies), coarse=False)
 
     def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
@@ -278,7 +283,14 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
         if then[name].value != now[name].value:
             values[name] *= now[name].number / then[name].number
     added = (*_with_unknowns(hypothesis.added, old), candidate)
-    return replace(hypothesis, assembly=candidate.assembly, added=added, values=values)
+    fits = {blocks: _renamed(fit, renamed) for blocks, fit in hypothesis.fits.items()}
+    return replace(hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits)
+
+
+def _renamed(fit: Fit, renamed: Callable[[str], str]) -> Fit:
+    """Return a fit under the names that its numbers have after an edit."""
+    parameters = tuple(replace(p, name=renamed(p.name)) for p in fit.parameters)
+    return replace(fit, parameters=parameters, values={renamed(n): v for n, v in fit.values.items()})
 
 
 def _refittable(parameters: Sequence[Variable]) -> list[Variable]:

@@ -1,48 +1,95 @@
-"""The decision: what is open, what an effect explains, which effect is taken, and when the search is done.
+"""The decision rule: what is open, what an effect must show to be named, and which of several is named.
 
-Everything here is a function of numbers: for each block the sum of squared residuals in units of the noise
-floor on fitted and on held-out records, and how many numbers an effect brings. The *excess* of a block is
-what that sum has beyond the number of residuals, which is what noise alone would leave.
+Everything here is a function of numbers. For each block and record they are sums of squared residuals in
+units of the noise floor, *predicted*: with numbers that come from the other records (:mod:`.prediction`).
+Records with the role ``held_out`` are not among them. The *excess* of a block is what its sum has beyond the
+number of residuals, which is what noise alone would leave. ``docs/decision.md`` is the rule in prose.
 
-An effect is added if it explains at least half of the excess of an open block, on the fitted records *and* on
-the others, without spoiling the whole. Of several such effects the one with the fewest numbers is taken that
-comes close to the best.
+An effect may be named if
+ 1. it explains a share of the excess that is left in some open block, and more than noise explains;
+ 2. that gain in prediction does not rest on a single piece of a record;
+ 3. its numbers exclude "no effect", are known, and stand off the bounds of their search;
+ 4. no record is predicted worse than without it.
+Of several such effects the one that predicts best is taken, unless a simpler one predicts about as well.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, field, fields
+from typing import Any, Generic, NamedTuple, TypeVar
 
-LEAST_EXCESS = 0.4
-"""Mean square above the floor that is let pass: filters and rounding are known no better."""
-SIGNIFICANT = 5.0
-"""Standard deviations of a mean square of noise beyond which it is open: what noise alone never reaches."""
-PRIOR_PER_NUMBER = 3.0
-"""Mean squared departure of refitted numbers, in standard deviations of their prior, beyond which the
-declared numbers are open: 3 is that of numbers which all stand at the edge of their declared range."""
-LEAST_SHARE = 0.5
-"""An effect must explain this share of the excess of some open block: less than half is a side of another."""
-LEAST_FURTHER = 0.05
-"""A further effect must explain this share of what that block lacked at first: forms are never exact."""
-CLOSED_SHARE = 0.75
-"""A block of which so much is explained counts as named, even if its form is not quite right."""
-SAME = 0.02
-"""A simpler hypothesis is taken if its excess is more by less than this share of the first excess."""
-ALIAS = 0.003
-"""Hypotheses whose excess differs by less than this share of the first excess cannot be told apart."""
-NOISE_MARGIN = 50.0
-"""Sum of squares, in units of the floor, by which equally good fits differ because of noise and of the limits
-of a fit; beside the two shares, it counts where the whole excess is small."""
-MOST_EFFECTS = 3
-"""Effects that are looked for: a fourth would rest on what three inexact forms leave over."""
-MOST_EFFECTS_IN_FREE_FLIGHT = 2
-"""The same where a body flies freely: a third takes minutes to look for, and rests on less."""
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+Array = NDArray[np.float64]
 
 DECLARED = "declared numbers"
 """Name of the block that stands for the declared numbers: refitted numbers should lie in their ranges."""
+
+
+def _criterion(default: float, meaning: str) -> Any:
+    return field(default=default, metadata={"meaning": meaning})
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """The numbers of the decision rule; every verdict repeats them.
+
+    They were set on the simulated bench of ``tests/rig``, seeds 200 to 299, and on the labelled practice
+    records, see ``docs/decision.md``; the meaning of each stands in its field and in ``verdict.json``.
+    """
+
+    least_excess: float = _criterion(
+        0.4, "mean square above the noise floor that is let pass: the floor is known no better"
+    )
+    significant: float = _criterion(
+        5.0,
+        "standard deviations of a mean square of noise, in effective samples, from which a block is open",
+    )
+    prior_per_number: float = _criterion(
+        3.0, "mean squared departure of refitted numbers in standard deviations of their spread, at most"
+    )
+    least_share: float = _criterion(
+        0.5, "share of the excess that is left in an open block which an effect must explain"
+    )
+    noise_margin: float = _criterion(
+        25.0,
+        "gain in prediction, in effective squares of the noise, that is more than noise or a fit's end gives",
+    )
+    exclusion: float = _criterion(
+        4.0, "standard errors by which the numbers of an effect must exclude the value without effect"
+    )
+    widest: float = _criterion(
+        1.0,
+        "largest standard error of a number on the fitted scale: natural logarithm, or tenths of the range",
+    )
+    worse: float = _criterion(
+        0.25,
+        "share by which an effect may let the squares of a record grow, besides the noise margin",
+    )
+    richer: float = _criterion(
+        2.0,
+        "a simpler effect is taken if it leaves at most so many times what its richer form leaves",
+    )
+    equal: float = _criterion(
+        1.25, "effects that leave at most so many times the least excess are equally good"
+    )
+    most_effects: int = _criterion(
+        3, "effects that are looked for: a fourth would rest on what three inexact forms leave over"
+    )
+    closed_share: float = _criterion(
+        0.75, "share of the excess of an open block that all effects together must explain for a name"
+    )
+
+    def described(self) -> list[dict[str, Any]]:
+        """Return name, value and meaning of each criterion, for reports."""
+        return [
+            {"name": f.name, "value": getattr(self, f.name), "meaning": f.metadata["meaning"]}
+            for f in fields(self)
+        ]
 
 
 @dataclass(frozen=True)
@@ -57,183 +104,293 @@ class Excess:
         Of the residual.
     floor
         Noise floor, root mean square over the records, in the unit.
-    fit, held_out
-        Root mean square of the residual on the records of each role, in the unit.
-    chi2, rows
-        Sum of squares in units of the floor, and number of residuals, over fit and held-out records.
+    fit, predicted
+        Root mean square of the residual in the unit: as fitted, and with numbers from the other records.
+    chi2
+        Sum of squares of the latter in units of the floor.
+    rows, effective
+        Number of residuals, and of independent ones they are equivalent to.
     open
         Whether that is more than noise.
+    pieces
+        The sum of squares by record, for each piece of the record in time.
     """
 
     block: str
     unit: str
     floor: float
     fit: float
-    held_out: float
-    chi2: tuple[float, float]
-    rows: tuple[int, int]
+    predicted: float
+    chi2: float
+    rows: int
+    effective: float
     open: bool
+    pieces: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
-    def excess(self) -> tuple[float, float]:
-        """Sum of squares beyond the floor, on fit and held-out records."""
-        first, second = (max(0.0, c - n) for c, n in zip(self.chi2, self.rows, strict=True))
-        return first, second
+    def excess(self) -> float:
+        """Sum of squares beyond the floor."""
+        return max(0.0, self.chi2 - self.rows)
 
     @property
     def mean_square(self) -> float:
-        """Mean square over all records in units of the floor."""
-        return sum(self.chi2) / max(sum(self.rows), 1)
+        """Mean square in units of the floor."""
+        return self.chi2 / max(self.rows, 1)
+
+    @property
+    def colour(self) -> float:
+        """Number of residuals for each independent one."""
+        return max(1.0, self.rows / max(self.effective, 1.0))
 
 
 Excesses = Mapping[str, Excess]
 """By name of the block."""
 
 
-def is_beyond_noise(mean_square: float, effective_size: float) -> bool:
+class Number(NamedTuple):
+    """A fitted number of an effect.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    distance
+        Departure from the value without effect, on a scale where that is finite; zero for a number that only
+        shapes the effect.
+    decides
+        Whether the effect vanishes with it.
+    error
+        Standard error on the fitted scale.
+    at_bound
+        Whether it stands at a bound of its search.
+    """
+
+    name: str
+    distance: float
+    decides: bool
+    error: float
+    at_bound: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What the fitted numbers of an effect say about its existence.
+
+    Parameters
+    ----------
+    numbers
+        Of the effect.
+    covariance
+        Of the numbers that decide, on the scale of their distance, shape (deciding, deciding).
+    """
+
+    numbers: tuple[Number, ...] = ()
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def exclusion(self) -> float:
+        """Standard errors by which "no effect" is excluded: of one normal number that is as improbable."""
+        distances = np.array([n.distance for n in self.numbers if n.decides])
+        if not len(distances):
+            return math.inf
+        statistic = float(distances @ np.linalg.solve(self.covariance, distances))
+        if len(distances) == 1 or statistic > 100.0:
+            return math.sqrt(max(statistic - len(distances) + 1.0, 0.0))
+        return float(norm.isf(0.5 * chi2.sf(statistic, len(distances))))
+
+
+def is_beyond_noise(criteria: Criteria, mean_square: float, effective_size: float) -> bool:
     """Tell whether a mean square in units of the noise floor is more than noise.
 
     Parameters
     ----------
+    criteria
+        Of the rule.
     mean_square
-        Of the residuals of a block on the records of a role.
+        Of the residuals of a block.
     effective_size
         How many independent residuals these are equivalent to.
     """
-    return mean_square > 1.0 + max(LEAST_EXCESS, SIGNIFICANT * math.sqrt(2.0 / max(effective_size, 1.0)))
+    scatter = criteria.significant * math.sqrt(2.0 / max(effective_size, 1.0))
+    return mean_square > 1.0 + max(criteria.least_excess, scatter)
 
 
-def is_beyond_prior(squares: float, count: int) -> bool:
+def is_beyond_prior(criteria: Criteria, squares: float, count: int) -> bool:
     """Tell whether refitted numbers lie outside their declared ranges, taken together.
 
     Parameters
     ----------
+    criteria
+        Of the rule.
     squares
         Sum of squared departures in standard deviations of the prior.
     count
         How many numbers.
     """
-    return squares > PRIOR_PER_NUMBER * count
+    return squares > criteria.prior_per_number * count
 
 
 def total_excess(excesses: Excesses) -> float:
-    """Return the sum of squares beyond the floor over all blocks and roles.
+    """Return the sum of squares beyond the floor over all blocks.
 
     Parameters
     ----------
     excesses
         Of one hypothesis.
     """
-    return sum(sum(each.excess) for each in excesses.values())
+    return sum(each.excess for each in excesses.values())
 
 
 def explained(before: Excesses, after: Excesses) -> dict[str, float]:
-    """Return the explained share of each open block's excess: the smaller of fit and held-out records.
-
-    A role on which a block had next to no excess says nothing.
+    """Return the explained share of each open block's excess, as predicted.
 
     Parameters
     ----------
     before, after
         Of two hypotheses on the same rows.
     """
-    shares = {}
+    return {
+        name: 1.0 - after[name].excess / one.excess
+        for name, one in before.items()
+        if one.open and one.excess > 0
+    }
+
+
+class Gain(NamedTuple):
+    """Gain in prediction, in effective squares of the noise.
+
+    Parameters
+    ----------
+    value, error
+        Over all pieces of all records, and its standard error from their scatter.
+    rest
+        The same without the piece that gains most.
+    """
+
+    value: float
+    error: float
+    rest: float
+
+
+def gain(before: Excesses, after: Excesses) -> Gain:
+    """Return by how much predictions gain from one hypothesis to another, over all blocks.
+
+    Parameters
+    ----------
+    before, after
+        Of two hypotheses on the same rows.
+    """
+    differences = np.concatenate(
+        [
+            np.subtract(pieces, after[name].pieces[record]) / max(one.colour, after[name].colour)
+            for name, one in before.items()
+            for record, pieces in one.pieces.items()
+        ]
+        or [np.zeros(0)]
+    )
+    count = len(differences)
+    scatter = float(np.sum((differences - differences.mean()) ** 2)) if count else 0.0
+    total, most = float(differences.sum()), float(differences.max()) if count else 0.0
+    return Gain(total, math.sqrt(scatter * count / max(count - 1, 1)), total - most)
+
+
+def gains_by_record(before: Excesses, after: Excesses) -> dict[str, float]:
+    """Return by how much the prediction of each record gains, in effective squares of the noise.
+
+    Parameters
+    ----------
+    before, after
+        Of two hypotheses on the same rows.
+    """
+    gains: dict[str, float] = {}
     for name, one in before.items():
-        if one.open:
-            pairs = zip(one.excess, after[name].excess, one.rows, strict=True)
-            shares[name] = min(1.0 - b / a for a, b, n in pairs if n and a > LEAST_EXCESS * n)
-    return shares
+        for record, pieces in one.pieces.items():
+            gained = sum(pieces) - sum(after[name].pieces[record])
+            gains[record] = gains.get(record, 0.0) + gained / max(one.colour, after[name].colour)
+    return gains
 
 
-def is_explained(first: Excesses, last: Excesses) -> bool:
-    """Tell whether what was named accounts for every block that was open.
+def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:
+    """Tell whether a gain in prediction is more than noise gives, and does not rest on a single piece.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    gained
+        From one hypothesis to another.
+    """
+    return gained.rest >= criteria.noise_margin
+
+
+def records_made_worse(criteria: Criteria, before: Excesses, after: Excesses) -> dict[str, float]:
+    """Return the records that are predicted worse than before, with the factor by which their squares grow.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    before, after
+        Of the hypotheses without and with an effect.
+    """
+    squares = {"before": dict[str, float](), "after": dict[str, float](), "margin": dict[str, float]()}
+    for name, one in before.items():
+        for record, pieces in one.pieces.items():
+            for when, value in (
+                ("before", sum(pieces)),
+                ("after", sum(after[name].pieces[record])),
+                ("margin", criteria.noise_margin * after[name].colour),
+            ):
+                squares[when][record] = squares[when].get(record, 0.0) + value
+    then, now = squares["before"], squares["after"]
+    return {
+        record: now[record] / max(then[record], 1e-300)
+        for record in then
+        if now[record] > (1.0 + criteria.worse) * then[record] + squares["margin"][record]
+    }
+
+
+def is_explained(criteria: Criteria, first: Excesses, last: Excesses) -> bool:
+    """Tell whether what was added accounts for most of every block that was open.
 
     Declared numbers that stay far from their values are no objection where a block was open: they are
     mentioned in ``where``.
 
     Parameters
     ----------
+    criteria
+        Of the rule.
     first, last
         Of the refitted declared model and of the last hypothesis.
     """
     shares = explained(first, last)
     if len(shares) > 1:
         shares.pop(DECLARED, None)
-    return all(not last[name].open or share >= CLOSED_SHARE for name, share in shares.items())
+    return all(not last[name].open or share >= criteria.closed_share for name, share in shares.items())
 
 
-def most_effects(*, has_free_flight: bool) -> int:
-    """Return how many effects are looked for.
-
-    Parameters
-    ----------
-    has_free_flight
-        Whether a body flies freely between contacts, so that predictions are never exact.
-    """
-    return MOST_EFFECTS_IN_FREE_FLIGHT if has_free_flight else MOST_EFFECTS
-
-
-def lacking(first: Excesses, now: Excesses, *, has_free_flight: bool) -> list[str]:
-    """Return the blocks that lack enough for a further effect to count, the largest excess first.
-
-    Declared numbers that are open count only where no block is.
+def is_complete(last: Excesses) -> bool:
+    """Tell whether nothing is left beyond the noise in any block.
 
     Parameters
     ----------
-    first, now
-        Of the refitted declared model and of the present hypothesis.
-    has_free_flight
-        Whether a body flies freely in the latter: then what is closed is not searched for more.
+    last
+        Of the last hypothesis.
     """
-    least = 1.0 - CLOSED_SHARE if has_free_flight else LEAST_FURTHER
-    names = [n for n, e in now.items() if e.open and sum(e.excess) >= least * sum(first[n].excess)]
-    blocks = sorted((n for n in names if n != DECLARED), key=lambda n: -sum(now[n].excess))
+    return not any(each.open for name, each in last.items() if name != DECLARED)
+
+
+def lacking(now: Excesses) -> list[str]:
+    """Return the blocks that are open, the largest excess first; declared numbers only where no block is.
+
+    Parameters
+    ----------
+    now
+        Of the present hypothesis.
+    """
+    names = [n for n, e in now.items() if e.open]
+    blocks = sorted((n for n in names if n != DECLARED), key=lambda n: -now[n].excess)
     return blocks or names
-
-
-def helps(first: Excesses, before: Excesses, after: Excesses) -> bool:
-    """Tell whether an effect explains enough of some open block without spoiling the whole.
-
-    Parameters
-    ----------
-    first, before, after
-        Of the refitted declared model, of the hypothesis without the effect, and with it.
-    """
-    if total_excess(after) >= total_excess(before):
-        return False
-    for name, share in explained(before, after).items():
-        gain = sum(before[name].excess) - sum(after[name].excess)
-        if share >= LEAST_SHARE and gain >= LEAST_FURTHER * sum(first[name].excess):
-            return True
-    return False
-
-
-def best_shares(before: Excesses, after: Excesses) -> tuple[float, float]:
-    """Return the share explained on fitted and on held-out records, of the block that gains most.
-
-    Parameters
-    ----------
-    before, after
-        Of the hypotheses without and with an effect.
-    """
-    shares = explained(before, after)
-    if not shares:
-        return 0.0, 0.0
-    block = max(shares, key=lambda name: shares[name])
-    pairs = zip(before[block].excess, after[block].excess, strict=True)
-    fitted, held = (1.0 - b / a if a > 0.0 else 1.0 for a, b in pairs)
-    return fitted, held
-
-
-def is_superfluous(first: Excesses, without: Excesses, with_it: Excesses) -> bool:
-    """Tell whether the hypothesis without an effect is about as good as that with it.
-
-    Parameters
-    ----------
-    first, without, with_it
-        Of the refitted declared model, and of the two hypotheses.
-    """
-    return total_excess(without) <= total_excess(with_it) + SAME * total_excess(first) + NOISE_MARGIN
 
 
 T = TypeVar("T")
@@ -253,12 +410,82 @@ class Rival(Generic[T]):
         How many numbers that brings.
     excesses
         What it leaves.
+    standing
+        What the fitted numbers say.
+    simpler
+        Effects of which it is a richer form.
     """
 
     hypothesis: T
     effect: str
     numbers: int
     excesses: Excesses
+    standing: Standing = field(default_factory=Standing)
+    simpler: tuple[str, ...] = ()
+
+
+def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[str, ...]:
+    """Return in words why an effect may not be named; nothing if it may.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    before
+        Of the hypothesis without the effect.
+    rival
+        With it.
+    """
+    words, after = [], rival.excesses
+    shares = explained(before, after)
+    best = max(shares.values(), default=0.0)
+    gained = gain(before, after)
+    if best < criteria.least_share or total_excess(after) >= total_excess(before):
+        words.append(
+            f"it explains {100.0 * max(best, 0.0):.0f} % of what is left, "
+            f"less than {100.0 * criteria.least_share:.0f} %"
+        )
+    if not all(name == DECLARED for name in shares) and not is_more_than_noise(criteria, gained):
+        words.append(
+            f"without its best piece of a record the prediction gains {gained.rest:.3g} squares of the noise"
+        )
+    return (*words, *_objections_of_numbers(criteria, rival.standing), *_worse(criteria, before, after))
+
+
+def _objections_of_numbers(criteria: Criteria, standing: Standing) -> list[str]:
+    words = []
+    if standing.exclusion < criteria.exclusion:
+        words.append(f"its numbers are {standing.exclusion:.1f} standard errors from no effect")
+    bounded = [n.name for n in standing.numbers if n.at_bound]
+    unknown = [n.name for n in standing.numbers if n.error > criteria.widest and not n.at_bound]
+    words += [f"{_listed(bounded)} at a bound of the search"] if bounded else []
+    words += [f"{_listed(unknown)} not known"] if unknown else []
+    return words
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 1} more are" if len(names) > 1 else " is"
+    return f"{names[0]}{more}"
+
+
+def _worse(criteria: Criteria, before: Excesses, after: Excesses) -> list[str]:
+    worse = records_made_worse(criteria, before, after)
+    return [f"record '{r}' is predicted worse, {f:.2g} times the squares" for r, f in sorted(worse.items())]
+
+
+def is_superfluous(criteria: Criteria, without: Excesses, with_it: Excesses) -> bool:
+    """Tell whether the hypothesis without an effect predicts about as well as that with it.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    without, with_it
+        Of the two hypotheses.
+    """
+    if not is_more_than_noise(criteria, gain(without, with_it)):
+        return True
+    return total_excess(without) <= criteria.richer * total_excess(with_it)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,13 +496,15 @@ class Choice(Generic[T]):
     equals: tuple[Rival[T], ...]
 
 
-def choose(first: Excesses, before: Excesses, rivals: Sequence[Rival[T]], block: str) -> Choice[T] | None:
-    """Return the simplest of the rivals that leave least in a block, without spoiling another.
+def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], block: str) -> Choice[T] | None:
+    """Return the simplest of the rivals that predict a block about as well as the best, and may be named.
 
     Parameters
     ----------
-    first, before
-        Of the refitted declared model, and of the hypothesis that all rivals add to.
+    criteria
+        Of the rule.
+    before
+        Of the hypothesis that all rivals add to.
     rivals
         In the order of the catalogue.
     block
@@ -284,30 +513,29 @@ def choose(first: Excesses, before: Excesses, rivals: Sequence[Rival[T]], block:
     Returns
     -------
     Choice or None
-        Nothing where none of them helps.
+        Nothing where none of them may be named.
     """
 
     def left(rival: Rival[T]) -> float:
         after = rival.excesses.items()
-        spoilt = sum(max(0.0, sum(e.excess) - sum(before[n].excess)) for n, e in after if n != block)
-        return sum(rival.excesses[block].excess) + spoilt
+        spoilt = sum(max(0.0, e.excess - before[n].excess) for n, e in after if n != block)
+        return rival.excesses[block].excess + spoilt
 
-    able = [rival for rival in rivals if helps(first, before, rival.excesses)]
+    able = [rival for rival in rivals if not objections(criteria, before, rival)]
+    able = [rival for rival in able if explained(before, rival.excesses).get(block, 0.0) > 0.0] or able
     if not able:
         return None
-    whole = sum(before[block].excess)
-    near = min(left(rival) for rival in able) + SAME * whole + NOISE_MARGIN
-    equal = [rival for rival in able if left(rival) <= near]
-    best = min(equal, key=lambda rival: (rival.numbers, total_excess(rival.excesses)))
-    margin = ALIAS * whole + NOISE_MARGIN
-    limit, total_limit = left(best) + margin, total_excess(best.excesses) + margin
-    alike = {
-        rival.effect: rival
-        for rival in reversed(equal)
-        if rival.numbers <= best.numbers
-        and left(rival) <= limit
-        and total_excess(rival.excesses) <= total_limit
-    }
+    best = min(able, key=left)
+
+    def is_near(rival: Rival[T]) -> bool:
+        """Tell whether a rival predicts about as well as the best: within noise, or in proportion."""
+        within = not is_more_than_noise(criteria, gain(rival.excesses, best.excesses))
+        nested = rival.effect in best.simpler
+        return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
+
+    near = [rival for rival in able if is_near(rival)]
+    simplest = min(rival.numbers for rival in near)
+    alike = {rival.effect: rival for rival in reversed(near) if rival.numbers == simplest}
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
     return Choice(taken, tuple(alike.values()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from ...errors import ConvergenceError
@@ -12,12 +12,12 @@ from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench
 from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter, declared_parameter
-from ...identification.statistics.residuals import effective_size
 from ...model import Variable
 from ..effects.candidate import Unknown
 from ..fitting.strategies import FitProblem, Plain, Start, method_for, refusal
 from ..fitting.unpredictable import Key, Tally
 from .hypothesis import Hypothesis
+from .prediction import tallies_of
 
 
 class FreeBlock(NamedTuple):
@@ -93,9 +93,24 @@ class HypothesisFit:
         try:
             best = method.fit(problem, strategy)
             tallies = _tallies(problem, best)
+            aside = method.set_aside(problem, best, tallies)
         except ConvergenceError as error:
             return error
-        return GroupFit(best, tallies, problem.has_free_flight, method.set_aside(problem, tallies))
+        return GroupFit(best, tallies, problem.has_free_flight, aside)
+
+    def judged(self, hypothesis: Hypothesis, group: Sequence[FreeBlock]) -> Mapping[Key, Tally]:
+        """Return what a hypothesis leaves over on all samples, its numbers as they are.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted, coarsely or not.
+        group
+            Blocks that share free numbers.
+        """
+        names = tuple(each.block.name for each in group)
+        problem = self._problem(replace(hypothesis, coarse=False), group, ())
+        return _tallies(problem, hypothesis.fits[names])
 
     def _problem(
         self, hypothesis: Hypothesis, group: Sequence[FreeBlock], new: Sequence[Unknown]
@@ -160,9 +175,5 @@ class HypothesisFit:
 
 
 def _tallies(problem: FitProblem, best: Fit) -> dict[Key, Tally]:
-    result = {}
-    for each in problem.evidence:
-        residual = each.residual(best.values)[0]
-        key = each.driven.block.name, each.record.name
-        result[key] = Tally(float(residual @ residual), len(residual), effective_size(residual))
-    return result
+    # Behind a free flight a slope holds at its point only, so no step without a record can be taken.
+    return tallies_of(problem.evidence, best, leave_out=not problem.has_free_flight)

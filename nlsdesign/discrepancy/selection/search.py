@@ -6,6 +6,7 @@ What is tried, and in which order; :mod:`.criteria` decides.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -15,22 +16,33 @@ from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
 from .criteria import (
     DECLARED,
+    Criteria,
     Excesses,
+    Gain,
     Rival,
-    best_shares,
     choose,
+    explained,
+    gain,
+    gains_by_record,
+    is_complete,
     is_explained,
     is_superfluous,
     lacking,
-    most_effects,
+    objections,
     total_excess,
 )
 from .excess import excesses
 from .hypothesis import Hypothesis
+from .standing import standing_of
 
 _PAIRED = 4
 """Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice. Six pairs
 take about as long as the catalogue did."""
+_MOST_EFFECTS_IN_FREE_FLIGHT = 2
+"""Effects that are looked for where a body flies freely: a third takes minutes, and rests on less."""
+
+
+_UNKNOWN_GAIN = Gain(math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,21 +53,43 @@ class Step:
     ----------
     chosen
         Hypothesis with the effect in it.
-    share_fit, share_held_out
-        Share of the excess of the block that it explains best.
+    share
+        Share of the excess that was left in a block before, of the block of which it explains most.
+    gain, gains
+        What prediction gains by it, over all records and on each.
     equals
-        Hypotheses with another last effect that explain as much with as few numbers.
+        Hypotheses with another last effect that predict as well with as few numbers.
     """
 
     chosen: Hypothesis
-    share_fit: float
-    share_held_out: float
+    share: float
+    gain: Gain = _UNKNOWN_GAIN
+    gains: Mapping[str, float] = field(default_factory=dict)
     equals: tuple[Hypothesis, ...] = ()
 
     @property
     def effect(self) -> str:
         """Identifier of what was added."""
         return self.chosen.newest.effect
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A candidate that was fitted beside nothing else, and why it was not named.
+
+    Parameters
+    ----------
+    candidate
+        Which.
+    share
+        Share of the whole excess that it explains alone.
+    objections
+        Clauses of the rule that speak against it; empty for one that may be named.
+    """
+
+    candidate: Candidate
+    share: float
+    objections: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -89,21 +123,24 @@ class Outcome:
     Parameters
     ----------
     last
-        Hypothesis with everything that was named, fitted to all samples.
+        Hypothesis with everything that may be named, fitted to all samples.
     steps
         One for each effect.
-    ranking
-        What was tried first, with the share of the whole excess that each explains alone.
+    tried
+        What was tried first, the best first.
     explained
-        Whether that accounts for every block that was open.
+        Whether that accounts for most of every block that was open.
+    complete
+        Whether nothing is left beyond the noise.
     skipped
         What could not be compared, and why.
     """
 
     last: Hypothesis
     steps: tuple[Step, ...] = ()
-    ranking: tuple[tuple[Candidate, float], ...] = ()
+    tried: tuple[Tried, ...] = ()
     explained: bool = False
+    complete: bool = False
     skipped: tuple[Skipped, ...] = ()
 
 
@@ -111,9 +148,10 @@ def search(
     comparison: Comparison,
     base: Hypothesis,
     catalogue: Sequence[EffectFunction],
+    criteria: Criteria,
     progress: Callable[[str], None],
 ) -> Outcome:
-    """Add effects to a hypothesis while a block stays open and one helps.
+    """Add effects to a hypothesis while a block stays open and one may be named.
 
     Parameters
     ----------
@@ -123,10 +161,12 @@ def search(
         Refitted declared model.
     catalogue
         Effects to try.
+    criteria
+        Of the decision.
     progress
         Told what is being tried.
     """
-    return _Search(comparison, catalogue, progress).outcome(base)
+    return _Search(comparison, catalogue, criteria, progress).outcome(base)
 
 
 @dataclass(eq=False)
@@ -135,34 +175,35 @@ class _Search:
 
     comparison: Comparison
     catalogue: Sequence[EffectFunction]
+    criteria: Criteria
     progress: Callable[[str], None]
     skipped: list[Skipped] = field(default_factory=list)
-    ranking: tuple[tuple[Candidate, float], ...] = ()
+    tried: tuple[Tried, ...] = ()
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.comparison.coarsely(base)
-        first = self._excesses(start)
         steps = self._backward(start, self._forward(start))
+        skipped = tuple(dict.fromkeys(self.skipped))
+        first = self._on_all(start)
         if not steps:
-            return Outcome(
-                base,
-                (),
-                self.ranking,
-                not any(e.open for e in first.values()),
-                tuple(dict.fromkeys(self.skipped)),
-            )
+            complete = is_complete(first)
+            return Outcome(base, (), self.tried, complete, complete, skipped)
         self.progress("fitting what was named to all samples")
         last = self.comparison.polished(steps[-1].chosen)
-        done = is_explained(first, self._excesses(steps[-1].chosen))
-        return Outcome(last, tuple(steps), self.ranking, done, tuple(dict.fromkeys(self.skipped)))
+        done = self._excesses(last)
+        explains = is_explained(self.criteria, first, done)
+        return Outcome(last, tuple(steps), self.tried, explains, is_complete(done), skipped)
 
     def _excesses(self, hypothesis: Hypothesis) -> Excesses:
-        return excesses(hypothesis, self.comparison.bench)
+        return excesses(hypothesis, self.comparison.bench, self.criteria)
+
+    def _on_all(self, hypothesis: Hypothesis) -> Excesses:
+        return self._excesses(self.comparison.on_all_samples(hypothesis))
 
     def _forward(self, start: Hypothesis) -> list[Step]:
-        """Return the effects that help, one after the other."""
-        first, present, steps = self._excesses(start), start, list[Step]()
-        while len(steps) < most_effects(has_free_flight=present.has_free_flight):
+        """Return the effects that may be named, one after the other."""
+        present, steps = start, list[Step]()
+        while len(steps) < self._most_effects(present):
             open_blocks = self._lacking(start, present)
             if not open_blocks:
                 break
@@ -172,26 +213,34 @@ class _Search:
                 # Effects elsewhere wait for their turn: most blocks have an effect of their own.
                 fresh = self._tried(present, block, tried)
                 tried += fresh
-                step = self._step(start, present, fresh, block)
+                step = self._step(present, fresh, block)
                 if step is not None:
                     break
-            before = self._excesses(present)
-            self.ranking = self.ranking or _ranked(before, {h: self._excesses(h) for h in tried})
-            further = [step] if step else self._pair(tried, first, before, open_blocks[0])
-            if not further:
+            self.tried = self.tried or self._account(present, tried)
+            if step is not None:
+                steps.append(step)
+            elif not steps:
+                # Beside an effect whose form is not exact, any two others would help a little.
+                steps += self._pair(tried, present, open_blocks[0])
+            else:
                 break
-            steps += further
+            if not steps:
+                break
             present = steps[-1].chosen
         return steps
 
+    def _most_effects(self, present: Hypothesis) -> int:
+        most = int(self.criteria.most_effects)
+        return min(most, _MOST_EFFECTS_IN_FREE_FLIGHT) if present.has_free_flight else most
+
     def _backward(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
         """Drop the effects that later ones have made superfluous, the first added first."""
-        first, place = self._excesses(start), 0
+        place = 0
         while len(steps) > 1 and place < len(steps) - 1:
             self.progress(f"trying without {steps[place].effect}")
             fewer = self._rebuilt(start, [s for k, s in enumerate(steps) if k != place])
             if fewer and is_superfluous(
-                first, self._excesses(fewer[-1].chosen), self._excesses(steps[-1].chosen)
+                self.criteria, self._excesses(fewer[-1].chosen), self._excesses(steps[-1].chosen)
             ):
                 steps = fewer
             else:
@@ -200,30 +249,42 @@ class _Search:
 
     def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
         """Return the blocks in which all samples ask for a further effect."""
-        full = self.comparison.on_all_samples
-        first, now = self._excesses(full(start)), self._excesses(full(present))
-        return lacking(first, now, has_free_flight=present.has_free_flight)
+        now = self._on_all(present)
+        blocks = lacking(now)
+        if present.has_free_flight:
+            # Predictions are never exact there, and every further fit takes long.
+            shares = explained(self._on_all(start), now)
+            blocks = [b for b in blocks if shares.get(b, 0.0) < self.criteria.closed_share]
+        return blocks
 
-    def _step(
-        self, start: Hypothesis, present: Hypothesis, fresh: Sequence[Hypothesis], block: str
-    ) -> Step | None:
+    def _step(self, present: Hypothesis, fresh: Sequence[Hypothesis], block: str) -> Step | None:
         """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
-        first, before = self._excesses(start), self._excesses(present)
+        before = self._excesses(present)
         if before[block].open:
-            return _chosen(first, before, {h: self._excesses(h) for h in fresh}, block)
-        full = self.comparison.on_all_samples
-        best = sorted(fresh, key=lambda h: sum(self._excesses(h)[block].chi2))[:_PAIRED]
-        on_all = {h: self._excesses(full(h)) for h in best}
-        return _chosen(self._excesses(full(start)), self._excesses(full(present)), on_all, block)
+            return self._chosen(before, {h: self._excesses(h) for h in fresh}, block)
+        best = sorted(fresh, key=lambda h: self._excesses(h)[block].chi2)[:_PAIRED]
+        on_all = {h: self._on_all(h) for h in best}
+        return self._chosen(self._on_all(present), on_all, block)
 
     def _candidates(self, present: Hypothesis) -> list[Candidate]:
         return [c for effect in self.catalogue for c in effect(present.assembly)]
 
     def _tried(self, present: Hypothesis, block: str, done: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Return fits of the candidates that act on a block and were not tried before."""
+        """Return fits of the candidates that act on a block and were not tried before.
+
+        What takes long is tried only where nothing else explains the block down to its noise.
+        """
         known = {(h.newest.effect, h.newest.location) for h in done}
         tasks = [(present, c) for c in self._candidates(present) if (c.effect, c.location) not in known]
-        return self._fits(tasks, () if block == DECLARED else (block,))
+        wanted = () if block == DECLARED else (block,)
+        quick = self._fits([task for task in tasks if not task[1].strategy.takes_long], wanted)
+        step = self._step(present, quick, block)
+        long = [task for task in tasks if task[1].strategy.takes_long]
+        if step is None or self._excesses(step.chosen)[block].open:
+            return quick + self._fits(long, wanted)
+        reason = f"takes long, and {step.effect} explains the block down to its noise"
+        self.skipped += [Skipped(c.effect, c.location, present.names, reason) for _, c in long]
+        return quick
 
     def _fits(
         self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
@@ -250,7 +311,7 @@ class _Search:
         self.skipped += [skipped[number] for number in sorted(skipped)]
         return [results[number] for number in sorted(results)]
 
-    def _pair(self, tried: Sequence[Hypothesis], first: Excesses, before: Excesses, block: str) -> list[Step]:
+    def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""
         best = sorted(tried, key=lambda h: total_excess(self._excesses(h)))[:_PAIRED]
         tasks = [
@@ -258,12 +319,12 @@ class _Search:
             for one, other in itertools.combinations(best, 2)
             if (again := self._again(one, other.newest)) is not None
         ]
-        pairs = {h: self._excesses(h) for h in self._fits(tasks)}
-        step = _chosen(first, before, pairs, block)
+        before = self._excesses(present)
+        step = self._chosen(before, {h: self._excesses(h) for h in self._fits(tasks)}, block)
         if step is None:
             return []
         alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)
-        return [Step(alone, *best_shares(before, self._excesses(alone))), step]
+        return [self._made(before, _rival(alone, self._excesses(alone))), step]
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
         """Return the same effect at the same kind of place of another assembly."""
@@ -287,26 +348,45 @@ class _Search:
                 return []
             if later is None:
                 return []
-            shares = best_shares(self._excesses(present), self._excesses(later))
-            rebuilt.append(Step(later, *shares, step.equals))
+            rival = _rival(later, self._excesses(later))
+            rebuilt.append(self._made(self._excesses(present), rival, step.equals))
             present = later
         return rebuilt
 
+    def _chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
+        """Return the best of some hypotheses, by what each leaves."""
+        choice = choose(self.criteria, before, [_rival(h, after) for h, after in tried.items()], block)
+        if choice is None:
+            return None
+        return self._made(before, choice.taken, tuple(r.hypothesis for r in choice.equals))
 
-def _chosen(
-    first: Excesses, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str
-) -> Step | None:
-    """Return the best of some hypotheses, by what each leaves."""
-    rivals = [Rival(h, h.newest.effect, len(h.newest.unknowns), after) for h, after in tried.items()]
-    choice = choose(first, before, rivals, block)
-    if choice is None:
-        return None
-    shares = best_shares(before, choice.taken.excesses)
-    return Step(choice.taken.hypothesis, *shares, tuple(r.hypothesis for r in choice.equals))
+    def _made(self, before: Excesses, rival: Rival[Hypothesis], equals: tuple[Hypothesis, ...] = ()) -> Step:
+        share = max(explained(before, rival.excesses).values(), default=0.0)
+        gained, gains = gain(before, rival.excesses), gains_by_record(before, rival.excesses)
+        return Step(rival.hypothesis, share, gained, gains, equals)
+
+    def _account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
+        """Return how far each effect goes alone and what speaks against it, the best first."""
+        before = self._excesses(present)
+        whole = max(total_excess(before), 1.0)
+        every = [
+            Tried(
+                h.newest,
+                1.0 - total_excess(self._excesses(h)) / whole,
+                objections(self.criteria, before, _rival(h, self._excesses(h))),
+            )
+            for h in tried
+        ]
+        return tuple(sorted(every, key=lambda each: -each.share))
 
 
-def _ranked(before: Excesses, tried: Mapping[Hypothesis, Excesses]) -> tuple[tuple[Candidate, float], ...]:
-    """Return how far each effect goes alone, the best first."""
-    whole = max(total_excess(before), 1.0)
-    shares = [(h.newest, 1.0 - total_excess(after) / whole) for h, after in tried.items()]
-    return tuple(sorted(shares, key=lambda pair: -pair[1]))
+def _rival(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
+    newest = hypothesis.newest
+    return Rival(
+        hypothesis,
+        newest.effect,
+        len(newest.unknowns),
+        after,
+        standing_of(newest.unknowns, hypothesis.fits.values()),
+        newest.simpler,
+    )

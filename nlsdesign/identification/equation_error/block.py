@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import casadi as ca
 
 from ...model import FlatModel
 
@@ -56,6 +58,8 @@ class Block:
     moving
         Name of the input that must be well away from zero for the block to say anything (dry friction at
         rest can be anything); ``None`` if there is no such input.
+    effort_per_drive
+        Constant factor in the output, where that is the error of a measured signal shown as an effort.
     """
 
     name: str
@@ -65,6 +69,23 @@ class Block:
     target: str | None
     width: float
     moving: str | None = None
+    effort_per_drive: float = 1.0
+
+    def scaled_to(self, effort_per_drive: float) -> Block:
+        """Return the block with another constant factor in its output.
+
+        Parameters
+        ----------
+        effort_per_drive
+            That of the declared model, so that all hypotheses are judged in one scale.
+        """
+        if effort_per_drive == self.effort_per_drive:
+            return self
+        s, model = self.model.symbols(), self.model
+        columns = [s.time, s.state, s.input, s.parameter, s.table]
+        output = s.output * (effort_per_drive / self.effort_per_drive)
+        equations = ca.Function("equations", columns, [s.derivative, output, s.signal, s.residual])
+        return replace(self, model=replace(model, equations=equations), effort_per_drive=effort_per_drive)
 
     @property
     def unit(self) -> str:

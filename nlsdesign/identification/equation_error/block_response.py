@@ -13,7 +13,7 @@ from ...errors import ConvergenceError, MeasurementError, unknown_name
 from ...symbolic import Expression, depends
 from ..records.measurement import Record
 from ..statistics.filters import derivative, without_rounding
-from .batch import Batch
+from .batch import Chain, Columns, Point
 from .block import Block, Drive
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
 
@@ -56,8 +56,8 @@ class _Walk(NamedTuple):
     tells whether there are short implicit steps, ``mean`` whether the mean output over these is taken.
     """
 
-    tables: ca.Function
-    step: Batch
+    tables: Point
+    step: Chain
     near: list[list[int]]
     stiff: bool
     mean: bool
@@ -113,16 +113,19 @@ class DrivenBlock:
         self.free = free_in(block, free)
         self._fixed = block.model.values
         e = _equations(block, self.free)
-        self._digest, self._size = Batch(e.digest), e.state.numel()
+        self._digest, self._size = Columns(e.digest), e.state.numel()
         self._late = [_free_delay(d, self.free) for d in _late_drives(block, self.free)]
-        self._output = Batch(_output_function(e))
+        self._output = Columns(_output_function(e))
         self._equations = e
+        self._sloped = _sloped(block)
         self._walk: _Walk | None = None
         if self._size:
             self._stages = stages_of(e.derivative, e.state, e.digested)
             arguments = [e.state, e.digested, ca.vertcat(e.parameter, e.now)]
             slope = ca.jacobian(e.derivative, e.state)
-            self._rate = ca.Function("rate", arguments, [e.derivative, ca.densify(slope)])
+            slope = ca.densify(slope)
+            self._rate = Point(ca.Function("rate", arguments, [ca.densify(e.derivative), slope]))
+            self._steepness = Columns(ca.Function("steepness", arguments, [ca.vec(slope)]))
             self._walk = self._made_walk(records, {**self._fixed, **(values or {})})
 
     def samples(self, record: Record, values: Mapping[str, float]) -> Samples:
@@ -135,9 +138,20 @@ class DrivenBlock:
         values
             Free parameters by name; a late signal is advanced by what stands there.
         """
-        return self._samples(record, values, smooth=self.stiff)
+        inputs, rates = self._inputs(record, values, smooth=self.stiff)
+        at = self._digest(inputs.shape[1], [inputs, rates])
+        corners = self._corners(inputs, record.step)
+        if corners is None:
+            return Samples(at, at[:, :-1], at[:, 1:], record.step)
+        count = inputs.shape[1] - 1
+        begin, end = (
+            self._digest(count, [corners[0], rates[:, :-1]]),
+            self._digest(count, [corners[1], rates[:, 1:]]),
+        )
+        return Samples(at, begin, end, record.step)
 
-    def _samples(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> Samples:
+    def _inputs(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> tuple[Array, Array]:
+        """Return the inputs of the model, and the slopes by which late ones change with their delay."""
         model, n = self.block.model, len(record.trace)
         inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
         rates = np.zeros_like(inputs)
@@ -155,8 +169,7 @@ class DrivenBlock:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
             if set(drive.stretched_by) & set(self._late):
                 rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
-        at = self._digest(inputs.shape[1], [inputs, rates])
-        return Samples(at, *self._ends(inputs, rates, at, record.step), record.step)
+        return inputs, rates
 
     @property
     def needs_new_samples(self) -> bool:
@@ -206,9 +219,9 @@ class DrivenBlock:
         rest, many = self._rest(begin[:, 0], p), size * (1 + len(self.free))
         start = np.zeros(many + (1 + len(self.free) if walk.mean else 0))
         start[:size] = rest
-        slope = self._rate(rest, begin.mean(axis=1), p)[1].full()
+        slope = self._rate(rest, begin.mean(axis=1), p)[1]
         near = [slope[np.ix_(g, g)].ravel(order="F") for g in walk.near]
-        tables = walk.tables(p, given.step).full().ravel(order="F")
+        tables = walk.tables(p, given.step)[0].ravel(order="F")
         constant = np.concatenate([p, tables, *near, [given.step]])
         path = np.column_stack([start, walk.step(n - 1, [start, begin, end, constant])])
         return path[:many], path[many:] if walk.mean else None
@@ -218,7 +231,7 @@ class DrivenBlock:
         p = np.array([values[name] for name in (*self.free, *self._late)])
         stretches = np.zeros(len(self._stages))
         for record in records:
-            stretches = np.maximum(stretches, self._stretches(self._samples(record, values, smooth=False), p))
+            stretches = np.maximum(stretches, self._stretches(record, values, p))
         stiff = [
             not stage.linear and bool(size > STIFF)
             for stage, size in zip(self._stages, stretches, strict=True)
@@ -228,45 +241,58 @@ class DrivenBlock:
         tables, step = _walk_functions(self._equations, self._stages, stiff, mean=mean)
         rest_of = [g.states for g, s in zip(self._stages, stiff, strict=True) if not (g.linear or s)]
         near = [g for g in rest_of if not is_short(self._equations.derivative[g])]
-        return _Walk(tables, Batch(step, chained=True), near, any(stiff), mean, step.n_instructions())
+        return _Walk(Point(tables), Chain(step), near, any(stiff), mean, step.n_instructions())
 
-    def _stretches(self, given: Samples, p: Array) -> Array:
+    def _stretches(self, record: Record, values: Mapping[str, float], p: Array) -> Array:
         """Return for each stage the largest norm of its derivative along a record, times the step."""
-        rest = self._rest(given.begin[:, 0], p)
-        probes = given.begin[:, :: max(1, given.begin.shape[1] // _PROBES)].T
-        slopes = [self._rate(rest, column, p)[1].full() for column in probes]
+        inputs, rates = self._inputs(record, values, smooth=False)
+        corners = self._corners(inputs, record.step)
+        left = (inputs if corners is None else corners[0])[:, : inputs.shape[1] - 1]
+        every = slice(None, None, max(1, left.shape[1] // _PROBES))
+        left, late = left[:, every], rates[:, : inputs.shape[1] - 1][:, every]
+        probes = self._digest(left.shape[1], [left, late])
+        rest, n = self._rest(probes[:, 0], p), self._size
+        slopes = self._steepness(left.shape[1], [rest, probes, p]).T.reshape(-1, n, n)
         # Where there is no derivative there is no response either, and a fit is told so.
-        slopes = [slope for slope in slopes if np.all(np.isfinite(slope))]
-        inside = [np.ix_(stage.states, stage.states) for stage in self._stages]
-        steepest = [max((float(np.linalg.norm(m[k], 2)) for m in slopes), default=0.0) for k in inside]
-        return given.step * np.array(steepest)
+        slopes = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+        inside = [slopes[(slice(None), *np.ix_(g.states, g.states))] for g in self._stages]
+        return record.step * np.array([np.linalg.norm(m, 2, axis=(1, 2)).max(initial=0.0) for m in inside])
 
-    def _ends(self, inputs: Array, rates: Array, at: Array, step: float) -> tuple[Array, Array]:
-        """Return what is known at both ends of every step; rates are those of the line in between."""
+    def _corners(self, inputs: Array, step: float) -> tuple[Array, Array] | None:
+        """Return the inputs at both ends of every step, with rates of the line in between.
+
+        Nothing is returned where no state is driven by a rate: then they are the inputs at the samples.
+        """
         names, drives = [v.name for v in self.block.model.inputs], self.block.drives
-        sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
-        s = self.block.model.symbols()
-        if not self._size or not depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped])):
-            return at[:, :-1], at[:, 1:]
+        if not self._sloped:
+            return None
         left, right = inputs[:, :-1].copy(), inputs[:, 1:].copy()
-        for i in sloped:
+        for i in self._sloped:
             signal = drives[names[i]].signal
             value = names.index(next(n for n, d in drives.items() if d.signal == signal and d.order == 0))
             left[i] = right[i] = np.diff(inputs[value]) / step
-        count = left.shape[1]
-        return self._digest(count, [left, rates[:, :-1]]), self._digest(count, [right, rates[:, 1:]])
+        return left, right
 
     def _rest(self, begin: Array, p: Array) -> Array:
         """Return the state in which the block rests at the first sample: bench records start at rest."""
         x = self.block.model.start(self.block.model.states)
         for _ in range(3):
-            rate, slope = (m.full() for m in self._rate(x, begin, p))
+            rate, slope = self._rate(x, begin, p)
             if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
                 raise ConvergenceError(
                     f"block '{self.block.name}'", "has no state of rest at the first sample"
                 )
             x = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
         return x
+
+
+def _sloped(block: Block) -> list[int]:
+    """Return which inputs are rates of signals; none where no state is driven by one."""
+    s, drives = block.model.symbols(), block.drives
+    names = [v.name for v in block.model.inputs]
+    sloped = [i for i, name in enumerate(names) if name in drives and drives[name].order == 1]
+    moved = s.state.numel() and depends(s.derivative, ca.vertcat(*[s.input[i] for i in sloped]))
+    return sloped if moved else []
 
 
 def _is_motion(block: Block, signal: str) -> bool:
@@ -367,9 +393,25 @@ def _equations(block: Block, free: Sequence[str]) -> _Equations:
 
 
 def _sensitivities(e: _Equations) -> tuple[Expression, Expression]:
-    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column."""
+    """Return symbols of the states' derivatives with respect to parameters, and x and those as one column.
+
+    Where a parameter acts on a state neither itself nor through other states, there is no symbol but a
+    structural zero: most states depend on few of the parameters.
+    """
     slope = ca.SX.sym("slope", e.state.numel(), e.parameter.numel())
-    return slope, ca.vertcat(e.state, ca.vec(slope))
+    acting = ca.Sparsity(e.state.numel(), e.parameter.numel())
+    if slope.numel():
+        reach = np.eye(e.state.numel(), dtype=bool) | _pattern(e.derivative, e.state)
+        for _ in range(e.state.numel().bit_length()):
+            reach = reach @ reach
+        acts = reach @ _pattern(e.derivative, e.parameter)
+        acting = ca.sparsify(ca.DM(acts.astype(float))).sparsity()
+    return ca.project(slope, acting), ca.vertcat(e.state, ca.vec(slope))
+
+
+def _pattern(value: Expression, of: Expression) -> NDArray[np.bool_]:
+    """Return which items of a column contain which symbols, shape (items, symbols)."""
+    return np.asarray(ca.DM(ca.jacobian_sparsity(value, of), 1.0).full() > 0.0)
 
 
 def _output_function(e: _Equations) -> ca.Function:
@@ -424,10 +466,13 @@ def _walk_functions(
     prepare = ca.Function("tables", [free, h], [ca.densify(ca.horzcat(table, dependence))])
     slope, everything = _sensitivities(e)
     along = ca.SX.sym("along", table.numel(), e.parameter.numel())
+    of = ca.vertcat(e.state, e.parameter, symbol)
+    directions = ca.vertcat(
+        slope, ca.SX.eye(e.parameter.numel()), ca.project(along, dependence.sparsity())
+    )
 
     def with_slope(value: Expression) -> Expression:
-        total = ca.jacobian(value, e.state) @ slope + ca.jacobian(value, e.parameter)
-        return ca.SX(ca.vertcat(value, ca.vec(total + ca.jacobian(value, symbol) @ along)))
+        return ca.SX(ca.vertcat(value, ca.vec(ca.jtimes(value, of, directions))))
 
     column = with_slope(new)
     if mean:

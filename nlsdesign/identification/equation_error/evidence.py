@@ -17,7 +17,7 @@ from ...simulation import Trace
 from ..records.canonical_order import in_canonical_order
 from ..records.measurement import Record, RecordSet
 from ..statistics.filters import derivative, noise_gain, rate_noise_gain, smoothing
-from .block import Block
+from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
 
 Array = NDArray[np.float64]
@@ -108,16 +108,24 @@ def noise_floor(block: Block, record: Record, noise: Noise) -> Floor:
     """
     n = len(record.trace)
     matrix = smoothing(n, block.width, STRIDE)
+    masked = record.masked_in([*(drive.signal for drive in block.drives.values()), block.target or ""])
+    matrix = matrix[np.flatnonzero((matrix != 0.0) @ masked.astype(float) == 0.0)]
     inputs = measured_inputs(block, record)
     if block.moving is not None:
         speed = np.abs(inputs[[v.name for v in block.model.inputs].index(block.moving)])
-        level = noise.level[block.drives[block.moving].signal] * rate_noise_gain() / record.step
+        level = _rate_noise(block.drives[block.moving], noise, record.step)
         # The filter smears what happens at a reversal; so its whole reach must be in motion.
         slow = (speed < SLOW * level).astype(float)
         matrix = matrix[np.flatnonzero(matrix @ slow < 1e-3)]
     variance, raw = _variances(block, record, noise, inputs)
     floor = Floor(matrix, np.zeros(0), np.sqrt(raw))
     return replace(floor, sigma=np.sqrt(variance[floor.places]))
+
+
+def _rate_noise(drive: Drive, noise: Noise, step: float) -> float:
+    """Return the noise of a rate, measured itself or the derivative of a motion."""
+    level = noise.level[drive.signal]
+    return level * rate_noise_gain() / step if drive.order else level
 
 
 def measured_inputs(block: Block, record: Record) -> Array:
@@ -215,6 +223,8 @@ class Bench:
         All records; their order and their names make no difference, see :func:`~.in_canonical_order`.
     blocks
         Of the declared model; they fix rows and noise floor.
+    noise
+        Of the measured signals, where it is known from other records of the same bench.
 
     Raises
     ------
@@ -222,12 +232,14 @@ class Bench:
         If no record moves enough to say anything about a block.
     """
 
-    def __init__(self, records: RecordSet, blocks: Sequence[Block]) -> None:
+    def __init__(self, records: RecordSet, blocks: Sequence[Block], *, noise: Noise | None = None) -> None:
+        self._blocks = tuple(blocks)
         self.records = in_canonical_order(records)
         self.given_order = {record.name: place for place, record in enumerate(records.records)}
-        self.noise = estimate_noise(self.records)
+        self.noise = estimate_noise(self.records) if noise is None else noise
         self.floors: dict[tuple[str, str], Floor] = {}
         self.units = {block.name: block.unit for block in blocks}
+        self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
         for block in blocks:
             self._check_alive(block)
@@ -241,6 +253,16 @@ class Bench:
                     "no record moves enough to say anything about it",
                     next_step=self._what_would(block),
                 )
+
+    def with_records(self, records: RecordSet) -> Bench:
+        """Return other records of the same bench as they are seen with the same noise.
+
+        Parameters
+        ----------
+        records
+            All records.
+        """
+        return Bench(records, self._blocks, noise=self.noise)
 
     def _check_alive(self, block: Block) -> None:
         if block.target is None or self.noise.level[block.target] > 0.0:
@@ -259,12 +281,12 @@ class Bench:
         """Return which motion would say something about a block."""
         if block.moving is None:
             return f"records need at least {STRIDE * _LEAST_ROWS} samples; record for longer"
-        signal = block.drives[block.moving].signal
-        step = min(r.step for r in self.records.records)
-        least = SLOW * self.noise.level[signal] * rate_noise_gain() / step
-        unit = self.records.records[0].trace.units[signal]
-        rate = with_unit(f"{least:.3g}", f"{unit}/s")
-        return f"record a motion in which {signal} changes faster than {rate}, for seconds on end"
+        drive = block.drives[block.moving]
+        least = SLOW * _rate_noise(drive, self.noise, min(r.step for r in self.records.records))
+        unit = self.records.records[0].trace.units[drive.signal]
+        rate = with_unit(f"{least:.3g}", f"{unit}/s" if drive.order else unit)
+        moves = "changes faster" if drive.order else "is larger"
+        return f"record a motion in which {drive.signal} {moves} than {rate}, for seconds on end"
 
     def driven(
         self, block: Block, free: Sequence[str], values: Mapping[str, float] | None = None
@@ -278,6 +300,7 @@ class Bench:
             if there are none, as where a finished model is only looked at, all do.
         """
         records = self.records.of("fit") or self.records.records
+        block = block.scaled_to(self._scales.get(block.name, block.effort_per_drive))
         return DrivenBlock(block, free, records=records, values=values)
 
     def evidence(
@@ -330,14 +353,17 @@ class Bench:
         if key not in self._thin:
             k = self._skip(record)
             trace = record.trace
-            raw = self.floors[block, record.name].raw_sigma[::k]
+            counted = np.flatnonzero(~record.masked_in(trace.signals)[::k])
+            raw = self.floors[block, record.name].raw_sigma[::k][counted]
             one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr")[::k])
+            masked = record.masked
             if not whole:
                 trace = Trace(
                     trace.time[::k], {n: v[::k] for n, v in trace.signals.items()}, trace.units, trace.name
                 )
-                one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace)))
-            self._thin[key] = replace(record, trace=trace), Floor(one, raw, raw)
+                one = scipy.sparse.csr_array(scipy.sparse.identity(len(trace), format="csr"))
+                masked = {n: m[::k] for n, m in masked.items()}
+            self._thin[key] = replace(record, trace=trace, masked=masked), Floor(one[counted], raw, raw)
         return self._thin[key]
 
     def _skip(self, record: Record) -> int:

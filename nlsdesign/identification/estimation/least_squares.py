@@ -135,7 +135,7 @@ def fit(
     ConvergenceError
         If the fit ends without a finite cost.
     """
-    rows = _Rows(evidence, parameters, known)
+    rows = Rows(evidence, parameters, known)
     low, high, start = box(parameters)
     if not parameters:
         fixed = rows(start)[0]
@@ -163,7 +163,7 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
         As for :func:`fit`.
     """
     low, high, start = box(parameters)
-    residual, slope = _Rows(evidence, parameters, None)(start)
+    residual, slope = Rows(evidence, parameters)(start)
     size = np.linalg.norm(slope, axis=0)
     used = size > 0.0
     step = np.linalg.lstsq(slope[:, used] / size[used], -residual, rcond=1e-10)[0] / size[used]
@@ -171,40 +171,88 @@ def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]
     return 0.5 * float(np.sum((residual + slope[:, used] @ step) ** 2))
 
 
-class _Rows:
-    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered."""
+class Rows:
+    """Residuals of priors and evidence over the fitted scale, with the last evaluation remembered.
+
+    Parameters
+    ----------
+    evidence, parameters, known
+        As for :func:`fit`.
+    """
 
     def __init__(
         self,
         evidence: Sequence[Evidence],
         parameters: Sequence[Parameter],
-        known: Mapping[tuple[str, str], float] | None,
+        known: Mapping[tuple[str, str], float] | None = None,
     ) -> None:
-        self._evidence, self._parameters, self._known = evidence, parameters, known
+        self._evidence, self.parameters, self._known = evidence, tuple(parameters), known
         self._names = [p.name for p in parameters]
         self._prior = np.diag([1.0 / p.sigma for p in parameters])
         self._centre = np.array([p.inward(p.centre) if math.isfinite(p.sigma) else 0.0 for p in parameters])
         self._last: tuple[bytes, tuple[Array, Array]] | None = None
 
     def values(self, x: Array) -> dict[str, float]:
-        return {p.name: p.outward(v) for p, v in zip(self._parameters, x, strict=True)}
+        """Return the numbers in SI by name.
+
+        Parameters
+        ----------
+        x
+            In the fitted scale.
+        """
+        return {p.name: p.outward(v) for p, v in zip(self.parameters, x, strict=True)}
+
+    @property
+    def prior_information(self) -> Array:
+        """Information of the priors on the fitted scale, shape (parameters, parameters)."""
+        return np.asarray(self._prior.T @ self._prior, dtype=np.float64)
+
+    def prior_gradient(self, x: Array) -> Array:
+        """Return the gradient of half the sum of squares of the priors.
+
+        Parameters
+        ----------
+        x
+            In the fitted scale.
+        """
+        return np.asarray(self.prior_information @ (x - self._centre), dtype=np.float64)
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
+        """Return residuals and slopes of priors and evidence, one below the other.
+
+        Parameters
+        ----------
+        x
+            In the fitted scale.
+        """
         if self._last is None or self._last[0] != x.tobytes():
             self._last = x.tobytes(), self._evaluated(x)
         return self._last[1]
 
-    def _evaluated(self, x: Array) -> tuple[Array, Array]:
+    def of(self, each: Evidence, x: Array) -> tuple[Array, Array]:
+        """Return residuals of one piece of evidence, shape (rows,), and slopes, shape (rows, parameters).
+
+        Parameters
+        ----------
+        each
+            A record seen by a block.
+        x
+            In the fitted scale.
+        """
         values = self.values(x)
+        residual, slope = each.residual(values)
+        wide = np.zeros((len(residual), len(x)))
+        for k, name in enumerate(each.driven.free):
+            j = self._names.index(name)
+            wide[:, j] = slope[:, k] * self.parameters[j].slope(values[name])
+        if each.driven.stiff:
+            wide[np.abs(wide).max(axis=1) > _OUTLYING_SLOPE] = 0.0
+        return residual, wide
+
+    def _evaluated(self, x: Array) -> tuple[Array, Array]:
         rows, slopes = [self._prior @ (x - self._centre)], [self._prior]
         for each in self._evidence:
-            residual, slope = each.residual(values)
-            wide = np.zeros((len(residual), len(x)))
-            for k, name in enumerate(each.driven.free):
-                j = self._names.index(name)
-                wide[:, j] = slope[:, k] * self._parameters[j].slope(values[name])
-            if each.driven.stiff:
-                wide[np.abs(wide).max(axis=1) > _OUTLYING_SLOPE] = 0.0
+            residual, wide = self.of(each, x)
             if each.driven.stiff and self._known is not None:
                 residual, wide = huber_rows(residual, wide, _HUBER)
                 bound = self._known.get((each.driven.block.name, each.record.name), math.inf)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 
+from .held_out import content_digest
 from .measurement import Record, RecordSet
 from .quality import Finding
 
@@ -21,16 +21,16 @@ def in_canonical_order(records: RecordSet) -> RecordSet:
         In any order.
     """
     ordered = tuple(sorted(records.records, key=_content))
-    findings = sorted(records.findings, key=lambda finding: (_place(finding, ordered), finding.text))
-    return replace(records, records=ordered, findings=tuple(findings))
+    findings, remarks = (
+        tuple(sorted(group, key=lambda finding: (_place(finding, ordered), finding.text)))
+        for group in (records.findings, records.remarks)
+    )
+    return replace(records, records=ordered, findings=findings, remarks=remarks)
 
 
 def _content(record: Record) -> tuple[int, str, str]:
     """Return number of samples, a digest of time and signals, and the role."""
-    digest = hashlib.sha256(record.trace.time.tobytes())
-    for name in sorted(record.trace.signals):
-        digest.update(record.trace.signals[name].tobytes())
-    return len(record.trace), digest.hexdigest(), record.role
+    return len(record.trace), content_digest(record.trace), record.role
 
 
 def _place(finding: Finding, ordered: tuple[Record, ...]) -> int:

@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 from ...errors import MeasurementError, nearest
 from ...quantity import parse_unit, same_dimension
 from ...simulation import Trace
+from .channel_quality import Checked, Sampled, check_channels
 from .clocks import Channel, Resolution, on_one_clock, resolutions
 from .lag import lag_between
 from .mapping import Align, Column, ColumnMap
-from .quality import Finding, channel_findings, check_columns, check_time
+from .quality import Finding, check_columns, check_time
 from .table_files import RecordTable
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_YEAR = 3.16e7
+_SINCE_1970, _NO_TIME = 1e8, 1e11
+"""A clock that begins later than this, in s, counts from 1970; beyond the second its unit must be another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +39,18 @@ class Run:
     resolution
         Resolution of the channels that were interpolated or filtered, by signal; see
         :class:`~nlsdesign.identification.records.clocks.Resolution`.
-    findings
-        What makes the file suspect.
+    masked
+        Samples that were faulty and stand interpolated, by signal, shape (n,).
+    findings, remarks
+        What makes the file suspect; what was changed or is unusual.
     """
 
     trace: Trace
     source: str
     resolution: Mapping[str, Resolution]
+    masked: Mapping[str, Mask]
     findings: tuple[Finding, ...]
+    remarks: tuple[Finding, ...]
 
 
 def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
@@ -61,16 +71,86 @@ def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
         If a column is missing, is not finite, or its clock runs backwards or has a gap; naming file, column
         and rows.
     """
+    table, began = _from_zero(table, mapping)
+    checked = _checked(table, mapping)
+    clean = replace(table, given={**table.given, **checked.values})
     if mapping.resample is None:
-        trace, note, resolution = _as_sampled(name, table, mapping)
+        trace, note, resolution = _as_sampled(name, clean, mapping)
+        times = dict.fromkeys(checked.masked, _seconds(table, mapping.time))
     else:
-        trace, note, resolution = _on_new_clock(name, table, mapping, mapping.resample)
-    findings = [
-        f
+        trace, note, resolution, times = _on_new_clock(name, clean, mapping, mapping.resample)
+    masked = {
+        c.signal: _on_clock(checked.masked[c.name], times[c.name], trace.time)
         for c in mapping.columns
-        for f in channel_findings(table.file, c.name, table.given[c.name], first_row=table.first_row)
-    ]
-    return Run(trace, f"{table.file}{note}", resolution, tuple(findings))
+        if c.name in checked.masked
+    }
+    return Run(trace, f"{table.file}{began}{note}", resolution, masked, checked.findings, checked.remarks)
+
+
+def _from_zero(table: RecordTable, mapping: ColumnMap) -> tuple[RecordTable, str]:
+    """Return a table whose clocks do not count from 1970, and what was subtracted from them."""
+    factor = parse_unit(mapping.time.unit).factor
+    clocks = {mapping.clock_of(c).name for c in mapping.columns} | {a.time for a in mapping.align if a.time}
+    clocks = {name for name in clocks if len(table.given.get(name, ())) and np.isfinite(table.given[name][0])}
+    first = min((float(table.given[name][0]) for name in clocks), default=0.0)
+    if abs(first) * factor > _NO_TIME:
+        raise MeasurementError(
+            f"{table.file}: column '{mapping.time.name}'",
+            f"begins at {first:g} {mapping.time.unit}, {first * factor / _YEAR:.2g} years from zero",
+            next_step="if it counts milliseconds, name it 't_ms', or give its unit in records.toml",
+        )
+    if first * factor < _SINCE_1970:
+        return table, ""
+    shifted = {name: table.given[name] - first for name in clocks}
+    return replace(table, given={**table.given, **shifted}), f" (time counted from {first:.9g})"
+
+
+def _checked(table: RecordTable, mapping: ColumnMap) -> Checked:
+    """Check every column with the others on its clock."""
+    parts = []
+    for clock in dict.fromkeys(mapping.clock_of(c) for c in mapping.columns):
+        columns = [c for c in mapping.columns if mapping.clock_of(c) == clock]
+        heads = [clock.name, *(c.name for c in columns)]
+        _check_present(table, heads)
+        raw = table.columns(heads)
+        check_columns(table.file, raw, first_row=table.first_row)
+        time = raw[clock.name] * parse_unit(clock.unit).factor
+        bridged = 1.0 / mapping.resample if mapping.resample else 0.0
+        check_time(table.file, clock.name, time, first_row=table.first_row, bridged=bridged)
+        sampled = [_sampled(c, raw[c.name], mapping) for c in columns]
+        parts.append(check_channels(table.file, time, sampled, first_row=table.first_row))
+    return Checked(
+        {head: values for part in parts for head, values in part.values.items()},
+        {head: mask for part in parts for head, mask in part.masked.items()},
+        tuple(finding for part in parts for finding in part.findings),
+        tuple(remark for part in parts for remark in part.remarks),
+    )
+
+
+def _sampled(column: Column, values: Array, mapping: ColumnMap) -> Sampled:
+    motion = any(same_dimension(column.unit, unit) for unit in ("rad", "m"))
+    commanded = column.signal in mapping.inputs.commanded
+    shown = commanded or column.signal in mapping.inputs.shown
+    return Sampled(column.name, column.unit, values, commanded, shown, motion)
+
+
+def _seconds(table: RecordTable, clock: Column) -> Array:
+    times: Array = table.given[clock.name] * parse_unit(clock.unit).factor
+    return times
+
+
+def _on_clock(mask: Mask, own: Array, time: Array) -> Mask:
+    """Return the samples of a clock that lie within a step, of either clock, of a masked one."""
+    if len(own) == len(time) and np.array_equal(own, time):
+        return mask
+    reach = (1.0 + 1e-6) * max(float(np.median(np.diff(own))), float(time[1] - time[0]))
+    first = np.searchsorted(time, own[mask] - reach)
+    behind = np.searchsorted(time, own[mask] + reach, side="right")
+    count = np.zeros(len(time) + 1, dtype=int)
+    np.add.at(count, first, 1)
+    np.add.at(count, behind, -1)
+    result: Mask = np.cumsum(count)[:-1] > 0
+    return result
 
 
 def _as_sampled(
@@ -95,7 +175,8 @@ def _as_sampled(
 
 def _on_new_clock(
     name: str, table: RecordTable, mapping: ColumnMap, rate: float
-) -> tuple[Trace, str, dict[str, Resolution]]:
+) -> tuple[Trace, str, dict[str, Resolution], dict[str, Array]]:
+    """Return the columns on a new clock, the changes, and the times of the samples of each column."""
     channels = {c.signal: _channel(table, c, mapping.clock_of(c), 1.0 / rate) for c in mapping.columns}
     changes = []
     for each in mapping.align:
@@ -112,6 +193,7 @@ def _on_new_clock(
         Trace(resampling.time, signals, _units(mapping), name),
         f" ({summary})" if summary else "",
         resolution,
+        {c.name: channels[c.signal].time for c in mapping.columns},
     )
 
 

@@ -67,6 +67,34 @@ class Align:
 
 
 @dataclass(frozen=True)
+class Inputs:
+    """Which signals are inputs of the model.
+
+    Parameters
+    ----------
+    commanded
+        Full names of inputs.
+    shown
+        Full names of readings of an input, for instance of a current.
+    """
+
+    commanded: frozenset[str] = frozenset()
+    shown: frozenset[str] = frozenset()
+
+    @staticmethod
+    def of(model: FlatModel) -> Inputs:
+        """Return the inputs of a model.
+
+        Parameters
+        ----------
+        model
+            Whose signals are measured.
+        """
+        commanded = frozenset(v.name for v in model.inputs)
+        return Inputs(commanded, frozenset(r.signal for r in model.readings if r.measured in commanded))
+
+
+@dataclass(frozen=True)
 class ColumnMap:
     """Columns of a set of records, the time column, and the records that are held out.
 
@@ -82,6 +110,8 @@ class ColumnMap:
         Rate in Hz of the common clock; ``None`` to keep the columns as sampled.
     align
         Lags to be removed before resampling; these need a rate.
+    inputs
+        Signals that are inputs of the model: what is odd in a reading may be right in a command.
     """
 
     time: Column
@@ -91,6 +121,7 @@ class ColumnMap:
     held_out_after: float | None = None
     resample: float | None = None
     align: tuple[Align, ...] = ()
+    inputs: Inputs = Inputs()
 
     def clock_of(self, column: Column) -> Column:
         """Return the column of times of a column.
@@ -113,6 +144,50 @@ def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
     """
     named = [(head, *_name_and_unit(head)) for head in heads]
     return [(h, u) for h, n, u in named if u and same_dimension(u, "s") and n.lower() in _TIME_NAMES]
+
+
+def times_without_unit(heads: Sequence[str]) -> list[str]:
+    """Return heads that are called like a time and give no unit of time.
+
+    Parameters
+    ----------
+    heads
+        Of a table.
+    """
+    names = (*_TIME_NAMES, "timestamp", "seconds", "ms")
+    timed = {head for head, _ in times_among(heads)}
+    return [head for head in heads if head.lower().strip("[]() ") in names and head not in timed]
+
+
+def heads_with_units(file: str, heads: Sequence[str], units: Mapping[str, str]) -> list[str]:
+    """Return heads with the units that stand beside them in the file.
+
+    Parameters
+    ----------
+    file
+        For messages.
+    heads
+        In the order of the file.
+    units
+        By head.
+
+    Raises
+    ------
+    MeasurementError
+        If a head names another unit.
+    """
+    result = []
+    for head in heads:
+        name, own = _name_and_unit(head)
+        unit = units.get(head)
+        if unit and own and unit != own:
+            raise MeasurementError(
+                f"{file}: column '{head}'",
+                f"is in {typeset_unit(own)} by its head and in {typeset_unit(unit)} by the row below",
+                next_step="correct one of them",
+            )
+        result.append(f"{name} [{unit}]" if unit and not own else head)
+    return result
 
 
 def read_mapping(path: Path) -> ColumnMap:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -16,14 +16,24 @@ from ...model import FlatModel
 from ...simulation import Trace
 from ..statistics.residuals import noise_of, quantum_of
 from .clocks import Resolution
+from .held_out import surrounded
 from .ingest import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
-from .mapping import check_signals, default_mapping, read_mapping, times_among
+from .mapping import (
+    Inputs,
+    check_signals,
+    default_mapping,
+    heads_with_units,
+    read_mapping,
+    times_among,
+    times_without_unit,
+)
 from .quality import Finding
 from .table_files import RecordTable, read_table, table_files
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Role = Literal["fit", "selection", "held_out"]
 
 
@@ -44,6 +54,9 @@ class Record:
         File, and the changes made to its samples.
     resolution
         Noise and count of signals that were interpolated or filtered; their samples no longer show it.
+    masked
+        Samples of a signal that are faulty, shape (n,), by signal: they stand interpolated in the trace, and a
+        residual that depends on one of them does not count.
     """
 
     name: str
@@ -51,6 +64,7 @@ class Record:
     role: Role = "fit"
     source: str = ""
     resolution: Mapping[str, Resolution] = field(default_factory=dict)
+    masked: Mapping[str, Mask] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
@@ -72,7 +86,22 @@ class Record:
         """
         if signal in self.resolution:
             return self.resolution[signal]
-        return Resolution(noise_of(self.trace[signal]), quantum_of(self.trace[signal]))
+        # What was interpolated has another noise, and no counts.
+        values = self.trace[signal][~self.masked_in([signal])]
+        return Resolution(noise_of(values), quantum_of(values))
+
+    def masked_in(self, signals: Iterable[str]) -> Mask:
+        """Return the samples that are masked in at least one of these signals, shape (n,).
+
+        Parameters
+        ----------
+        signals
+            Full names.
+        """
+        result = np.zeros(len(self.trace), dtype=bool)
+        for name in signals:
+            result |= self.masked.get(name, False)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +116,14 @@ class RecordSet:
         Measured columns.
     findings
         Reasons to suspect the data.
+    remarks
+        What was changed, masked or assumed, and what is unusual; these do not make the data suspect.
     """
 
     records: tuple[Record, ...]
     columns: tuple[Column, ...]
     findings: tuple[Finding, ...] = field(default=())
+    remarks: tuple[Finding, ...] = field(default=())
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -107,6 +139,30 @@ class RecordSet:
             For instance ``"fit"``.
         """
         return tuple(r for r in self.records if r.role in roles)
+
+    def without_held_out(self) -> RecordSet:
+        """Return the records that may choose anything, with the findings about them.
+
+        Raises
+        ------
+        MeasurementError
+            If all records are held out.
+        """
+        kept = tuple(r for r in self.records if r.role != "held_out")
+        if not kept:
+            raise MeasurementError(
+                "records",
+                "are all held out, so nothing can be fitted",
+                next_step="hold out some of them only",
+            )
+        held = [r.source or r.name for r in self.records if r.role == "held_out"]
+        others = [r.source or r.name for r in kept]
+        findings = tuple(
+            f
+            for f in self.findings
+            if not any(f.place.startswith(s) for s in held) or any(f.place.startswith(s) for s in others)
+        )
+        return replace(self, records=kept, findings=findings)
 
     def column(self, signal: str) -> Column:
         """Return the column that measures a signal.
@@ -151,8 +207,8 @@ def load_records(
         in the folder; without it the heads must be names of signals, or name a unit that only one sensor of
         the model has.
     hold_out
-        Globs on record names. Without any, here or in the mapping, every third record in order of name is
-        held out, beginning with the second; a single record is cut after two thirds.
+        Globs on record names. Without any, here or in the mapping, a third of the records is held out, those
+        that the others surround, see :func:`~.held_out.surrounded`; a single record is cut after two thirds.
 
     Raises
     ------
@@ -165,27 +221,28 @@ def load_records(
     files = table_files(folder)
     path = mapping or (folder / "records.toml" if (folder / "records.toml").exists() else None)
     given = read_mapping(path) if path else None
-    tables = {file: read_table(file) for file in files}
+    tables = {file: _table(file, given) for file in files}
     runs = {file: table for file, table in tables.items() if _is_run(table.heads, given)}
     if not runs:
-        raise MeasurementError(
-            str(folder), "no file has a column of time", next_step="name it 't_s' or 'time [s]'"
-        )
+        raise _without_time(str(folder), tables.values())
     # Where files differ in the order of their columns, their names must not choose among them.
     first = min(runs, key=lambda file: tuple(runs[file].heads))
     chosen = given or default_mapping(runs[first].heads, model, first.name)
     check_signals(first.name, chosen.columns, model)
-    records: list[Record] = []
-    findings: list[Finding] = []
-    for file, table in runs.items():
-        record, new_findings = _record(file, table, chosen)
-        records.append(record)
-        findings += new_findings
+    chosen = replace(chosen, inputs=Inputs.of(model))
+    whole = [_record(file, table, chosen) for file, table in runs.items()]
+    records = [record for one in whole for record in one.records]
+    findings = tuple(finding for one in whole for finding in one.findings)
+    remarks = [remark for one in whole for remark in one.remarks]
+    remarks += [_left_out(file) for file in tables if file not in runs]
     held = tuple(hold_out) or chosen.held_out
     if chosen.held_out_after is not None and not hold_out:
-        parts = [part for r in records for part in cut_in_time(r, chosen.held_out_after)]
-        return RecordSet(tuple(parts), chosen.columns, tuple(findings))
-    return RecordSet(split(records, held, chosen.selection), chosen.columns, tuple(findings))
+        parts = tuple(part for r in records for part in cut_in_time(r, chosen.held_out_after))
+        return RecordSet(parts, chosen.columns, findings, tuple(remarks))
+    roles = split(records, held, chosen.selection)
+    if not held and len(records) > 1:
+        remarks.append(_by_default(roles))
+    return RecordSet(roles, chosen.columns, findings, tuple(remarks))
 
 
 def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) -> RecordSet:
@@ -217,13 +274,48 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
     beside = file.parent / "records.toml"
     path = mapping or (beside if beside.exists() else None)
     given = read_mapping(path) if path else None
-    table = read_table(file)
+    table = _table(file, given)
     if not _is_run(table.heads, given):
-        raise MeasurementError(file.name, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+        raise _without_time(file.name, [table])
     chosen = given or default_mapping(table.heads, model, file.name)
     check_signals(file.name, chosen.columns, model)
-    record, findings = _record(file, table, chosen)
-    return RecordSet((replace(record, role="held_out"),), chosen.columns, tuple(findings))
+    one = _record(file, table, replace(chosen, inputs=Inputs.of(model)))
+    return replace(one, records=(replace(one.records[0], role="held_out"),))
+
+
+def _table(file: Path, mapping: ColumnMap | None) -> RecordTable:
+    """Return the table of a file; units that stand below its heads become part of them where nothing maps them."""
+    table = read_table(file)
+    if mapping is not None or not table.units:
+        return table
+    named = heads_with_units(file.name, table.heads, table.units)
+    return replace(table, given={n: table.given[h] for n, h in zip(named, table.heads, strict=True)})
+
+
+def _without_time(where: str, tables: Iterable[RecordTable]) -> MeasurementError:
+    """Return the error on records without time; a time without unit is not guessed, but asked for."""
+    for table in tables:
+        for head in times_without_unit(table.heads):
+            steps = np.diff(table.given[head])
+            usual = f"{float(np.median(steps)):g}" if len(steps) else "0"
+            return MeasurementError(
+                f"{table.file}: column '{head}'",
+                f"names no unit; its samples lie {usual} apart, which may be seconds or milliseconds",
+                next_step="name it 't_s' or 't_ms', or give its unit in records.toml: [time]",
+            )
+    return MeasurementError(where, "has no column of time", next_step="name it 't_s' or 'time [s]'")
+
+
+def _left_out(file: Path) -> Finding:
+    return Finding(file.name, "has no column of time, so it is not taken for a record")
+
+
+def _by_default(records: Sequence[Record]) -> Finding:
+    held = ", ".join(sorted(r.name for r in records if r.role == "held_out"))
+    return Finding(
+        "records",
+        f"held out by default: {held}, inside the range of the others; to choose, write held_out in records.toml",
+    )
 
 
 def _is_run(heads: Sequence[str], mapping: ColumnMap | None) -> bool:
@@ -253,8 +345,13 @@ def split(
     if not held_out and len(records) == 1:
         return _cut_after_two_thirds(records[0])
     names = [r.name for r in records]
-    chosen = {n for g in held_out for n in fnmatch.filter(names, g)} if held_out else set(names[1::3])
-    compared = {n for g in selection for n in fnmatch.filter(names, g)} - chosen
+    compared = {n for g in selection for n in fnmatch.filter(names, g)}
+    if held_out:
+        chosen = {n for g in held_out for n in fnmatch.filter(names, g)}
+    else:
+        free = [r for r in records if r.name not in compared] if len(compared) < len(names) - 1 else records
+        chosen = {free[k].name for k in surrounded([r.trace for r in free])}
+    compared -= chosen
     for glob in (*held_out, *selection):
         if not fnmatch.filter(names, glob):
             raise MeasurementError(
@@ -322,9 +419,12 @@ def _cut_after_two_thirds(record: Record) -> tuple[Record, ...]:
 def _part(record: Record, rows: slice, role: Role, label: str) -> Record:
     trace, name = record.trace, f"{record.name} ({label})"
     signals = {n: v[rows] for n, v in trace.signals.items()}
-    return replace(record, name=name, role=role, trace=Trace(trace.time[rows], signals, trace.units, name))
+    part = Trace(trace.time[rows], signals, trace.units, name)
+    masked = {n: m[rows] for n, m in record.masked.items()}
+    return replace(record, name=name, role=role, trace=part, masked=masked)
 
 
-def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> tuple[Record, tuple[Finding, ...]]:
+def _record(file: Path, table: RecordTable, mapping: ColumnMap) -> RecordSet:
     run = read_run(file.stem, table, mapping)
-    return Record(file.stem, run.trace, source=run.source, resolution=run.resolution), run.findings
+    record = Record(file.stem, run.trace, source=run.source, resolution=run.resolution, masked=run.masked)
+    return RecordSet((record,), mapping.columns, run.findings, run.remarks)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeasurementError
-from ..statistics.residuals import noise_of, quantum_of
 
 Array = NDArray[np.float64]
 
@@ -19,22 +18,20 @@ _BRIDGED = 20.0
 """Longest gap, in usual steps, for which a slower clock is proposed."""
 _JITTER = 0.02
 """Steps that differ by more than this share are interpolated to a uniform grid."""
-_CLIPPED_RUN = 5
-"""Smallest number of equal extreme samples that may be clipping."""
-_APPROACH, _MISSING_COUNTS = 3, 3.0
-"""Samples before and after a run from which its slope is taken, and the missing peak height in counts."""
+_LARGEST = 1e100
+"""Nothing that is measured is larger in any unit."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A reason to suspect data that can be read.
+    """What is odd about data that can be read.
 
     Parameters
     ----------
     place
         File, column and rows.
     text
-        The reason.
+        What it is.
     """
 
     place: str
@@ -45,7 +42,7 @@ class Finding:
 
 
 def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2) -> None:
-    """Check that every number is finite.
+    """Check that every number is finite, and of a size that can be measured.
 
     Parameters
     ----------
@@ -65,9 +62,16 @@ def check_columns(file: str, columns: Mapping[str, Array], *, first_row: int = 2
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise MeasurementError(
-                f"{file}: column '{head}', {_rows(_first_run(bad), first_row)}",
+                f"{file}: column '{head}', {rows_in_words(_first_run(bad), first_row)}",
                 f"is not a finite number ({len(bad)} in all)",
                 next_step="cut the record before or after these rows",
+            )
+        huge = np.flatnonzero(np.abs(values) > _LARGEST)
+        if len(huge):
+            raise MeasurementError(
+                f"{file}: column '{head}', {rows_in_words(huge[:1], first_row)}",
+                f"{values[huge[0]]:g} is larger than anything that is measured",
+                next_step="correct the number",
             )
 
 
@@ -100,7 +104,7 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged
     if len(back):
         what = "runs backwards" if np.any(steps < 0.0) else "stands still"
         raise MeasurementError(
-            f"{file}: column '{head}', {_rows(_first_run(back + 1), first_row)}",
+            f"{file}: column '{head}', {rows_in_words(_first_run(back + 1), first_row)}",
             f"time {what} ({time[back[0]]:g} s is followed by {time[back[0] + 1]:g} s)",
             next_step="sort the record, or cut it where the clock was set back",
         )
@@ -108,7 +112,7 @@ def check_time(file: str, head: str, time: Array, *, first_row: int = 2, bridged
     gaps = np.flatnonzero(steps > max(_GAP * usual, (1.0 + _JITTER) * bridged))
     if len(gaps):
         raise MeasurementError(
-            f"{file}: column '{head}', {_rows(gaps[:1] + 1, first_row)}",
+            f"{file}: column '{head}', {rows_in_words(gaps[:1] + 1, first_row)}",
             f"there is a gap of {steps[gaps[0]]:g} s; samples lie {usual:g} s apart ({len(gaps)} in all)",
             next_step="split the record into one file before and one after the gap" + _slower(steps, usual),
         )
@@ -130,60 +134,20 @@ def _slower(steps: Array, usual: float) -> str:
     return f", or put it on a slower clock: resample_Hz = {rate:g} in records.toml"
 
 
-def channel_findings(file: str, head: str, values: Array, *, first_row: int = 2) -> list[Finding]:
-    """Return findings on a constant, clipped or saturated channel.
-
-    Parameters
-    ----------
-    file, head
-        For messages.
-    values
-        As they stand in the file.
-    first_row
-        As above.
-    """
-    place = f"{file}: column '{head}'"
-    if np.ptp(values) == 0.0:
-        return [
-            Finding(f"{place}, {_rows(np.arange(len(values)), first_row)}", f"is constant at {values[0]:g}")
-        ]
-    # Without noise a channel may rest on its largest value; with noise this is clipping.
-    if noise_of(values) < 2.0 * quantum_of(values):
-        return []
-    for extreme, which in ((values.max(), "largest"), (values.min(), "smallest")):
-        run = _longest_run(values == extreme)
-        if len(run) >= _CLIPPED_RUN and _cut_off(values, run):
-            return [
-                Finding(
-                    f"{place}, {_rows(run, first_row)}",
-                    f"rests on its {which} value {extreme:g}: clipped or saturated",
-                )
-            ]
-    return []
-
-
-def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:
-    """Tell whether a signal approaches its extreme so fast that its peak must lie beyond it."""
-    first, last = int(run[0]), int(run[-1])
-    sides = values[max(first - _APPROACH, 0) : first + 1], values[last : last + _APPROACH + 1]
-    slopes = [abs(part[-1] - part[0]) / (len(part) - 1) for part in sides if len(part) > 1]
-    half = 0.5 * len(run)
-    # Peak of the parabola that has this slope half of the approach before the run.
-    missing = 0.5 * half**2 * max(slopes, default=0.0) / (half + 0.5 * _APPROACH)
-    return missing > _MISSING_COUNTS * max(quantum_of(values), noise_of(values))
-
-
 def _first_run(indices: NDArray[np.intp]) -> NDArray[np.intp]:
     ends = np.flatnonzero(np.diff(indices) > 1)
     return indices[: int(ends[0]) + 1] if len(ends) else indices
 
 
-def _longest_run(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
-    places = np.flatnonzero(mask)
-    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    return max(runs, key=len)
+def rows_in_words(indices: NDArray[np.intp], first_row: int) -> str:
+    """Return the rows of a run of samples, for messages.
 
-
-def _rows(indices: NDArray[np.intp], first_row: int) -> str:
+    Parameters
+    ----------
+    indices
+        Ascending, at least one.
+    first_row
+        Row of sample 0.
+    """
     first, last = int(indices[0]) + first_row, int(indices[-1]) + first_row
     return f"row {first}" if first == last else f"rows {first} to {last}"

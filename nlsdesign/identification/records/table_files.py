@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
+import contextlib
 import importlib
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeasurementError, missing_library
+from .csv_files import read_csv
 
 Array = NDArray[np.float64]
 
 LEAST_ROWS = 50
 """Smallest number of rows of a record."""
-_FIRST_ROW = 2
+_MOST_ROWS = 50_000_000
+"""Largest number of rows of a record: 14 hours at 1 kHz."""
 _ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5")
 
 
@@ -34,12 +36,15 @@ class RecordTable:
     given
         Columns by head, shape (n,); in binary files they may differ in length.
     first_row
-        Number of the first row in messages: 2 in a CSV file, whose heads are row 1.
+        Number of the first row in messages: 2 in a CSV file whose heads are row 1.
+    units
+        Units of columns, by head, where the file gives them beside the heads.
     """
 
     file: str
     given: Mapping[str, Array]
     first_row: int = 1
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def heads(self) -> tuple[str, ...]:
@@ -107,7 +112,7 @@ def table_files(folder: Path) -> list[Path]:
 def read_table(file: Path) -> RecordTable:
     """Read the columns of one file.
 
-    A CSV file has commas and one row of heads. In a MAT file every numeric vector is a column, fields of a
+    A CSV file is read by :func:`~.csv_files.read_csv`. In a MAT file every numeric vector is a column, fields of a
     structure under ``structure.field``; in an HDF5 file every numeric vector under its path, ``group/name``.
 
     Parameters
@@ -118,7 +123,8 @@ def read_table(file: Path) -> RecordTable:
     Raises
     ------
     MeasurementError
-        If the file cannot be read, a row is too short or too long, or a cell is not a number.
+        If the file cannot be read, two columns have one head, a row is too short or too long, a cell is not a
+        number, or an HDF5 file asks for numbers of another file, or for more than a record can hold.
     MissingLibraryError
         If the library that reads it is not installed.
     """
@@ -137,70 +143,54 @@ def _library(name: str, file: Path) -> Any:
 
 
 def _csv(file: Path) -> RecordTable:
-    with file.open(newline="", encoding="utf8") as stream:
-        rows = [row for row in csv.reader(stream) if row]
-    if len(rows) < 1 + LEAST_ROWS:
-        raise _too_short(file.name, max(len(rows) - 1, 0))
-    heads = [head.strip() for head in rows[0]]
-    try:
-        numbers = np.array(rows[1:], dtype=float)
-    except ValueError:
-        return RecordTable(file.name, _ending_early(file.name, heads, rows[1:]), _FIRST_ROW)
-    return RecordTable(file.name, {h: numbers[:, i] for i, h in enumerate(heads)}, _FIRST_ROW)
-
-
-def _ending_early(file: str, heads: list[str], rows: list[list[str]]) -> dict[str, Array]:
-    """Return columns of different length, as two clocks side by side give them."""
-    if any(len(row) != len(heads) for row in rows):
-        raise _bad_cell(file, heads, rows)
-    columns = {}
-    for place, head in enumerate(heads):
-        cells = [row[place].strip() for row in rows]
-        while cells and not cells[-1]:
-            cells.pop()
-        try:
-            columns[head] = np.array(cells, dtype=float)
-        except ValueError:
-            raise _bad_cell(file, heads, rows) from None
-    return columns
-
-
-def _bad_cell(file: str, heads: list[str], rows: list[list[str]]) -> MeasurementError:
-    for number, row in enumerate(rows, start=_FIRST_ROW):
-        if len(row) != len(heads):
-            return MeasurementError(
-                f"{file}: row {number}", f"has {len(row)} cells, the heads are {len(heads)}"
-            )
-        for head, cell in zip(heads, row, strict=True):
-            try:
-                float(cell)
-            except ValueError:
-                if not cell.strip() and not any(r[heads.index(head)].strip() for r in rows[number - 1 :]):
-                    continue  # the column has ended
-                return MeasurementError(f"{file}: column '{head}', row {number}", f"'{cell}' is not a number")
-    return MeasurementError(file, "cannot be read as a table of numbers")
+    table = read_csv(file)
+    rows = max((len(column) for column in table.columns.values()), default=0)
+    if rows < LEAST_ROWS:
+        raise _too_short(file.name, rows)
+    return RecordTable(file.name, table.columns, table.first_row, table.units)
 
 
 def _parquet(file: Path) -> RecordTable:
-    pyarrow = _library("pyarrow", file)
     parquet = _library("pyarrow.parquet", file)
-    try:
+    with _damage_named(file):
         table = parquet.read_table(file)
-    except pyarrow.ArrowInvalid as error:
-        raise MeasurementError(file.name, f"cannot be read: {error}") from None
-    return RecordTable(file.name, _numeric({n: table.column(n).to_numpy() for n in table.column_names}))
+        names = table.column_names
+        vectors = [column.to_numpy() for column in table.columns]
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise MeasurementError(
+                f"{file.name}: columns {names.index(name) + 1} and {place + 1}",
+                f"have the same head '{name}'",
+                next_step="give each column a head of its own",
+            )
+    return RecordTable(file.name, _numeric(dict(zip(names, vectors, strict=True))))
 
 
 def _mat(file: Path) -> RecordTable:
     if _is_hdf5(file):
         return _hdf5(file)
     arrays: dict[str, Any] = {}
+    library = _library("scipy.io", file)
+    with _damage_named(file):
+        _gather(library.loadmat(file, squeeze_me=True), "", arrays)
+        return RecordTable(file.name, _numeric(arrays))
+
+
+@contextlib.contextmanager
+def _damage_named(file: Path) -> Iterator[None]:
+    """Turn whatever a library raises over a damaged file into one error of the project."""
     try:
-        _gather(_library("scipy.io", file).loadmat(file, squeeze_me=True), "", arrays)
-    # SciPy raises the second for versions of the format that it cannot read.
-    except (ValueError, NotImplementedError) as error:
-        raise MeasurementError(file.name, f"cannot be read: {error}") from None
-    return RecordTable(file.name, _numeric(arrays))
+        yield
+    except MeasurementError:
+        raise
+    # Libraries answer damage with errors of any kind: of zlib, of indices, of memory, of types.
+    except Exception as error:
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise MeasurementError(
+            file.name,
+            f"cannot be read: {reason}",
+            next_step="the file is damaged or of another format: copy or export it again",
+        ) from None
 
 
 def _gather(values: Any, prefix: str, arrays: dict[str, Any]) -> None:
@@ -231,12 +221,31 @@ def _hdf5(file: Path) -> RecordTable:
     arrays: dict[str, Any] = {}
 
     def visit(name: str, node: Any) -> None:
-        if isinstance(node, h5py.Dataset) and not name.startswith("#"):
+        if isinstance(node, h5py.Dataset) and not name.startswith("#") and _is_vector(node):
+            _check_dataset(f"{file.name}: '{name}'", node)
             arrays[name] = node[()]
 
-    with h5py.File(file, "r") as stream:
+    with _damage_named(file), h5py.File(file, "r") as stream:
         stream.visititems(visit)
-    return RecordTable(file.name, _numeric(arrays))
+        return RecordTable(file.name, _numeric(arrays))
+
+
+def _is_vector(dataset: Any) -> bool:
+    return dataset.dtype.kind in "fiub" and sum(length != 1 for length in dataset.shape) == 1
+
+
+def _check_dataset(where: str, dataset: Any) -> None:
+    """Refuse a column whose numbers stand in other files, or are more than a record can hold."""
+    if dataset.external or dataset.is_virtual:
+        raise MeasurementError(
+            where, "takes its numbers from another file", next_step="write the numbers into this file"
+        )
+    if dataset.size > _MOST_ROWS:
+        raise MeasurementError(
+            where,
+            f"declares {dataset.size:.3g} numbers; at most {_MOST_ROWS:.3g} are read",
+            next_step="split the record",
+        )
 
 
 def _numeric(arrays: Mapping[str, Any]) -> dict[str, Array]:

@@ -1,0 +1,387 @@
+"""Samples that a sensor or a recorder got wrong: spikes, dropouts, stuck values, and jumps of a position.
+
+A group of samples is faulty where it begins and ends abruptly, while the samples on both sides of it lie on one
+cubic from which the group is off by many times their scatter (after Hampel 1974: a robust scale, taken from
+the neighbours). So a step, a jump of stick–slip, the start of a motion or coarse counts are not faults: there
+the two sides do not continue each other, or scatter as much as the group. A change that another channel shows
+at the same time is no fault of a sensor either. All scales come from the channel itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from ..statistics.residuals import noise_of, quantum_of
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LONGEST = 20
+"""Samples that are at most interpolated: of the order of the filter through which a rate is measured."""
+_SIDE = 12
+"""Samples on either side of a group that must continue each other."""
+_LEAST_SIDE = 6
+_NEXT, _SHORT = 2, 3
+"""Samples beside a group that must be good already, and up to which length a cubic bridges it; else a parabola."""
+_ABRUPT, _OFF = 5.0, 8.0
+"""A change between two samples is abrupt, and a group is faulty, beyond so many times the scatter. White noise
+reaches 4.9 once in a million samples."""
+_SLOPE_SPAN, _SCATTER_SPAN = 11, 51
+"""Samples over which the usual change between samples, and the scatter of the changes, are taken."""
+_TO_DEVIATION = 1.4826
+_TAIL = 1.96 * _TO_DEVIATION
+"""Of normal noise, the size that 5 % exceed, over the median size."""
+_SHARE_OF_RANGE = 1e-4
+"""Scatter is taken to be at least this share of the range: smaller faults do not matter."""
+_MEDIAN_SPAN, _LONG_TAIL, _HALF_WAY = 5, 2, 2e-5
+"""Faults are extremes of the channel itself where so many times more samples are half as far from the median of
+their neighbours. White noise has this share of samples at half of the least fault."""
+_BUSY = 0.05
+"""Where a larger share of all changes is abrupt, this is how the channel moves."""
+_COMMAND = 3
+"""A command that leaves and returns for longer is a pulse."""
+_CHANCE = 1e-4
+"""Largest expected number of runs of equal values, as long, that chance would leave in the record."""
+_FREE_SIGNS = 0.6
+"""Share of fourth differences that turn the sign, from which on a channel is noise about a slower course: 0.80 for
+white noise, 0 for a smooth motion."""
+_JUMP, _JUMP_OVER_ALL = 10.0, 3.0
+"""A position jumps where it changes by more than these times the largest change nearby, and anywhere else."""
+_CONFIRMS = 4.0
+_REACH = (12, 50)
+"""Samples on either side over which another channel is asked whether something happened."""
+
+
+class Group(NamedTuple):
+    """Faulty samples.
+
+    Parameters
+    ----------
+    first, behind
+        Indices of the first sample, and of the first one that is good again.
+    kind
+        ``"spike"``, ``"dropout"`` (several samples off), ``"stuck"`` (a value is repeated) or ``"jump"``,
+        behind which all samples are off.
+    size
+        Largest distance from the samples around, in the unit of the channel.
+    """
+
+    first: int
+    behind: int
+    kind: str
+    size: float
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """Another channel on the same clock: what it shows at the same time is no fault of a sensor.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    """
+
+    values: Array
+
+    @cached_property
+    def least(self) -> float:
+        """Scatter that its samples have at least."""
+        return _least_scatter(self.values)
+
+    def turns(self, first: int, behind: int, reach: int) -> bool:
+        """Tell whether it changes its course where a group is.
+
+        Then its samples around the group are better described by two parabolas, one before and one behind, than
+        by one polynomial of as many coefficients over both.
+
+        Parameters
+        ----------
+        first, behind
+            Of the group.
+        reach
+            Samples on either side that are looked at.
+        """
+        left = np.arange(max(first - reach, 0), first)
+        right = np.arange(behind, min(behind + reach, len(self.values)))
+        if min(len(left), len(right)) < _LEAST_SIDE:
+            return False
+        whole = np.concatenate([left, right])
+        joint = _sum_of_squares(self.values, whole, 5)
+        apart = _sum_of_squares(self.values, left, 2) + _sum_of_squares(self.values, right, 2)
+        return joint > _CONFIRMS * max(apart, len(whole) * self.least**2)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What decides, beside the channel itself, whether samples are faulty.
+
+    Parameters
+    ----------
+    others
+        Other channels on the same clock.
+    commanded
+        Whether the channel is an input of the model: a command may rest, and jump.
+    motion
+        Whether the channel is a position or an angle: a body is never in two places.
+    """
+
+    others: Sequence[Witness] = ()
+    commanded: bool = False
+    motion: bool = False
+
+
+def faulty_groups(values: Array, around: Surroundings) -> list[Group]:
+    """Return the groups of samples that are faulty, in order.
+
+    Parameters
+    ----------
+    values
+        Finite, shape (n,).
+    around
+        What else is known.
+    """
+    if len(values) < 2 * _SIDE or np.ptp(values) == 0.0:
+        return []
+    scatter = _Scatter(values)
+    groups: list[Group] = []
+    if len(scatter.edges) <= _BUSY * len(values):
+        groups += _excursions(scatter, around)
+    if not around.commanded:
+        groups += [g for g in _stuck(values, around) if not _overlaps(g, groups)]
+        if around.motion:
+            groups += _jumps(scatter, groups, around)
+    return sorted(groups)
+
+
+def repaired(values: Array, groups: Sequence[Group]) -> tuple[Array, Mask]:
+    """Return the channel with faulty samples interpolated, and which these are.
+
+    A cubic through the good samples on both sides is put in; at an end of the record, and in a group longer than
+    :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as it is.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    groups
+        Faulty ones.
+    """
+    mask = np.zeros(len(values), dtype=bool)
+    groups = [g for g in groups if g.kind != "jump"]
+    for group in groups:
+        mask[group.first : group.behind] = True
+    good = np.flatnonzero(~mask)
+    result = values.copy()
+    for group in groups:
+        place = int(np.searchsorted(good, group.first))
+        sides = good[max(place - _SIDE, 0) : place + _SIDE]
+        inside = np.arange(group.first, group.behind)
+        if min(place, len(good) - place) < _LEAST_SIDE or len(inside) > LONGEST:
+            result[inside] = np.interp(inside, sides, values[sides])
+        else:
+            result[inside] = _Course.through(values, sides, group.first)(inside)
+    return result, mask
+
+
+class _Course(NamedTuple):
+    """A polynomial over sample numbers, and the scatter about it."""
+
+    coefficients: Array
+    origin: int
+    scatter: float
+
+    @staticmethod
+    def through(values: Array, places: NDArray[np.intp], origin: int, order: int = 3) -> _Course:
+        """Return the polynomial through samples by least squares."""
+        powers = np.vander((places - origin) / _SIDE, order + 1)
+        coefficients = np.linalg.lstsq(powers, values[places], rcond=None)[0]
+        left = values[places] - powers @ coefficients
+        freedom = max(len(places) - order - 1, 1)
+        return _Course(coefficients, origin, float(np.sqrt(left @ left / freedom)))
+
+    def __call__(self, places: NDArray[np.intp]) -> Array:
+        result: Array = np.polyval(self.coefficients, (places - self.origin) / _SIDE)
+        return result
+
+
+class _Scatter:
+    """The changes of a channel from sample to sample, without its slope, and which of them are abrupt."""
+
+    def __init__(self, values: Array) -> None:
+        self.values = values
+        self.changes = np.diff(values)
+        self.jumps = self.changes - median_filter(self.changes, _SLOPE_SPAN, mode="nearest")
+        self.least = _least_scatter(values)
+        size = np.abs(self.jumps)
+        local = _TO_DEVIATION * median_filter(size, _SCATTER_SPAN, mode="nearest")
+        scale = np.maximum(local, self.least)
+        # A channel whose changes have heavy tails by nature is judged by these.
+        usual, rare = np.percentile(size, (50.0, 95.0))
+        self.tail = max(1.0, float(rare) / max(_TAIL * float(usual), _TAIL * self.least / _TO_DEVIATION))
+        self.edges = np.flatnonzero(size > _ABRUPT * self.tail * scale)
+
+    def group(self, first: int, behind: int, *, both: bool = True) -> float:
+        """Return how far a group is off if the samples around it continue each other; 0 if not.
+
+        Parameters
+        ----------
+        first, behind
+            Of the group.
+        both
+            Whether it must be off at both of its ends, or at one.
+        """
+        values = self.values
+        left = np.arange(max(first - _SIDE, 0), first)
+        right = np.arange(behind, min(behind + _SIDE, len(values)))
+        if min(len(left), len(right)) < _LEAST_SIDE:
+            return 0.0
+        inside = np.arange(first, behind)
+        # Over a longer gap a cubic would join any two courses.
+        order = 3 if len(inside) <= _SHORT else 2
+        near = np.concatenate([left[-_NEXT:], right[:_NEXT]])
+        far = _Course.through(values, np.concatenate([left[:-_NEXT], right[_NEXT:]]), first, order)
+        if np.max(np.abs(values[near] - far(near))) > _ABRUPT * self.tail * max(far.scatter, self.least):
+            return 0.0  # it comes and goes gradually
+        course = _Course.through(values, np.concatenate([left, right]), first, order)
+        scale = self.tail * max(course.scatter, self.least)
+        off = np.abs(values[inside] - course(inside))
+        largest = float(off.max())
+        ends = min(off[0], off[-1]) if both else max(off[0], off[-1])
+        return largest if largest > _OFF * scale and ends >= 0.5 * largest else 0.0
+
+
+def _least_scatter(values: Array) -> float:
+    low, high = np.percentile(values, (5.0, 95.0))
+    return max(noise_of(values), quantum_of(values), _SHARE_OF_RANGE * float(high - low))
+
+
+def _count(values: Array) -> float:
+    """Return the usual smallest change: the count where there is one, also behind a jump by a part of a count."""
+    changes = np.abs(np.diff(values))
+    changes = changes[changes > 0.0]
+    return float(np.percentile(changes, 5.0)) if len(changes) else 0.0
+
+
+def _excursions(scatter: _Scatter, around: Surroundings) -> list[Group]:
+    """Return groups that leave the course of a channel and return to it."""
+    longest = _COMMAND if around.commanded else LONGEST
+    groups: list[Group] = []
+    behind = 0
+    for place, edge in enumerate(scatter.edges):
+        first = int(edge) + 1
+        if first < behind:
+            continue
+        for other in scatter.edges[place + 1 :]:
+            if other - edge > longest:
+                break
+            size = scatter.group(first, int(other) + 1)
+            if size and not _confirmed(first, int(other) + 1, around.others):
+                behind = int(other) + 1
+                groups.append(Group(first, behind, "spike" if behind == first + 1 else "dropout", size))
+                break
+    groups = _standing_clear(scatter, groups)
+    if not around.commanded:
+        groups += _held(scatter, groups, around)
+    return groups
+
+
+def _standing_clear(scatter: _Scatter, groups: list[Group]) -> list[Group]:
+    """Leave out groups that are only the far end of a distribution with long tails.
+
+    Where faults are the extremes of what the channel does anyway, more samples are off by a half of the smallest of
+    them than by all of it.
+    """
+    if not groups:
+        return groups
+    off = np.abs(scatter.values - median_filter(scatter.values, _MEDIAN_SPAN, mode="nearest"))
+    expected = _HALF_WAY * len(off)
+    for place, group in enumerate(sorted(groups, key=lambda g: g.size)):
+        below = int(np.sum((off > 0.5 * group.size) & (off < group.size)))
+        left = len(groups) - place
+        if below - expected <= _LONG_TAIL * left:
+            return [g for g in groups if g.size >= group.size]
+    return []
+
+
+def _held(scatter: _Scatter, groups: Sequence[Group], around: Surroundings) -> Iterator[Group]:
+    """Yield groups in which a moving channel holds one value and then catches up."""
+    values = scatter.values
+    for edge in scatter.edges:
+        last = int(edge)
+        first = last
+        while first > 0 and last - first < LONGEST and values[first - 1] == values[last]:
+            first -= 1
+        group = Group(first + 1, last + 1, "stuck", 0.0)
+        if 2 <= group.behind - group.first < LONGEST and not _overlaps(group, groups):
+            size = scatter.group(group.first, group.behind, both=False)
+            if size and not _confirmed(group.first, group.behind, around.others):
+                yield group._replace(size=size)
+
+
+def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
+    """Yield runs of equal values in a channel that is noise all around, while other channels go on."""
+    if noise_of(values) < 2.0 * _count(values):
+        return
+    extremes = float(values.min()), float(values.max())
+    equal = np.diff(values) == 0.0
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]])))
+    starts, ends = bounds[::2], bounds[1::2] + 1
+    long = ends - starts >= 4
+    usual = (np.sum(equal) - np.sum((ends - starts - 1)[long])) / len(equal)
+    for first, behind in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
+        if values[first] in extremes:
+            continue  # it may be clipped, or slack
+        length = behind - first
+        span = max(_SCATTER_SPAN, 2 * length)
+        near = np.concatenate([equal[max(first - span, 0) : first], equal[behind : behind + span]])
+        chance = max(float(usual), float(np.mean(near)) if len(near) else 1.0)
+        if chance ** (length - 1) * len(values) > _CHANCE:
+            continue
+        sides = values[max(first - span, 0) : first + 1], values[behind - 1 : behind + span]
+        goes_on = not around.others or any(np.ptp(each.values[first:behind]) > 0.0 for each in around.others)
+        if goes_on and all(_is_noise(side) for side in sides):
+            size = float(max(abs(values[behind] - values[first]), abs(values[first - 1] - values[first])))
+            yield Group(first, behind, "stuck", size)
+
+
+def _is_noise(side: Array) -> bool:
+    signs = np.sign(np.diff(side, 4))
+    return len(signs) > _LEAST_SIDE and bool(np.mean(signs[1:] * signs[:-1] < 0.0) > _FREE_SIGNS)
+
+
+def _jumps(scatter: _Scatter, groups: Sequence[Group], around: Surroundings) -> Iterator[Group]:
+    """Yield the samples at which a position jumps to another course of the same speed."""
+    size = np.abs(scatter.changes)
+    rest = size.copy()
+    rest[scatter.edges] = 0.0
+    for edge in scatter.edges.tolist():
+        near = rest[max(edge - _SIDE, 0) : edge + _SIDE + 1]
+        least = max(_JUMP * max(float(near.max()), scatter.least), _JUMP_OVER_ALL * float(rest.max()))
+        group = Group(edge + 1, edge + 1, "jump", float(scatter.changes[edge]))
+        if size[edge] > least and not any(g.first - 1 <= edge <= g.behind for g in groups):
+            if not _confirmed(edge + 1, edge + 1, around.others):
+                yield group
+
+
+def _overlaps(group: Group, groups: Sequence[Group]) -> bool:
+    return any(group.first < each.behind and each.first < group.behind for each in groups)
+
+
+def _confirmed(first: int, behind: int, others: Sequence[Witness]) -> bool:
+    """Tell whether another channel changes its course where a group is."""
+    return any(each.turns(first, behind, reach) for each in others for reach in _REACH)
+
+
+def _sum_of_squares(values: Array, places: NDArray[np.intp], order: int) -> float:
+    at = (places - places[0]) / max(places[-1] - places[0], 1)
+    powers = np.vander(at, order + 1)
+    left = values[places] - powers @ np.linalg.lstsq(powers, values[places], rcond=None)[0]
+    return float(left @ left)

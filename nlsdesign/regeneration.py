@@ -1,0 +1,391 @@
+"""The observer of a machine, designed again from the better model of a diagnosis, and what that improves.
+
+The torque that the records show is compared with what two observers make of the measured motion and current:
+one designed from the declared model, one from the better model. Both read the same samples. The same is
+repeated with numbers drawn from what is known of them: the declared spreads before, the covariance of the
+fits after.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from .discrepancy.blocks.shown_values import shown_values
+from .errors import MeasurementError, NlsError
+from .export import export_c, export_fmu
+from .identification import Record, RecordSet
+from .identification.estimation.least_squares import Fit
+from .model import FlatModel
+from .model.readings import reading_of
+from .model.roles import measured_motion, series_spring
+from .model.structure import SpringNames
+from .observer import FixedGrid, Grid, ObserverDesign, design_observer_with_details, observe
+from .observer.scheduled import whole_contour
+from .processes import parallel_map
+from .quantity import three_digits, with_unit
+from .simulation import Trace
+
+Array = NDArray[np.float64]
+
+DRAWS = 8
+"""Draws of the numbers, before and after each: enough for a root mean square over the spread."""
+_POINTS = 257
+"""Grid points of the observers of the draws, whose tables need no finer error bound than the spread."""
+_LONGEST_ROW = 12
+"""Points of a row of numbers beyond which it is the table of a shape, drawn with one common factor."""
+_SEED = 0
+
+
+@dataclass(frozen=True)
+class ObserverChoice:
+    """What is to be estimated, from what, and how often.
+
+    Parameters
+    ----------
+    sample_time
+        In s.
+    spring
+        Path of the spring whose torque is estimated; decided from the structure if it is ``None``.
+    measured
+        State that is measured; decided from the structure if it is ``None``.
+    """
+
+    sample_time: float = 1e-3
+    spring: str | None = None
+    measured: str | None = None
+
+
+class TorqueError(NamedTuple):
+    """Root mean square error of the estimated torque on one record, in its unit.
+
+    Parameters
+    ----------
+    record, role
+        Which.
+    before, after
+        Of the observers from the declared and from the better model.
+    torque
+        Root mean square of the measured torque.
+    """
+
+    record: str
+    role: str
+    before: float
+    after: float
+    torque: float
+
+
+@dataclass(frozen=True, eq=False)
+class Regeneration:
+    """The observer of the better model, and the torque error before and after.
+
+    Parameters
+    ----------
+    plant
+        The better model.
+    observer
+        Of the better model; ``None`` where none can be designed.
+    reasons
+        Why there is no observer, or no comparison; empty if nothing is lacking.
+    quantity, unit
+        What is estimated.
+    errors
+        By record, with the nominal numbers.
+    spread_before, spread_after
+        Root mean square error over these records for each draw of the numbers, where an observer could be
+        designed.
+    course
+        Time, measured torque, and both estimates on the first of these records.
+    """
+
+    plant: FlatModel
+    observer: FlatModel | None
+    reasons: tuple[str, ...] = ()
+    quantity: str = ""
+    unit: str = "N*m"
+    errors: tuple[TorqueError, ...] = ()
+    spread_before: tuple[float, ...] = ()
+    spread_after: tuple[float, ...] = ()
+    course: tuple[Array, Array, Array, Array] | None = None
+
+    @property
+    def nominal(self) -> tuple[float, float]:
+        """Error over all records, before and after, with the nominal numbers."""
+        before, after = (_rms([getattr(e, which) for e in self.errors]) for which in ("before", "after"))
+        return before, after
+
+    @property
+    def over_spread(self) -> tuple[float, float]:
+        """Error over all records and draws, before and after."""
+        return _rms(self.spread_before), _rms(self.spread_after)
+
+    def words(self) -> tuple[str, ...]:
+        """Return the torque error before and after in sentences; none where nothing was compared."""
+        if not self.errors:
+            return ()
+        pairs = {"with the nominal numbers": self.nominal, "over the spread": self.over_spread}
+        return tuple(
+            f"Error of the observer of `{self.quantity}` {how}, before → after: "
+            f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
+            for how, pair in pairs.items()
+            if all(map(math.isfinite, pair))
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``regeneration.json``."""
+        keys = ("before", "after")
+        return {
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
+            "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
+            "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
+            "records": [each._asdict() for each in self.errors],
+            "reasons": list(self.reasons),
+        }
+
+
+def _rms(values: Sequence[float]) -> float:
+    return math.sqrt(math.fsum(v * v for v in values) / len(values)) if values else math.nan
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+def regenerate(
+    declared: FlatModel,
+    better: FlatModel,
+    records: RecordSet,
+    *,
+    fits: Sequence[Fit] = (),
+    choice: ObserverChoice | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> Regeneration:
+    """Design the observer again, and compare it with the one from the declared model.
+
+    Parameters
+    ----------
+    declared, better
+        Model as declared, and as a diagnosis left it.
+    records
+        Bench records; those that no fit has seen are compared, or all where there are none.
+    fits
+        Of the better model, for the spread of its numbers.
+    choice
+        What is estimated; by default the torque of the series spring, every millisecond.
+    progress
+        Told what is being done.
+
+    Returns
+    -------
+    Regeneration
+        With reasons in words where no observer can be designed or nothing can be compared.
+    """
+    choice = choice or ObserverChoice()
+    progress("designing the observer of the better model")
+    try:
+        after = _designed(better, choice)
+    except NlsError as error:
+        return Regeneration(better, None, (f"no observer can be designed for the better model: {error}",))
+    spring = series_spring(better, choice.spring)
+    known: dict[str, Any] = {"quantity": spring.effort, "unit": better.variable(spring.effort).unit}
+    try:
+        before = _designed(declared, choice)
+        runs = [_Watched.of(better, spring, r, choice) for r in records.of("held_out") or records.records]
+    except NlsError as error:
+        return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
+    pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
+    errors = tuple(
+        TorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
+        for run, (a, b) in zip(runs, pairs, strict=True)
+    )
+    progress("designing observers over the spread of the numbers")
+    draws = [*_draws(declared, ()), *_draws(better, fits)]
+    models = [*[declared] * DRAWS, *[better] * DRAWS]
+    spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
+    return Regeneration(
+        better,
+        after.model,
+        _failures(spread),
+        errors=errors,
+        spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
+        spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
+        course=(runs[0].trace.time, runs[0].torque, *pairs[0]),
+        **known,
+    )
+
+
+def _designed(model: FlatModel, choice: ObserverChoice, grid: Grid | None = None) -> ObserverDesign:
+    return design_observer_with_details(
+        model,
+        estimate=series_spring(model, choice.spring).effort,
+        measured=measured_motion(model, choice.measured),
+        sample_time=choice.sample_time,
+        grid=grid,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched:
+    """A record at the sample time of the observers, with the torque that it shows."""
+
+    record: Record
+    trace: Trace
+    torque: Array
+    readings: Mapping[str, str]
+    motion: str
+
+    @classmethod
+    def of(cls, model: FlatModel, spring: SpringNames, record: Record, choice: ObserverChoice) -> _Watched:
+        """Return a record as an observer sees it, and the torque behind its readings."""
+        motion = measured_motion(model, choice.measured)
+        shown = {reading_of(model.readings, signal).measured: signal for signal in record.trace.signals}
+        if motion not in shown:
+            raise MeasurementError(f"record '{record.name}'", f"does not measure '{motion}'")
+        torque = _shown_torque(model, spring, record, shown)
+        time = np.arange(record.trace.time[0], record.trace.time[-1], choice.sample_time)
+        silent = {v.name: np.full(len(record.trace), v.start) for v in model.inputs if v.name not in shown}
+        trace = record.trace.with_signals({**silent, _TORQUE: torque}, dict.fromkeys([*silent, _TORQUE], "1"))
+        even = trace.at(time)
+        return cls(record, even, even[_TORQUE], {n: s for n, s in shown.items() if n != s}, motion)
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the torque."""
+        return float(np.sqrt(np.mean(self.torque**2)))
+
+    def estimate(self, design: ObserverDesign) -> Array:
+        """Return what an observer makes of the record, begun at rest at its first angle."""
+        inputs = {v.name for v in design.model.inputs}
+        wires = {name: signal for name, signal in self.readings.items() if name in inputs}
+        first = float(self.trace[self.readings.get(self.motion, self.motion)][0])
+        run = observe(design.model, self.trace, readings=wires, start=design.start(first))
+        return run[design.step.plant.estimate.name]
+
+    def error(self, estimate: Array) -> float:
+        """Return the root mean square error of an estimate."""
+        return float(np.sqrt(np.mean((estimate - self.torque) ** 2)))
+
+
+_TORQUE = "torque behind the readings"
+
+
+def _shown_torque(model: FlatModel, spring: SpringNames, record: Record, shown: Mapping[str, str]) -> Array:
+    """Return the torque that a record shows: as measured, or a measured force times the lever arm."""
+    if spring.effort in shown:
+        return shown_values(model, record, shown[spring.effort])
+    for cam in spring.cams:
+        force = next((n for n in shown if n == cam.force or n.startswith(f"{cam.element}.")), None)
+        if force is not None and model.variable(force).unit == "N":
+            arm = _along(model, record, shown, cam.lever_arm)
+            elements = model.values[cam.elements]
+            return elements * arm * shown_values(model, record, shown[force])
+    raise MeasurementError(
+        f"record '{record.name}'",
+        f"measures neither the torque '{spring.effort}' nor a force behind its cam",
+        next_step="measure one of them to know the error of the observer",
+    )
+
+
+def _along(model: FlatModel, record: Record, shown: Mapping[str, str], signal: str) -> Array:
+    """Return a signal of the model along the measured states and inputs of a record."""
+    s, count = model.symbols(), len(record.trace)
+    groups = []
+    for variables in (model.states, model.inputs):
+        values = np.repeat(model.start(variables)[:, None], count, axis=1)
+        for place, variable in enumerate(variables):
+            if variable.name in shown:
+                values[place] = shown_values(model, record, shown[variable.name])
+        groups.append(values)
+    place = next(i for i, v in enumerate(model.signals) if v.name == signal)
+    wanted = ca.Function("wanted", [s.state, s.input, s.parameter, s.table], [s.signal[place]])
+    states, inputs = groups
+    result: Array = wanted.map(count)(states, inputs, model.start(model.parameters), np.zeros(0)).full()
+    return result.ravel()
+
+
+def _draws(model: FlatModel, fits: Sequence[Fit]) -> list[dict[str, float]]:
+    """Return draws of the numbers: from the covariance of fits, all others from their declared spreads."""
+    random = np.random.default_rng(_SEED)
+    rows = Counter(v.name.partition("[")[0] for v in model.parameters)
+    fitted = {p.name for fit in fits for p in fit.parameters}
+    result = []
+    for _ in range(DRAWS):
+        common = {row: random.uniform(-1.0, 1.0) for row in rows}
+        values = {}
+        for v in model.parameters:
+            row = v.name.partition("[")[0]
+            if v.spread > 0.0 and v.name not in fitted:
+                share = common[row] if rows[row] > _LONGEST_ROW else random.uniform(-1.0, 1.0)
+                values[v.name] = v.start * math.exp(share * math.log1p(v.spread))
+        for fit in fits:
+            centre = np.array([p.inward(fit.values[p.name]) for p in fit.parameters])
+            drawn = random.multivariate_normal(centre, fit.covariance, method="eigh")
+            for p, x in zip(fit.parameters, drawn, strict=True):
+                if p.name in model.values:
+                    values[p.name] = min(max(p.outward(float(x)), p.lower), p.upper)
+        result.append(values)
+    return result
+
+
+def _drawn_error(
+    model: FlatModel, values: Mapping[str, float], runs: Sequence[_Watched], choice: ObserverChoice
+) -> float:
+    """Return the error over all records of the observer with other numbers; not a number if there is none."""
+    drawn = model.with_values(values)
+    ends = whole_contour(drawn)
+    try:
+        design = _designed(drawn, choice, FixedGrid(ends.lower, ends.upper, _POINTS))
+        return _rms([run.error(run.estimate(design)) for run in runs])
+    except NlsError:
+        return math.nan
+
+
+def _failures(spread: Sequence[float]) -> tuple[str, ...]:
+    count = sum(not math.isfinite(error) for error in spread)
+    words = f"for {count} of {len(spread)} draws of the numbers no observer can be designed"
+    return (words,) if count else ()
+
+
+def write_regeneration(result: Regeneration, folder: Path) -> tuple[dict[Path, str], tuple[str, ...]]:
+    """Write the observer as C and FMU, and the plant of the better model as FMU.
+
+    Parameters
+    ----------
+    result
+        From :func:`regenerate`.
+    folder
+        Is made where it does not exist.
+
+    Returns
+    -------
+    tuple
+        What was written, by path, and in words what could not be written, with the reason.
+    """
+    written: dict[Path, str] = {}
+    reasons = []
+    for name, model in {"observer": result.observer, "plant": result.plant}.items():
+        if model is None:
+            continue
+        try:
+            if name == "observer":
+                source = export_c(model, folder / "c", name=name)
+                written |= {source.source: "observer in C99", source.header: "its interface"}
+            written[export_fmu(model, folder / f"{name}.fmu")] = f"{name} of the better model as FMU"
+        except NlsError as error:
+            reasons.append(f"the {name} is not exported: {error}")
+    return written, tuple(reasons)

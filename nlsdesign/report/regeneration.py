@@ -1,0 +1,80 @@
+"""Sections of a report on the observer that was designed again from the better model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..figures import HeldOut, held_out_series
+from ..quantity import three_digits, typeset_unit
+from ..regeneration import Regeneration
+from .sections import Chapter, FigureSection, FileSection, KeyNumber, NumbersSection, Section, TableSection
+
+
+def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> list[Section]:
+    """Return the chapter on the observer: torque error before and after, and the files.
+
+    Parameters
+    ----------
+    result
+        From :func:`nlsdesign.regeneration.regenerate`.
+    files
+        What was written, by path.
+    """
+    sections: list[Section] = [
+        Chapter(
+            "Observer from the better model",
+            "The torque observer, designed from the declared model (before) and from the better model (after). "
+            "Both read the measured signals and are compared with the torque that the records show.",
+        )
+    ]
+    if result.errors:
+        sections += [_numbers(result), _table(result)]
+    if result.course is not None:
+        time, torque, before, after = result.course
+        name = result.errors[0].record
+        series = HeldOut(time, torque, before, after, result.quantity, result.unit, 0.0, f"Record {name}")
+        sections.append(
+            FigureSection(
+                f"Estimated torque: {name}", held_out_series(series),
+                caption=f"Above: {result.quantity}, as measured and as both observers estimate it. "
+                "Below: the errors, unfiltered.",
+                assumed="The measured torque is what the better model says is behind the readings.",
+            )
+        )  # fmt: skip
+    if result.reasons:
+        rows = tuple((reason,) for reason in result.reasons)
+        caption = "Why something is lacking here."
+        sections.append(TableSection("Not done", ("reason",), rows, caption=caption))
+    if files:
+        sections.append(FileSection("Files", files, caption="Written beside this report."))
+    return sections
+
+
+def _numbers(result: Regeneration) -> NumbersSection:
+    unit = typeset_unit(result.unit)
+    before, after = (three_digits(each) for each in result.nominal)
+    numbers = [KeyNumber("torque error, nominal numbers", f"{before} → {after} {unit}", "before → after")]
+    if result.spread_before and result.spread_after:
+        before, after = (three_digits(each) for each in result.over_spread)
+        counts = f"{len(result.spread_before)} and {len(result.spread_after)} draws"
+        note = f"declared spreads → covariance of the fit, {counts}"
+        numbers.append(KeyNumber("torque error over the spread", f"{before} → {after} {unit}", note))
+    return NumbersSection("Torque error", tuple(numbers))
+
+
+def _table(result: Regeneration) -> TableSection:
+    unit = typeset_unit(result.unit)
+    rows = tuple(
+        (
+            e.record,
+            e.role.replace("_", " "),
+            three_digits(e.before),
+            three_digits(e.after),
+            three_digits(e.torque),
+        )
+        for e in result.errors
+    )
+    columns = ("record", "used", f"before in {unit}", f"after in {unit}", f"torque in {unit}")
+    caption = "Root mean square error of the estimated torque with nominal numbers, and the torque itself."
+    return TableSection("Torque error of each record", columns, rows, caption=caption)
