@@ -191,7 +191,7 @@ def test_a_hardening_spring_is_a_cubic_at_first() -> None:
     for x in (-2e-3, 1e-3):
         force = model.evaluate([], [x, 0.0])["piece.force"]
         assert force == pytest.approx(cubic * x**3, rel=1e-3)
-    # Anywhere it is the derivative of K·x₀²·(cosh(x/x₀) − 1 − (x/x₀)²/2), on both sides of where its series ends.
+    # Anywhere it is the derivative of K·x₀²·(cosh(x/x₀) − 1 − (x/x₀)²/2).
     h = 1e-6
 
     def energy(at: float) -> float:

@@ -14,7 +14,6 @@ from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter
 from ..core.springs import Elastic
 
-
 _SERIES = 0.1
 """Share of the scale below which the series stands for a difference that would cancel."""
 
@@ -24,9 +23,9 @@ class HardeningSpring(Elastic):
     """What a spring has beyond its proportional part: F = c·x³·S(x/x₀), S(u) = 6·(sinh(u) − u)/u³.
 
     The cubic c·x³ while x ≪ x₀, as the first term that Hooke's law leaves out of any spring without a
-    preferred side, and exponential beyond x₀, as tissue and rubber near the end of their chains. Alike on both
-    sides, C∞ but for 1e-10 of S at x₀/10, where its series ends. Sources: Fung 1967 (exponential law); Ogden
-    1972 (powers of the stretch).
+    preferred side, and exponential beyond x₀, as tissue and rubber near the end of their chains. Alike on
+    both sides, C∞ but for 1e-13 of S at x₀/10, where its series ends. Sources: Fung 1967 (exponential law);
+    Ogden 1972 (powers of the stretch).
 
     Examples
     --------
