@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...components.assembly.named_parts import Assembly
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ...identification.statistics.filters import derivative
+from ...identification.statistics.filters import RATE_SPAN, derivative
 from ...model import FlatModel, flatten
 from ...model.readings import ReadingNames, reading_of
 from ...model.structure import MovingBody, top_part
@@ -46,9 +46,7 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
         known = {s: np.asarray(record.trace[s], float) for s in records.signals}
         shown = {r.measured: shown_values(model, record, r.signal) for r in _shown(model, records)}
         moving = [b for b in model.bodies if b.motion in shown]
-        shown |= {
-            b.rate: derivative(shown[b.motion], record.step, order=1) for b in moving if b.rate not in shown
-        }
+        shown |= {b.rate: _rate(shown[b.motion], record.step) for b in moving if b.rate not in shown}
         for body in moving:
             time = _rms(shown[body.motion] - np.mean(shown[body.motion])) / max(
                 _rms(shown[body.rate]), 1e-300
@@ -97,6 +95,14 @@ def _large(values: NDArray[np.float64]) -> tuple[float, int]:
     size = np.abs(values)
     level = float(np.quantile(size, _USUAL))
     return level, int(np.argmin(np.abs(size - level)))
+
+
+def _rate(motion: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Return the rate of a motion; at both ends of a record, where the filter reaches beyond, that beside."""
+    rate, reach = derivative(motion, step, order=1), RATE_SPAN
+    if len(rate) > 2 * reach:
+        rate[:reach], rate[-reach:] = rate[reach], rate[-reach - 1]
+    return rate
 
 
 def _rms(values: NDArray[np.float64]) -> float:
