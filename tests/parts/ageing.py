@@ -38,8 +38,8 @@ _PARTS: tuple[Part, ...] = (
     BoucWen(stiffness=400.0, yield_effort=3.0, exponent=1.5),
     BoucWen(stiffness=0.4, yield_effort=0.03, exponent=1.0, domain=ROTATION),
     BoucWen(stiffness=4e5, yield_effort=3e4, exponent=2.0, domain=MATERIAL),
-    HardeningSpring(stiffness=2000.0, scale=0.01),
-    HardeningSpring(stiffness=2.0, scale=0.4, domain=ROTATION),
-    HardeningSpring(stiffness=4e5, scale=0.3, domain=MATERIAL),
+    HardeningSpring(cubic=3e6, scale=0.01),
+    HardeningSpring(cubic=2.0, scale=0.4, domain=ROTATION),
+    HardeningSpring(cubic=7e5, scale=0.3, domain=MATERIAL),
 )
 EXAMPLES: tuple[Part, ...] = _PARTS

@@ -53,7 +53,7 @@ ROWS: tuple[Row, ...] = (
     Row(
         c.HardeningSpring,
         "Taylor series",
-        ("force", "k·x³/(6·x₀²) for small motion, and the derivative of its energy"),
+        ("force", "c·x³ for small motion, and the derivative of its energy"),
         _HERE + "a_hardening_spring_is_a_cubic_at_first",
     ),
     Row(

@@ -186,18 +186,22 @@ def test_a_smooth_slider_with_a_large_exponent_is_a_dry_one() -> None:
 
 
 def test_a_hardening_spring_is_a_cubic_at_first() -> None:
-    model = pulled(HardeningSpring(stiffness=K, scale=0.05))
+    scale, cubic = 0.05, K / (6.0 * 0.05**2)
+    model = pulled(HardeningSpring(cubic=cubic, scale=scale))
     for x in (-2e-3, 1e-3):
         force = model.evaluate([], [x, 0.0])["piece.force"]
-        assert force == pytest.approx(K * x**3 / (6.0 * 0.05**2), rel=1e-3)
-    # Far beyond its scale it is the derivative of K·x₀²·(cosh(x/x₀) − 1 − (x/x₀)²/2).
-    x, h = 0.2, 1e-6
+        assert force == pytest.approx(cubic * x**3, rel=1e-3)
+    # Anywhere it is the derivative of K·x₀²·(cosh(x/x₀) − 1 − (x/x₀)²/2).
+    h = 1e-6
 
     def energy(at: float) -> float:
-        return K * 0.05**2 * (np.cosh(at / 0.05) - 1.0 - (at / 0.05) ** 2 / 2.0)
+        return K * scale**2 * float(np.cosh(at / scale) - 1.0 - (at / scale) ** 2 / 2.0)
 
-    slope = (energy(x + h) - energy(x - h)) / (2.0 * h)
-    assert model.evaluate([], [x, 0.0])["piece.force"] == pytest.approx(slope, rel=1e-6)
+    for x in (-0.2, 0.05, 0.2):
+        slope = (energy(x + h) - energy(x - h)) / (2.0 * h)
+        assert model.evaluate([], [x, 0.0])["piece.force"] == pytest.approx(slope, rel=1e-6)
+    below, above = (model.evaluate([], [0.1 * scale * f, 0.0])["piece.force"] for f in (1 - 1e-9, 1 + 1e-9))
+    assert below == pytest.approx(above, rel=1e-8)
 
 
 def test_heat_needs_work() -> None:

@@ -82,7 +82,9 @@ CATALOGUE = [
     "clock_drift",
     "winding_heat",
 ]
-ON_THE_RIG = [effect for effect in ALL if effect.__name__ != "constant_force"]
+ELSEWHERE = ("constant_force", "asymmetric_friction")
+"""Need a sliding body, and friction to begin with."""
+ON_THE_RIG = [effect for effect in ALL if effect.__name__ not in ELSEWHERE]
 
 
 def test_the_catalogue_is_the_stated_one() -> None:
@@ -145,7 +147,11 @@ def test_an_effect_is_not_added_twice_at_the_same_place(effect: Effect, rig: Ass
 def test_effects_stay_away_from_what_cannot_have_them() -> None:
     able = {effect.__name__ for effect in ALL if effect(bare())}
     assert able == {
-        "coulomb_friction", "stribeck_friction", "load_dependent_friction", "quadratic_drag", "torque_ripple", "backlash",  # noqa: E501
+        "coulomb_friction", "stribeck_friction", "load_dependent_friction", "quadratic_drag", "torque_ripple",
+        "backlash", "constant_torque", "gravity_load", "drivetrain_resonance", "position_dependent_friction",
+        "drive_delay", "torque_constant_saturation", "command_compression", "winding_heat",
+        "torque_constant_drift", "second_relaxation", "rate_independent_hysteresis", "strain_stiffening",
+        "stress_softening", "self_heating",
     }  # fmt: skip
 
 
@@ -217,7 +223,7 @@ def test_a_specimen_without_motor_ages_and_its_cell_reads_the_aged_force() -> No
         for found in effect(tied):
             assert found.assembly.sensors()["cell"].of == "piece.force"
             assert flatten(found.assembly).states
-    (softened,) = stress_softening(tied)
+    softened, *_ = stress_softening(tied)
     model = flatten(softened.assembly.with_values({"piece.softening": 0.5}))
     largest = [0.02 if v.name == "piece.largest" else 0.0 for v in model.states]
     soft, virgin = (model.evaluate(state, [0.01, 0.0]) for state in (largest, [0.0] * len(largest)))
@@ -232,6 +238,8 @@ def test_a_motor_without_a_spring_has_the_effects_of_a_drive() -> None:
     assert able == {
         "coulomb_friction": 1, "stribeck_friction": 1, "quadratic_drag": 1, "torque_ripple": 1,
         "drive_delay": 1, "torque_constant_saturation": 1, "angle_sensor_eccentricity": 2,
+        "constant_torque": 1, "gravity_load": 1, "position_dependent_friction": 2, "drivetrain_resonance": 1,
+        "command_compression": 1, "winding_heat": 1, "torque_constant_drift": 2,
     }  # fmt: skip
     once, on_motor = (
         c.assembly.quantities()["encoder_eccentricity.order"].number for c in angle_sensor_eccentricity(drive)
@@ -275,12 +283,17 @@ def test_behind_one_fault_of_a_load_cell_every_other_one_is_offered(rig: Assembl
         "force_sensor_drift": {"force_sensor_drift.drift": 0.2},
         "force_sensor_bias": {"force_sensor.bias": 3.0},
         "force_sensor_gain": {"force_sensor.gain": 1.1},
+        "force_sensor_nonlinearity": {"force_sensor_nonlinearity.nonlinearity": 1e-4},
+        "clock_drift": {"force_sensor_clock.rate": 1e-4},
     }
     assert offered(rig, "force_sensor") == set(faults)
     for effect, numbers in faults.items():
-        (candidate,) = (c for e in ALL for c in e(rig) if c.effect == effect)
+        at_the_cell = (c for e in ALL for c in e(rig) if c.location == "force_sensor")
+        (candidate,) = (c for c in at_the_cell if c.effect == effect)
         faulty = candidate.assembly.with_values(numbers)
-        assert offered(faulty, "force_sensor") == set(faults) - {effect}
+        # Of a delay and a clock that drifts records show the sum alone.
+        lag = {"force_sensor_delay", "clock_drift"}
+        assert offered(faulty, "force_sensor") == set(faults) - (lag if effect in lag else {effect})
         # Whatever is added next, the records go on measuring the same signal.
         assert {r.signal for r in flatten(faulty).readings} >= {"force_sensor.reading"}
 

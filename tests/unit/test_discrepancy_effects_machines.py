@@ -52,8 +52,12 @@ def strip(law: NeoHooke | LinearElastic) -> Assembly:
     )
 
 
-def test_only_friction_and_a_constant_force_can_sit_on_a_carriage() -> None:
-    assert {effect.__name__ for effect in ALL if effect(drive())} == {"coulomb_friction", "constant_force"}
+def test_what_acts_on_a_carriage_and_what_is_wrong_with_its_drive() -> None:
+    assert {effect.__name__ for effect in ALL if effect(drive())} == {
+        "coulomb_friction", "stribeck_friction", "quadratic_drag", "position_dependent_friction",
+        "constant_force", "drive_delay", "torque_constant_saturation", "command_compression",
+        "winding_heat", "torque_constant_drift",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from nlsdesign.components import (
     ROTATION,
     TRANSLATION,
     Assembly,
+    CoulombFriction,
     CurrentSensor,
     Dashpot,
     DriveDelay,
@@ -105,13 +106,14 @@ def torsion() -> Assembly:
 
 
 def wheels() -> Assembly:
-    """Two wheels, one geared to the other, and one spring."""
+    """Two wheels, one geared to the other, one spring, and friction of a seal."""
     return assembly(
         "wheels",
         first=Inertia(inertia=1e-3),
         second=Inertia(inertia=2e-3),
         gear=Gear(between=("first", "second"), ratio=5.0),
         spring=tie(Spring(stiffness=2.0, domain=ROTATION), "second"),
+        seal=tie(CoulombFriction(sliding_effort=0.1, domain=ROTATION).smooth(), "first"),
     )
 
 
@@ -127,8 +129,8 @@ MACHINES = {
     "torsion": torsion,
     "wheels": wheels,
 }
-ONE_KIND_OF_MACHINE = {"cam_profile_error"}
-"""What only a contour can have: it is looked at on the rig alone."""
+ONE_KIND_OF_MACHINE = {"cam_profile_error", "cable_friction"}
+"""What only a contour, or a cable with something around it, can have: it is looked at on the rig alone."""
 
 
 def bare(machine: Assembly) -> Assembly:
@@ -146,7 +148,8 @@ DECLARED = {"dry friction", "constant load", "gravity"}
 
 @pytest.mark.parametrize("effect", ALL, ids=lambda e: e.__name__)
 def test_every_effect_is_offered_on_two_machines(effect: object) -> None:
-    able = {name for name, made in MACHINES.items() if effect(bare(made()))}  # type: ignore[operator]
+    machines = {name: (made(), bare(made())) for name, made in MACHINES.items()}
+    able = {name for name, pair in machines.items() if any(effect(each) for each in pair)}  # type: ignore[operator]
     wanted = 1 if effect.__name__ in ONE_KIND_OF_MACHINE else 2  # type: ignore[attr-defined]
     assert len(able) >= wanted, able
 
@@ -170,7 +173,7 @@ def test_what_can_be_missing_on_springs_that_a_machine_strains() -> None:
     for made in (tensile, torsion):
         offered = {effect.__name__ for effect in ALL if effect(made())}
         assert offered >= {
-            "coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_dependent_friction",
+            "coulomb_friction", "stribeck_friction", "load_dependent_friction",
             "rate_independent_hysteresis", "strain_stiffening", "second_relaxation", "stress_softening",
             "self_heating", "force_sensor_bias", "force_sensor_gain", "force_sensor_delay",
             "force_sensor_drift", "force_sensor_nonlinearity", "clock_drift",
@@ -219,6 +222,28 @@ def test_ripple_begins_at_odd_orders_and_at_those_of_shafts_behind_gears() -> No
     assert max(order.starts) < order.upper
     assert turns_per_turn(wheels(), "first") == [1.0, pytest.approx(0.2)]
     assert turns_per_turn(wheels(), "second") == [1.0, 5.0]
+
+
+def test_friction_that_was_named_may_differ_between_the_directions() -> None:
+    (coulomb,) = [e for e in ALL if e.__name__ == "coulomb_friction"]
+    (uneven,) = [e for e in ALL if e.__name__ == "asymmetric_friction"]
+    for made in (joint, slide, tensile):
+        assert not uneven(made())
+        (even,) = coulomb(made())
+        (found,) = uneven(even.assembly)
+        assert found.location == even.location
+        level = even.unknowns[0].name
+        off = found.assembly.with_values({level: 2.0, found.unknowns[0].name: 0.25})
+        tied, model = level.rpartition(".")[0], flatten(off)
+        speeds = [v.name.endswith(".speed") for v in (*model.states, *model.inputs)]
+        count = len(model.states)
+        efforts = []
+        for rate in (1.0, -1.0):
+            values = [rate if is_speed else 0.0 for is_speed in speeds]
+            now = model.evaluate(values[:count], values[count:])
+            efforts.append(now.get(f"{tied}.torque", now.get(f"{tied}.force")))
+        assert efforts == [pytest.approx(2.5), pytest.approx(-1.5)]
+        assert not uneven(off)
 
 
 # --- names and order ------------------------------------------------------------------------------

@@ -14,28 +14,36 @@ from ..core.element import Scope
 from ..core.part_numbers import one_of, parameter
 from ..core.springs import Elastic
 
+_SERIES = 0.1
+"""Share of the scale below which the series stands for a difference that would cancel."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class HardeningSpring(Elastic):
-    """What a spring has beyond its proportional part: F = k·x₀·(sinh(x/x₀) − x/x₀), alike on both sides.
+    """What a spring has beyond its proportional part: F = c·x³·S(x/x₀), S(u) = 6·(sinh(u) − u)/u³.
 
-    The cubic k·x³/(6·x₀²) while x ≪ x₀, as the first term that Hooke's law leaves out of any spring without
-    a preferred side, and exponential beyond, as tissue and rubber near the end of their chains. C∞.
-    Sources: Fung 1967 (exponential law); Ogden 1972 (powers of the stretch).
+    The cubic c·x³ while x ≪ x₀, as the first term that Hooke's law leaves out of any spring without a
+    preferred side, and exponential beyond x₀, as tissue and rubber near the end of their chains. Alike on
+    both sides, C∞ but for 1e-13 of S at x₀/10, where its series ends. Sources: Fung 1967 (exponential law);
+    Ogden 1972 (powers of the stretch).
 
     Examples
     --------
-    >>> HardeningSpring(stiffness=2000.0, scale=0.01).domain.effort
+    >>> HardeningSpring(cubic=3e6, scale=0.01).domain.effort
     'force'
     """
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"elasticity", "strain stiffening"})
 
     domain: Domain = one_of(TRANSLATION, ROTATION, MATERIAL)
-    stiffness: Quantity = parameter("{effort}/{motion}", "stiffness k", minimum=0.0, maximum=1e12)
+    cubic: Quantity = parameter("{effort}/{motion}^3", "cubic stiffness c", minimum=0.0, maximum=1e18)
     scale: Quantity = parameter("{motion}", "motion x₀ from which it grows fast", minimum=1e-9, maximum=1e4)
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
-        """Return k·x₀·(sinh(x/x₀) − x/x₀)."""
-        size = scope.parameter("scale")
-        return scope.parameter("stiffness") * (size * ca.sinh(motion / size) - motion)
+        """Return c·x³·S(x/x₀)."""
+        share = motion / scope.parameter("scale")
+        near = ca.fabs(share) < _SERIES
+        square, far = share * share, ca.if_else(near, _SERIES, share)
+        series = 1 + square / 20 * (1 + square / 42 * (1 + square / 72))
+        factor = ca.if_else(near, series, 6 * (ca.sinh(far) - far) / far**3)
+        return scope.parameter("cubic") * motion**3 * factor

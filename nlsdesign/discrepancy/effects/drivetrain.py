@@ -120,11 +120,10 @@ def _gravity(assembly: Assembly, body: str) -> Iterator[Edit]:
     weight = HorizontalTorque(horizontal_torque=number(0.01, "N*m"))
     load = GravityLoad(weight=weight, hanging_angle=number(0.0, "rad"))
     edited, part = tied(assembly, "weight", body, load)
-    quarter = math.pi / 2.0
     unknowns = (
-        Unknown(f"{part}.horizontal_torque", (0.2,), 1e-4, 3.0, efforts_on(body)),
-        # All directions; the bounds overlap, so that none of them stands at a bound.
-        Unknown(f"{part}.hanging_angle", (-2.0 * quarter, -quarter, 0.0, quarter), -5.0, 5.0, null=None),
+        # A torque of either sign with two directions begins near any; the bounds overlap.
+        Unknown(f"{part}.horizontal_torque", (0.1,), -3.0, 3.0, efforts_on(body)),
+        Unknown(f"{part}.hanging_angle", (0.0, math.pi / 2.0), -5.0, 5.0, null=None),
     )
     yield Edit(edited, unknowns)
 
@@ -134,8 +133,15 @@ def _reduced(whole: Quantity, share: float, spread: float) -> Quantity:
     return replace(whole.with_value(share * whole.number, whole.source), spread=max(whole.spread, spread))
 
 
-def _shaft(assembly: Assembly, behind: str, inertia: Quantity) -> tuple[Assembly, str, tuple[Unknown, ...]]:
-    """Return the assembly with a second inertia behind a shaft that twists, its name, and what is open."""
+def _shaft(
+    assembly: Assembly, behind: str, frequencies: tuple[float, ...]
+) -> tuple[Assembly, str, tuple[Unknown, ...]]:
+    """Return the assembly with a second inertia behind a shaft that twists, its name, and what is open.
+
+    Fits begin at natural frequencies that are given as multiples of that of the quickest motion.
+    """
+    name = f"{behind}.inertia"
+    inertia = assembly.quantities()[name]
     second = _SHARE_BEHIND * inertia.number
     body = free_name(assembly, "second_inertia")
     edited = assembly.with_part(body, Inertia(inertia=number(second, "kg*m^2")))
@@ -146,14 +152,12 @@ def _shaft(assembly: Assembly, behind: str, inertia: Quantity) -> tuple[Assembly
     )
     edited = edited.with_part(shaft, tie(twist, behind, body))
     left = _reduced(inertia, 1.0 - _SHARE_BEHIND, 0.3)
-    name = next(n for n, q in assembly.quantities().items() if q is inertia and n.startswith(f"{behind}."))
     edited = edited.with_values({name: left})
-    # Natural frequencies from about that of the quickest motion to twenty times as much; little loss.
     unknowns = (
         Unknown(f"{body}.inertia", (second,), 1e-3 * second, 5.0 * second, null=None),
         Unknown(
             f"{shaft}.stiffness.stiffness",
-            tuple(second * omega**2 for omega in (2.0, 4.0, 8.0)),
+            tuple(second * omega**2 for omega in frequencies),
             second * 0.1,
             second * 1e4,
             f"1 / {QUICKEST} / {QUICKEST}",
@@ -173,7 +177,7 @@ def _shaft(assembly: Assembly, behind: str, inertia: Quantity) -> tuple[Assembly
 
 def _absorber(assembly: Assembly, body: str) -> Iterator[Edit]:
     """Let a part of the inertia hang on a shaft; what acts on the body goes on acting on it."""
-    edited, _, unknowns = _shaft(assembly, body, assembly.quantities()[f"{body}.inertia"])
+    edited, _, unknowns = _shaft(assembly, body, (3.0, 8.0))
     yield Edit(edited, unknowns)
 
 
@@ -181,7 +185,7 @@ def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
     """Put a shaft between a body and its load: the spring pulls at the second inertia from now on."""
     part, driver = assembly[name], _drivers(assembly, name)[0]
     assert isinstance(part, Tie)
-    edited, body, unknowns = _shaft(assembly, driver, assembly.quantities()[f"{driver}.inertia"])
+    edited, body, unknowns = _shaft(assembly, driver, (4.0,))
     ends = tuple(body if end == driver else end for end in part.between)
     yield Edit(edited.with_part(name, replace(part, between=ends)), unknowns)
 

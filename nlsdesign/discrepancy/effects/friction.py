@@ -13,19 +13,21 @@ from ...components import (
     QuadraticDrag,
     SpotFriction,
     StribeckFriction,
+    Tie,
     WavyFriction,
     tie,
 )
 from ...components.core.domain import Domain
 from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
-from .candidate import SOURCE, Unknown, free_name, wrapped
+from .candidate import SOURCE, Unknown, free_name, numbers_of, wrapped
 from .effect import Edit, Effect, Form
 from .places import (
     beside,
     domain_of,
     driven_ties,
     driving_end,
+    laws,
     moving_bodies,
     restoring_ties,
     turning_bodies,
@@ -120,17 +122,29 @@ def _stribeck(assembly: Assembly, place: str) -> Iterator[Edit]:
     yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction",)})
 
 
-def _asymmetric(assembly: Assembly, place: str) -> Iterator[Edit]:
-    def law(domain: Domain) -> Element:
-        level = number(0.01, domain.effort_unit)
-        return AsymmetricFriction(sliding_effort=level, asymmetry=number(0.0, "1"), domain=domain).smooth()
+def _even_friction(assembly: Assembly, place: str) -> str | None:
+    """Return the path of even dry friction on a body, or inside a tie."""
+    for path, part in laws(assembly):
+        owner = assembly[path.partition(".")[0]]
+        on_body = isinstance(owner, Tie) and place in owner.between
+        if type(part) is CoulombFriction and (on_body or path.startswith(f"{place}.")):
+            return path
+    return None
 
-    put = Placed(assembly, place, "dry_friction", law)
-    unknowns = (
-        Unknown(f"{put.path}.sliding_effort", (0.05,), 1e-4, 2.0, put.effort),
-        Unknown(f"{put.path}.asymmetry", (0.0,), -1.0, 1.0),
-    )
-    yield Edit(put.assembly, unknowns, {"simpler": ("coulomb_friction", "constant_torque", "constant_force")})
+
+def _rubbing(assembly: Assembly) -> list[str]:
+    """Return the bodies and ties with even dry friction, declared or added before."""
+    places = [*moving_bodies(assembly), *driven_ties(assembly)]
+    return [place for place in places if _even_friction(assembly, place)]
+
+
+def _asymmetric(assembly: Assembly, place: str) -> Iterator[Edit]:
+    """Let even friction differ between the directions: its level stays what it is, in the mean."""
+    path = _even_friction(assembly, place)
+    if path is not None:
+        even = assembly.element(path)
+        uneven = AsymmetricFriction(**numbers_of(even), asymmetry=number(0.0, "1"))
+        yield Edit(assembly.with_part(path, uneven), (Unknown(f"{path}.asymmetry", (0.0,), -1.0, 1.0),))
 
 
 def _loaded(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -244,15 +258,15 @@ quadratic_drag = Effect(
 )
 asymmetric_friction = Effect(
     "asymmetric_friction",
-    "Dry friction that differs between the two directions: the same as even friction beside a constant load.",
-    25,
-    tuple(
-        _forms(
+    "Dry friction that differs between the directions: in motion the same as a constant load beside it.",
+    265,
+    (
+        Form(
+            _rubbing,
             _asymmetric,
             "an effort against the motion that is larger in one direction",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (levels by direction)",
-            "dry friction",
-        )
+        ),
     ),
 )
 position_dependent_friction = Effect(

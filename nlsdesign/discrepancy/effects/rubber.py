@@ -183,29 +183,26 @@ def _stiffening(assembly: Assembly, path: str) -> Iterator[Edit]:
         Unknown(f"{inner}.knots[1]", (0.4, 0.75), 0.01, 0.98, f"{path}.strain", null=None),
     )
     yield Edit(assembly.with_part(inner, law), unknowns)
-    yield _hardening(assembly, path, size, (stiffness, f"{path}.strain"))
+    yield from _hardening(assembly, path, size, (stiffness, f"{path}.strain"))
 
 
-def _hardening(assembly: Assembly, path: str, size: float, sizes: tuple[str, str]) -> Edit:
-    """Return the smooth form: cubic at first, exponential where the motion passes its scale."""
+def _hardening(assembly: Assembly, path: str, size: float, sizes: tuple[str, str]) -> Iterator[Edit]:
+    """Yield the smooth forms: a cubic, and one that grows exponentially beyond a scale of its own."""
     piece, (stiffness, motion) = assembly.element(path), sizes
     domain = MATERIAL if isinstance(piece, Specimen) else piece.domain
-    law = HardeningSpring(
-        stiffness=number(1.0, domain.unit("{effort}/{motion}")),
-        scale=number(1.0, domain.motion_unit),
-        domain=domain,
-    )
+    far = Quantity(1e3, domain.motion_unit, "definition: so far away that the law is a cubic")
+    law = HardeningSpring(cubic=number(1.0, domain.unit("{effort}/{motion}^3")), scale=far, domain=domain)
     edited, inner = beside(assembly, path, "stiffening", law)
-    unknowns = (
-        Unknown(f"{inner}.stiffness", (0.3 * size,), 1e-5 * size, 1e3 * size, stiffness),
-        Unknown(f"{inner}.scale", (0.7,), 0.05, 5.0, motion, null=None),
-    )
-    return Edit(edited, unknowns)
+    of = f"{stiffness} / {motion} / {motion}"
+    cubic = Unknown(f"{inner}.cubic", (0.1 * size,), 1e-5 * size, 1e3 * size, of)
+    yield Edit(edited, (cubic,))
+    scale = Unknown(f"{inner}.scale", (0.5,), 0.05, 3.0, motion, null=None)
+    yield Edit(edited.with_values({scale.name: number(1.0, domain.motion_unit)}), (cubic, scale))
 
 
 def _lumped_stiffening(assembly: Assembly, path: str) -> Iterator[Edit]:
     effort, motion = effort_over_motion(assembly, path)
-    yield _hardening(assembly, path, 1.0, (f"{effort} / {motion}", motion))
+    yield from _hardening(assembly, path, 1.0, (f"{effort} / {motion}", motion))
 
 
 second_relaxation = Effect(

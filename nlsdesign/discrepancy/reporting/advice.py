@@ -53,6 +53,40 @@ _EXPERIMENTS: Mapping[frozenset[str], str] = {
             "the motion turns, friction does not",
         ),
         (
+            ("current_sensor_bias", "constant_torque"),
+            "read the ammeter with the drive switched off: a bias stays",
+        ),
+        (
+            ("asymmetric_friction", "constant_torque"),
+            "let the body coast to rest from both directions, and stand: a torque goes on acting at rest",
+        ),
+        (
+            ("asymmetric_friction", "constant_force"),
+            "let the body coast to rest from both directions, and stand: a force goes on acting at rest",
+        ),
+        (
+            ("asymmetric_friction", "current_sensor_bias"),
+            "read the ammeter with the drive switched off: a bias stays",
+        ),
+        (
+            ("command_compression", "torque_constant_saturation"),
+            "stall the drive and step the command up to its limit: iron is proportional at first, a "
+            "compressed command falls short from the first step on",
+        ),
+        (
+            ("gravity_load", "angle_sensor_eccentricity"),
+            "hold the body at rest all round: a weight takes torque there, an eccentric disc none",
+        ),
+        (
+            ("winding_heat", "torque_constant_drift"),
+            "record once after a rest and once after minutes of hard work: heat follows the work, drift "
+            "the time",
+        ),
+        (
+            ("force_sensor_delay", "clock_drift"),
+            "record the same motion for ten times as long: a clock that drifts goes on losing time",
+        ),
+        (
             ("force_sensor_gain", "strain_stiffening"),
             "hang a known weight on the load cell",
         ),

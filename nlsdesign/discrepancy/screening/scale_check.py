@@ -50,7 +50,7 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
         shown = {r.measured: shown_values(model, record, r.signal) for r in _shown(model, records)}
         moving = [b for b in model.bodies if b.motion in shown]
         shown |= {
-            b.rate: derivative(shown[b.motion], record.step, order=1, span=spans[b.motion])
+            b.rate: _rate(shown[b.motion], record.step, spans[b.motion])
             for b in moving
             if b.rate not in shown
         }
@@ -102,6 +102,14 @@ def _large(values: NDArray[np.float64]) -> tuple[float, int]:
     size = np.abs(values)
     level = float(np.quantile(size, _USUAL))
     return level, int(np.argmin(np.abs(size - level)))
+
+
+def _rate(motion: NDArray[np.float64], step: float, span: float) -> NDArray[np.float64]:
+    """Return the rate of a motion; at both ends of a record, where the filter reaches beyond, that beside."""
+    rate, reach = derivative(motion, step, order=1, span=span), max(2, round(span / step))
+    if len(rate) > 2 * reach:
+        rate[:reach], rate[-reach:] = rate[reach], rate[-reach - 1]
+    return rate
 
 
 def _rms(values: NDArray[np.float64]) -> float:
