@@ -297,7 +297,9 @@ class _Plan:
 
     def _floors(self, record: Record) -> dict[str, Floor]:
         floors = {
-            b.name: noise_floor(b, record, self._bench.noise) for b in self._blocks if b.name in self._open
+            b.name: noise_floor(b, record, self._bench.noise, self._bench.filters[b.name])
+            for b in self._blocks
+            if b.name in self._open
         }
         return {name: f for name, f in floors.items() if len(f.sigma) >= _LEAST_ROWS}
 
