@@ -25,7 +25,7 @@ from nlsdesign.components import Assembly
 from nlsdesign.discrepancy import effects
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.planning.experiment import next_experiment
-from nlsdesign.discrepancy.planning.limits import Limits
+from nlsdesign.discrepancy.planning.machine_limits import MachineLimits
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
@@ -88,7 +88,7 @@ PAIRS = (
 )
 STRENGTHS = (1.0, 0.5, 0.25, 0.125)
 """Tried in this order until the first records leave a pair undecided."""
-LIMITS = Limits(
+LIMITS = MachineLimits(
     np.radians(-45.0), np.radians(45.0), speed=8.0, acceleration=300.0,
     drive=(("current_sensor.reading", 12.0),),
 )  # fmt: skip

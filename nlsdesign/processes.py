@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import multiprocessing
 import os
@@ -39,8 +40,26 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
         yield from map(work, range(count))
         return
     _work = work
-    with multiprocessing.get_context("fork").Pool(cores, initializer=_ignore_interrupts) as pool:
+    # An interrupt between fork and the first line of a helper would end that helper, and the pool would wait
+    # for it for ever. So none is delivered until all helpers ignore it, nor while they are ended.
+    with _interrupts_held():
+        pool = multiprocessing.get_context("fork").Pool(cores, initializer=_ignore_interrupts)
+    try:
         yield from pool.imap(_call, range(count))
+    finally:
+        with _interrupts_held():
+            pool.terminate()
+            pool.join()
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold interrupts back until the end of the block, where they are delivered."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _ignore_interrupts() -> None:

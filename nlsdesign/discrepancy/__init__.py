@@ -3,6 +3,9 @@
 from .blocks.prediction_of_blocks import predict
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
+from .effects.unnamed_tables import unnamed_part
+from .planning.experiment import Experiment, Separation, next_experiment, write_command
+from .planning.machine_limits import MachineLimits
 from .reporting.circumstances import DiagnosisRun, records_of_run
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
@@ -16,16 +19,22 @@ __all__ = [
     "DiagnosisRun",
     "Effect",
     "EffectEvidence",
+    "Experiment",
     "FittedNumber",
+    "MachineLimits",
     "NamedEffect",
     "RecordGap",
     "Refit",
+    "Separation",
     "Unknown",
     "Verdict",
     "diagnose",
+    "next_experiment",
     "predict",
     "records_of_run",
     "refit",
+    "unnamed_part",
+    "write_command",
     "write_refit",
     "write_verdict",
 ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..discrepancy.effects.plain_names import kind_in_words, title
 from ..discrepancy.reporting.circumstances import settings_of
+from ..discrepancy.reporting.fitted_numbers import fitted_numbers
 from ..discrepancy.reporting.verdict import RecordGap, Verdict
 from ..figures import (
     CandidateShare,
@@ -76,7 +77,7 @@ def _blocks(verdict: Verdict) -> TableSection:
         unit = typeset_unit(gap.unit) or "1"
         rows.append((f"`{name}`{f', {kind}' if kind else ''}", *size, unit, *times))
     columns = ("block", "before", "after", "noise", "unit", "before / noise", "after / noise")
-    which = "held-out" if verdict.assessed == "held_out" else "fitted"
+    which = "held-out" if verdict.gap().role == "held_out" else "fitted"
     caption = (
         "The machine, cut at the measured signals: error of each block, root mean square over the "
         f"{which} records. At 1 × noise nothing is missing there."
@@ -179,7 +180,7 @@ def _with_unit_of(abscissa: str, model: FlatModel) -> str:
 
 def _numbers(verdict: Verdict) -> list[Section]:
     """Return the declared numbers after the refit, those that left their declared range highlighted."""
-    numbers = verdict.numbers
+    numbers = fitted_numbers(verdict.fits)
     if not numbers:
         return []
     rows = tuple(

@@ -24,7 +24,7 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
     sections: list[Section] = [
         Chapter(
             "Observer from the better model",
-            "The torque observer, designed from the declared model (before) and from the better model (after). "
+            "The torque observer, designed from the declared (before) and from the better model (after). "
             "Both read the measured signals and are compared with the torque that the records show.",
         )
     ]

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from nlsdesign.components import (
+    MATERIAL,
+    ROTATION,
+    BoucWen,
     CapstanFriction,
+    DamageByMotion,
+    Dashpot,
     Following,
+    HardeningSpring,
     LargestMotion,
+    LossHeat,
     Part,
     PermanentSet,
     SelfHeating,
@@ -23,5 +30,16 @@ _PARTS: tuple[Part, ...] = (
     SelfHeating(members=_INSIDE, heat=WorkHeat(halving_work=40.0, cooling_time=8.0)),
     StressSoftening(members=_INSIDE, curve=LargestMotion(softening=0.2)),
     SelfHeating(members=_INSIDE, heat=ViscousHeat(halving_speed=0.3, cooling_time=8.0)),
+    SelfHeating(
+        members=(*_INSIDE, ("loss", Dashpot(damping=30.0))),
+        heat=LossHeat(halving_loss=4.0, cooling_time=8.0, relaxing_share=0.5),
+    ),
+    StressSoftening(members=_INSIDE, curve=DamageByMotion(damage=0.3, damage_motion=5e-3)),
+    BoucWen(stiffness=400.0, yield_effort=3.0, exponent=1.5),
+    BoucWen(stiffness=0.4, yield_effort=0.03, exponent=1.0, domain=ROTATION),
+    BoucWen(stiffness=4e5, yield_effort=3e4, exponent=2.0, domain=MATERIAL),
+    HardeningSpring(stiffness=2000.0, scale=0.01),
+    HardeningSpring(stiffness=2.0, scale=0.4, domain=ROTATION),
+    HardeningSpring(stiffness=4e5, scale=0.3, domain=MATERIAL),
 )
 EXAMPLES: tuple[Part, ...] = _PARTS

@@ -33,6 +33,30 @@ ROWS: tuple[Row, ...] = (
         _HERE + "viscous_heat_is_the_loss_less_what_cooled_off",
     ),
     Row(
+        c.SelfHeating,
+        "first law",
+        ("simulated heat", "quadrature of the dashpot's loss over an exponential"),
+        _HERE + "heat_of_the_loss_inside_softens_what_does_not_relax",
+    ),
+    Row(
+        c.StressSoftening,
+        "definition",
+        ("simulated force", "damage at the largest motion by hand"),
+        _HERE + "damage_is_the_same_at_every_later_motion",
+    ),
+    Row(
+        c.BoucWen,
+        "work lost in a loop",
+        ("simulated loop", "that of a spring with a dry slider, for a large exponent"),
+        _HERE + "a_smooth_slider_with_a_large_exponent_is_a_dry_one",
+    ),
+    Row(
+        c.HardeningSpring,
+        "Taylor series",
+        ("force", "k·x³/(6·x₀²) for small motion, and the derivative of its energy"),
+        _HERE + "a_hardening_spring_is_a_cubic_at_first",
+    ),
+    Row(
         c.CapstanFriction,
         "capstan",
         ("force", "Euler's differential equation along the wrap, integrated"),

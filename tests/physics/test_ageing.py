@@ -10,11 +10,16 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp, trapezoid
 
 from nlsdesign.components import (
     TRANSLATION,
+    BoucWen,
     CapstanFriction,
+    DamageByMotion,
+    Dashpot,
     Driven,
     Element,
     Following,
+    HardeningSpring,
     LargestMotion,
+    LossHeat,
     PermanentSet,
     SelfHeating,
     Spring,
@@ -121,6 +126,78 @@ def test_viscous_heat_is_the_loss_less_what_cooled_off() -> None:
     assert heat[-1] > 0.05
     assert signals["piece.heat"] == pytest.approx(heat, rel=1e-4, abs=1e-6)
     assert force == pytest.approx(K * x / (1.0 + heat), rel=1e-4, abs=1e-5)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_heat_of_the_loss_inside_softens_what_does_not_relax(share: float) -> None:
+    """ϑ' = c·ẋ²·g/E − ϑ/τ with a dashpot c beside the spring; g = 1 where the dashpot does not soften."""
+    damping, loss, cooling = 30.0, 0.05, 3.0
+    times = np.linspace(0.0, 4.0, 8001)
+    heat = LossHeat(halving_loss=loss, cooling_time=cooling, relaxing_share=share)
+    members = (*BAND, ("dashpot", Dashpot(damping=damping)))
+    force, signals = forces(SelfHeating(members=members, heat=heat), times)
+    x, v = (np.array([f(t) for t in times]) for f in (place, speed))
+
+    def rate(t: float, warm: np.ndarray) -> np.ndarray:
+        return damping * speed(t) ** 2 / (1.0 + share * warm) / loss - warm / cooling
+
+    expected = solve_ivp(rate, (0.0, 4.0), [0.0], t_eval=times, rtol=1e-9, atol=1e-12, max_step=0.01).y[0]
+    assert expected[-1] > 0.05
+    assert signals["piece.heat"] == pytest.approx(expected, rel=1e-4, abs=1e-6)
+    by_hand = K * x / (1.0 + expected) + damping * v / (1.0 + share * expected)
+    assert force == pytest.approx(by_hand, rel=1e-4, abs=1e-4)
+
+
+def test_damage_is_the_same_at_every_later_motion() -> None:
+    times = np.linspace(0.0, 6.0, 601)
+    curve = DamageByMotion(damage=0.4, damage_motion=REACH, following=1e-4)
+    force, _ = forces(StressSoftening(members=BAND, curve=curve), times)
+    x = np.array([place(t) for t in times])
+    largest = np.maximum.accumulate(x)
+    by_hand = K * x * (1.0 - 0.4 * (1.0 - np.exp(-largest / REACH)))
+    assert force == pytest.approx(by_hand, rel=2e-3, abs=1e-3)
+
+
+def test_softening_knows_no_side() -> None:
+    """A spring twisted both ways is softened by the larger of both: half of the motion, half of the loss."""
+    softened = StressSoftening(members=BAND, curve=LargestMotion(softening=0.4))
+    model = pulled(softened)
+    states = [REACH if v.name == "piece.largest" else 0.0 for v in model.states]
+    there, back = (model.evaluate(states, [side * REACH / 2.0, 0.0])["piece.force"] for side in (1.0, -1.0))
+    assert there == pytest.approx(K * REACH / 2.0 * 0.8)
+    assert back == pytest.approx(-there)
+
+
+def test_a_smooth_slider_with_a_large_exponent_is_a_dry_one() -> None:
+    """Elastic from each reversal on until it slides: the loop of a spring of stiffness K behind a slider."""
+    limit = 4.0
+    times = np.linspace(0.0, 4.0, 4001)
+    force, _ = forces(BoucWen(stiffness=K, yield_effort=limit, exponent=20.0), times)
+    x, dry = np.array([place(t) for t in times]), np.zeros(4001)
+    for k in range(4000):
+        dry[k + 1] = np.clip(dry[k] + K * (x[k + 1] - x[k]), -limit, limit)
+    assert np.sqrt(np.mean((force - dry) ** 2)) < 0.04 * limit
+    second = slice(2000, 4001)
+    lost = trapezoid(force[second], x[second])
+    assert lost == pytest.approx(trapezoid(dry[second], x[second]), rel=0.06)
+    # A small exponent rounds the way: less is lost in a loop of the same reach.
+    round_way, _ = forces(BoucWen(stiffness=K, yield_effort=limit, exponent=0.5), times)
+    assert trapezoid(round_way[second], x[second]) < 0.8 * lost
+
+
+def test_a_hardening_spring_is_a_cubic_at_first() -> None:
+    model = pulled(HardeningSpring(stiffness=K, scale=0.05))
+    for x in (-2e-3, 1e-3):
+        force = model.evaluate([], [x, 0.0])["piece.force"]
+        assert force == pytest.approx(K * x**3 / (6.0 * 0.05**2), rel=1e-3)
+    # Far beyond its scale it is the derivative of K·x₀²·(cosh(x/x₀) − 1 − (x/x₀)²/2).
+    x, h = 0.2, 1e-6
+
+    def energy(at: float) -> float:
+        return K * 0.05**2 * (np.cosh(at / 0.05) - 1.0 - (at / 0.05) ** 2 / 2.0)
+
+    slope = (energy(x + h) - energy(x - h)) / (2.0 * h)
+    assert model.evaluate([], [x, 0.0])["piece.force"] == pytest.approx(slope, rel=1e-6)
 
 
 def test_heat_needs_work() -> None:

@@ -8,18 +8,28 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, trapezoid
 from scipy.interpolate import BSpline
 
 from nlsdesign.components import (
     CamWithProfileError,
+    ClockDrift,
+    CommandCompression,
+    CommandSaturation,
     DriveDelay,
+    Driven,
     DrivePart,
     DriveSaturation,
     Eccentricity,
+    Element,
     GearedMotor,
     Inertia,
+    LoadNonlinearity,
+    SpotFriction,
     Spring,
+    TorqueConstantDrift,
+    WavyFriction,
+    WindingHeat,
     through,
     tie,
 )
@@ -29,6 +39,7 @@ from nlsdesign.errors import ArrangementError
 from nlsdesign.model import flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.model.transform import with_outputs
+from nlsdesign.quantity import Quantity
 from nlsdesign.simulation import simulate
 
 MOTOR = {"inertia": 0.01, "gear_ratio": 25.0, "torque_constant": 0.03}
@@ -152,3 +163,87 @@ def test_extension_of_a_misshapen_cam_is_the_integral_of_its_lever_arm() -> None
             found = model.evaluate([sign * angle, 0.0])
             assert found["spring.cam.lever_arm_now"] == pytest.approx(sign * arm, rel=1e-5)
             assert found["spring.cable.extension"] == pytest.approx(extension, rel=1e-4)
+
+
+def torques(part: DrivePart, current: float, times: np.ndarray) -> np.ndarray:
+    """Torque of the motor with one part in its drive, under a steady current."""
+    run = simulate(flatten(driven(part=part)), times, inputs={"motor.current": lambda t: current})
+    return np.asarray(run["motor.drive_torque"])
+
+
+@pytest.mark.parametrize("current", [-9.0, -0.01, 0.0, 4.0, 15.0])
+def test_what_falls_with_the_command_follows_its_curve(current: float) -> None:
+    iron = flatten(driven(part=CommandSaturation(saturation=4.0)))
+    found = iron.evaluate([0.0, 0.0], [current])["motor.drive_torque"]
+    assert found == pytest.approx(TORQUE_PER_AMPERE * 4.0 * math.sin(math.atan(current / 4.0)), abs=1e-12)
+    # A source whose inner resistance is |u|/u_h of the load: of u that share is left.
+    weak = flatten(driven(part=CommandCompression(halving=4.0)))
+    found = weak.evaluate([0.0, 0.0], [current])["motor.drive_torque"]
+    inner = abs(current) / 4.0
+    assert found == pytest.approx(TORQUE_PER_AMPERE * current * (1.0 / (1.0 + inner)), abs=1e-12)
+
+
+def test_a_winding_warms_as_a_body_with_one_time_constant() -> None:
+    times, cooling = np.linspace(0.0, 6.0, 601), 2.0
+    found = torques(WindingHeat(halving=10.0, cooling_time=cooling), 5.0, times)
+    heat = 0.25 * (1.0 - np.exp(-times / cooling))
+    assert found == pytest.approx(TORQUE_PER_AMPERE * 5.0 / (1.0 + heat), rel=1e-5)
+
+
+def test_a_torque_constant_drifts_along_its_curve() -> None:
+    times = np.linspace(0.0, 6.0, 61)
+    line = torques(TorqueConstantDrift(drift=0.02), 5.0, times)
+    assert line == pytest.approx(TORQUE_PER_AMPERE * 5.0 * (1.0 + 0.02 * times), rel=1e-5)
+    settled = torques(TorqueConstantDrift(drift=0.02, settling_time=0.5), 5.0, times)
+    assert settled[-1] == pytest.approx(TORQUE_PER_AMPERE * 5.0 * 1.01, rel=1e-4)
+
+
+def test_a_cell_is_off_most_in_the_middle_of_its_scale() -> None:
+    cell = LoadNonlinearity(of="spring.force", nonlinearity=0.04, full_scale=200.0)
+    loads = np.linspace(-200.0, 200.0, 401)
+    readings = cell.recorded(np.arange(401.0), loads, np.random.default_rng(1))
+    line = loads * readings[-1] / 200.0
+    assert np.max(np.abs(readings - line)) == pytest.approx(0.04 * 200.0 / 4.0, rel=1e-3)
+    numbers = _Plain(cell)
+    behind = [float(ca.DM(ca.evalf(cell.infer(numbers, ca.SX(each))))) for each in readings[::40]]
+    assert behind == pytest.approx(loads[::40], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("rate", [-2e-3, 2e-3])
+def test_a_clock_that_loses_time_reads_an_earlier_value(rate: float) -> None:
+    machine = assembly(
+        "a",
+        grip=Driven(),
+        spring=tie(Spring(stiffness=Quantity(1.0, "N*m/rad")), "grip"),
+        cell=ClockDrift(of="spring.torque", rate=rate),
+    )
+    omega, times = 10.0, np.linspace(0.0, 3.0, 1501)
+    run = simulate(
+        flatten(machine),
+        times,
+        inputs={
+            "grip.angle": lambda t: math.sin(omega * t),
+            "grip.speed": lambda t: omega * math.cos(omega * t),
+        },
+    )
+    error = run["cell.reading"] - np.sin(omega * times * (1.0 - rate))
+    assert np.max(np.abs(error)[100:]) < 2e-4
+    assert np.max(np.abs(run["cell.reading"] - np.sin(omega * times))) > 0.05
+
+
+SPOT = SpotFriction(sliding_effort=0.2, place=0.3, width=0.05).smooth(1e-4)
+WAVY = WavyFriction(sliding_effort=0.2, sine=0.05, cosine=0.1).smooth(1e-4)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("law", "low", "high", "expected"),
+    [(SPOT, -0.7, 1.3, 0.2 * 0.05 * math.sqrt(math.pi)), (WAVY, 0.0, 2.0 * math.pi, 2.0 * math.pi * 0.2)],
+)
+def test_friction_of_a_place_takes_its_work(
+    law: Element, low: float, high: float, expected: float, sense: float
+) -> None:
+    model = flatten(assembly("a", shaft=Inertia(inertia=1.0), rub=tie(law, "shaft")))
+    angles = np.linspace(low, high, 401)
+    torque = [sense * model.evaluate([a, sense])["rub.torque"] for a in angles]
+    assert trapezoid(torque, angles) == pytest.approx(expected, rel=1e-6)

@@ -19,7 +19,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import ALL, predict
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects.candidate import Candidate
-from nlsdesign.discrepancy.effects.unnamed import EFFECT, unnamed_part
+from nlsdesign.discrepancy.effects.unnamed_tables import EFFECT, unnamed_part
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis

@@ -105,6 +105,71 @@ def in_degrees(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+def spike(rows: np.ndarray) -> np.ndarray:
+    rows[700, FORCE] += 300.0
+    return rows
+
+
+def dropout(rows: np.ndarray) -> np.ndarray:
+    rows[700:705, FORCE] = 0.0
+    return rows
+
+
+def encoder_at_zero(rows: np.ndarray) -> np.ndarray:
+    rows[733, ANGLE] = 0.0
+    return rows
+
+
+def huge_current(rows: np.ndarray) -> np.ndarray:
+    rows[700, CURRENT] = 50.0
+    return rows
+
+
+MASKED = {
+    "spike": (spike, "force_N", "row 702: spike by 3", 700),
+    "dropout": (dropout, "force_N", "rows 702 to 706: samples off by", 700),
+    "encoder": (encoder_at_zero, "theta_rad", "row 735: spike by", 733),
+    "current": (huge_current, "current_A", "row 702: spike by", 700),
+}
+
+
+@pytest.mark.parametrize("case", MASKED)
+def test_a_faulty_sample_is_masked_and_said_and_suspects_nothing(
+    case: str, rig: Assembly, clean: np.ndarray, tmp_path: Path
+) -> None:
+    change, head, words, place = MASKED[case]
+    write_records(tmp_path / "records", {"a": change(clean.copy())})
+    records = load_records(tmp_path / "records", flatten(rig))
+    assert records.findings == ()
+    said = [str(each) for each in records.remarks]
+    assert any(f"a.csv: column '{head}', {words}" in each for each in said), said
+    assert any(f"at {clean[place, TIME]:g} s" in each and "masked" in each for each in said), said
+    (signal,) = (c.signal for c in records.columns if c.name == head)
+    assert place in np.flatnonzero(records.records[0].masked_in([signal]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["spike", "dropout"])
+def test_a_clean_set_with_a_faulty_sample_stays_clean(
+    case: str, rig: Assembly, clean: np.ndarray, tmp_path: Path
+) -> None:
+    slow = make_records(ACTUATORS["arm"], {}, 11, only=("sine_25deg_2.0Hz",))["sine_25deg_2.0Hz"]
+    write_records(tmp_path / "records", {"a": MASKED[case][0](clean.copy()), "b": slow})
+    records = load_records(tmp_path / "records", flatten(rig), hold_out=["b"])
+    assert diagnose(rig, records, catalogue=TWO).verdict == "none"
+
+
+def test_many_faulty_samples_make_a_record_suspect(rig: Assembly, clean: np.ndarray, tmp_path: Path) -> None:
+    rows = clean.copy()
+    rows[20:-20:60, FORCE] += 300.0
+    write_records(tmp_path / "records", {"a": rows})
+    (finding,) = load_records(tmp_path / "records", flatten(rig)).findings
+    assert "column 'force_N'" in str(finding)
+    assert "1.7 % of its samples are faulty: check cable and recorder" in str(finding) or "1.6 %" in str(
+        finding
+    )
+
+
 SUSPECT: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {
     "clipped": (clipped, "a.csv: column 'force_N', rows "),
     "millinewton": (in_millinewton, "is it in thousandths of the stated unit?"),

@@ -52,6 +52,7 @@ class Table:
     def __init__(self, table: dict[Collection[str], tuple[float, ...]], **flags: bool) -> None:
         self.table = {frozenset(names): left for names, left in table.items()}
         self.bench, self.flags, self.asked = Bench(), flags, list[tuple[str, ...]]()
+        self.records: Table | None = None
 
     def hypothesis(self, added: tuple[Candidate, ...]) -> Hypothesis:
         left = self.table.get(frozenset(c.effect for c in added))
@@ -69,6 +70,13 @@ class Table:
 
     def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
         return hypothesis
+
+    def without_whole_records(self, hypothesis: Hypothesis) -> Hypothesis:
+        return (
+            self.hypothesis(hypothesis.added)
+            if self.records is None
+            else self.records.hypothesis(hypothesis.added)
+        )
 
     def polished(self, hypothesis: Hypothesis) -> Hypothesis:
         return replace(hypothesis, values={"polished": 1.0})
@@ -207,3 +215,13 @@ def test_what_only_all_samples_show_is_judged_on_all_samples() -> None:
     found = outcome(Coarse({(): (100.0,), ("a",): (50.0,), ("b",): (60.0,)}), effect("a"), effect("b"))
     assert names(found) == ["b"]
     assert found.steps[0].share == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_does_not_predict_whole_records_is_not_named_and_the_next_best_is() -> None:
+    left = {(): (1e5,), ("a",): (10.0,), ("b",): (2e4,), ("a", "b"): (10.0,)}
+    table = Table(left)
+    table.records = Table({**left, ("a",): (2e5,), ("a", "b"): (2e5,)})
+    found = outcome(table, effect("a"), effect("b"))
+    assert names(found) == ["b"]
+    assert found.tried[0].candidate.effect == "a"
+    assert found.tried[0].objections == ("it does not predict records that are left out as a whole",)

@@ -121,7 +121,7 @@ GAPS = (
 )
 EFFECT = NamedEffect(
     "stribeck_friction", "motor", {"dry_friction.sliding_effort": (0.3748171, "N*m", 4.3e-4)}, ("backlash",),
-    0.99, 0.98, "a torque against the motion", "Stribeck 1902", 0.97,
+    0.98, "a torque against the motion", "Stribeck 1902", 0.97,
     EffectEvidence(310.0, 12.0, "sliding_effort", 87.2, "slow", -1.5, (("coulomb_friction", 41.0, 6.0),)),
 )  # fmt: skip
 

@@ -93,9 +93,22 @@ def test_numbers_arrive_in_si_under_the_names_of_the_model(folder: Path, model: 
     assert [r.role for r in records.records] == ["fit", "fit", "held_out", "fit"]
 
 
-def test_without_a_rule_every_third_record_is_held_out(folder: Path, model: FlatModel) -> None:
-    (folder / "records.toml").write_text(MAPPING.replace('held_out = ["c*"]', ""), encoding="utf8")
-    assert [r.name for r in read(folder, model).of("held_out")] == ["b"]
+@pytest.mark.parametrize("names", ["abcd", "dcba", "bdac"])
+def test_without_a_rule_the_record_inside_the_others_is_held_out_whatever_its_name(
+    names: str, tmp_path: Path, model: FlatModel
+) -> None:
+    sizes = dict(zip(names, (0.2, 0.7, 1.0, 0.4), strict=True))
+    for name, size in sizes.items():
+        rows = table()
+        rows[:, 1:] *= size
+        write(tmp_path, name, rows)
+    (tmp_path / "records.toml").write_text(MAPPING.replace('held_out = ["c*"]', ""), encoding="utf8")
+    records = read(tmp_path, model)
+    (held,) = records.of("held_out")
+    assert 0.2 < sizes[held.name] < 1.0
+    (remark,) = records.remarks
+    assert f"held out by default: {held.name}, inside the range" in str(remark)
+    assert not records.findings
 
 
 def test_a_single_record_is_cut_in_time(folder: Path, model: FlatModel) -> None:
@@ -218,6 +231,25 @@ def test_a_dead_and_a_saturated_channel_make_data_suspect(folder: Path, model: F
     assert "clipped" in found[1]
 
 
+def test_a_machine_at_rest_and_a_limited_command_are_remarked_alone(tmp_path: Path, model: FlatModel) -> None:
+    """All channels rest for 11 samples; then one record rests throughout; then a command meets its limit."""
+    resting, limited = table(), table()
+    resting[100:111, 1:] = resting[100, 1:]
+    limited[:, 2] = np.clip(limited[:, 2], -0.7, 0.7)
+    still = table()
+    still[:, 1:] = 0.0
+    write(tmp_path, "a", resting)
+    write(tmp_path, "b", still)
+    write(tmp_path, "c", limited)
+    text = MAPPING.replace("cell.reading", "wheel.torque")
+    (tmp_path / "records.toml").write_text(text, encoding="utf8")
+    records = read(tmp_path, model)
+    assert records.findings == ()
+    said = [str(r) for r in records.remarks]
+    assert any("b.csv: column 'theta_deg'" in each and "is constant at 0" in each for each in said), said
+    assert any("c.csv: column 'torque_Nm'" in each and "a limit of the drive" in each for each in said), said
+
+
 def test_uneven_steps_are_interpolated_and_said(folder: Path, model: FlatModel) -> None:
     rows = table()
     rows[1:-1, 0] += 0.2 * STEP * np.sin(np.arange(1, COUNT - 1))
@@ -228,3 +260,17 @@ def test_uneven_steps_are_interpolated_and_said(folder: Path, model: FlatModel) 
     np.testing.assert_allclose(np.diff(first.trace.time), STEP, rtol=1e-9)
     # What was linear in time still is.
     np.testing.assert_allclose(first.trace["encoder.reading"], 0.5 * first.trace.time, atol=1e-6)
+
+
+def test_a_motion_that_is_sampled_too_coarsely_says_how_often_it_should_be(
+    tmp_path: Path, model: FlatModel
+) -> None:
+    """Ten samples a period at 50 Hz: a hundred would do."""
+    (tmp_path / "records.toml").write_text(MAPPING.replace('held_out = ["c*"]', ""), encoding="utf8")
+    time = np.arange(COUNT) * 0.02
+    angle = 20.0 * np.sin(2 * np.pi * 5.0 * time + 0.3)
+    write(tmp_path, "a", np.column_stack([time, angle, 3.0 * np.radians(angle)]))
+    remarks = [str(r) for r in read(tmp_path, model).remarks]
+    (text,) = [each for each in remarks if "samples a period" in each]
+    assert "a.csv: column 'theta_deg': has about 10 samples a period" in text
+    assert "record at 100 Hz or more" in text

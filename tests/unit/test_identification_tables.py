@@ -116,3 +116,50 @@ def test_a_missing_library_is_named_with_what_installs_it(
     (tmp_path / f"a{ending}").write_bytes(b"")
     with pytest.raises(MissingLibraryError, match=rf"needs {library}.*pip install 'nlsdesign\[records\]'"):
         read_table(tmp_path / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_damage_is_one_message_whatever_the_library_says(
+    ending: str, columns: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    """Cut at many places and with bytes turned over: what can be read is a table, the rest names the file."""
+    whole = tmp_path / f"whole{ending}"
+    WRITERS[ending](whole, columns)
+    sound, draw = whole.read_bytes(), np.random.default_rng(8)
+    refused = 0
+    for number in range(60):
+        damaged = bytearray(sound)
+        if number % 2:
+            damaged = damaged[: int(draw.integers(1, len(damaged)))]
+        else:
+            for place in draw.integers(0, min(len(damaged), 600), 4):
+                damaged[place] ^= int(draw.integers(1, 256))
+        file = tmp_path / f"damaged{ending}"
+        file.write_bytes(bytes(damaged))
+        try:
+            assert isinstance(read_table(file).given, dict)
+        except MeasurementError as error:
+            assert file.name in str(error)
+            refused += 1
+    assert refused > 15
+
+
+def test_a_column_of_another_file_or_of_terabytes_is_refused(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    np.arange(100.0).tofile(tmp_path / "secret.bin")
+    with h5py.File(tmp_path / "outside.h5", "w") as stream:
+        stream.create_dataset("force", (100,), "f8", external=[(str(tmp_path / "secret.bin"), 0, 800)])
+    with pytest.raises(MeasurementError, match=r"outside\.h5: 'force'.*from another file"):
+        read_table(tmp_path / "outside.h5")
+    with h5py.File(tmp_path / "huge.h5", "w") as stream:
+        stream.create_dataset("force", (10**12,), "f8", chunks=(1000,))
+    with pytest.raises(MeasurementError, match=r"huge\.h5: 'force'.*declares 1e\+12 numbers"):
+        read_table(tmp_path / "huge.h5")
+
+
+def test_two_columns_of_one_head_in_a_binary_file_are_refused(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    table = pyarrow.table([np.arange(60.0), np.ones(60), np.zeros(60)], names=["t_s", "f_N", "f_N"])
+    pytest.importorskip("pyarrow.parquet").write_table(table, tmp_path / "a.parquet")
+    with pytest.raises(MeasurementError, match=r"a\.parquet: columns 2 and 3: have the same head 'f_N'"):
+        read_table(tmp_path / "a.parquet")

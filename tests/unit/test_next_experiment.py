@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,14 +17,15 @@ from nlsdesign.components import ROTATION, Assembly, Dashpot, GearedMotor, Sprin
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy import effects
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.effects.candidate import Candidate, Unknown
-from nlsdesign.discrepancy.planning.commands import commands
+from nlsdesign.discrepancy.planning.candidate_commands import commands
 from nlsdesign.discrepancy.planning.experiment import Experiment, next_experiment, write_command
-from nlsdesign.discrepancy.planning.limits import Limits, limits_seen
+from nlsdesign.discrepancy.planning.machine_limits import MachineLimits, limits_seen
+from nlsdesign.discrepancy.planning.separation import BlockResponse, ReadyHypothesis, apart
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Column, Record, RecordSet, load_records
+from nlsdesign.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from nlsdesign.quantity import Quantity
@@ -35,7 +38,7 @@ INERTIA, DAMPING, STIFFNESS, TORQUE = 2e-3, 5e-3, 0.8, 0.05
 COLUMNS = (Column("angle_deg", "motor.angle", "deg"), Column("current_A", "motor.current", "A"))
 UNITS = {"motor.angle": "rad", "motor.current": "A"}
 STEP, NOISE = 2e-3, 0.05
-LIMITS = Limits(-1.0, 1.0, speed=6.0, acceleration=150.0, drive=(("motor.current", 30.0),))
+LIMITS = MachineLimits(-1.0, 1.0, speed=6.0, acceleration=150.0, drive=(("motor.current", 30.0),))
 
 
 def number(value: float, unit: str, spread: float = 0.0) -> Quantity:
@@ -85,8 +88,8 @@ def fitted(records: Sequence[Record], *names: str) -> tuple[Bench, list[Hypothes
     bench = Bench(chosen, blocks_of(flatten(machine()), chosen.signals))
     comparison = Comparison(bench, {"spring.torque": 0.4})
     base = comparison.base(machine())
-    found = [comparison.with_effect(base, getattr(effects, name)(base.assembly)[0]) for name in names]
-    return bench, [h for h in found if h is not None]
+    experiment = [comparison.with_effect(base, getattr(effects, name)(base.assembly)[0]) for name in names]
+    return bench, [h for h in experiment if h is not None]
 
 
 def left(hypothesis: Hypothesis) -> float:
@@ -102,31 +105,31 @@ def undecided() -> tuple[Bench, list[Hypothesis]]:
 @cache
 def proposed() -> Experiment:
     bench, hypotheses = undecided()
-    found = next_experiment(hypotheses, bench, limits=LIMITS, duration=4.0)
-    assert found is not None
-    return found
+    experiment = next_experiment(hypotheses, bench, limits=LIMITS, duration=4.0)
+    assert experiment is not None
+    return experiment
 
 
 def test_the_proposed_record_decides_what_the_first_one_could_not() -> None:
-    found, (simple, rich) = proposed(), undecided()[1]
+    experiment, (simple, rich) = proposed(), undecided()[1]
     assert abs(left(simple) - left(rich)) < 9.0
-    time, angle = found.command.time, found.command["motor.angle"]
+    time, angle = experiment.command.time, experiment.command["motor.angle"]
     further = record("further", time, angle, stribeck, 2)
     _, (simple, rich) = fitted([quick(stribeck), further], "coulomb_friction", "stribeck_friction")
     assert left(simple) - left(rich) > 100.0
 
 
 def test_it_is_slow_where_only_slowness_tells() -> None:
-    found = proposed()
-    speed = np.abs(np.gradient(found.command["motor.angle"], found.command.time))
+    experiment = proposed()
+    speed = np.abs(np.gradient(experiment.command["motor.angle"], experiment.command.time))
     quickest = 0.4 * 2.0 * np.pi * 2.0
     assert np.median(speed[speed > 1e-3]) < 0.2 * quickest
 
 
 def test_the_expected_current_is_that_of_the_motion() -> None:
     """The record that is expected obeys the balance that was written by hand, with the best numbers."""
-    found, (simple, _) = proposed(), undecided()[1]
-    time, angle = found.command.time, found.command["motor.angle"]
+    experiment, (simple, _) = proposed(), undecided()[1]
+    time, angle = experiment.command.time, experiment.command["motor.angle"]
     speed = np.gradient(angle, time)
     numbers = {n: simple.values[n] for n in simple.values}
     torque = (
@@ -136,33 +139,36 @@ def test_the_expected_current_is_that_of_the_motion() -> None:
         + numbers["dry_friction.sliding_effort"] * np.tanh(speed / 0.02)
     )
     inside = slice(50, -50)
-    error = found.command["motor.current"][inside] - torque[inside] / TORQUE
+    error = experiment.command["motor.current"][inside] - torque[inside] / TORQUE
     assert np.max(np.abs(error)) < 0.05 * np.max(np.abs(torque)) / TORQUE
 
 
 def test_what_a_number_can_absorb_does_not_count() -> None:
-    """A second damper predicts otherwise, but after a refit of the first one it predicts the same."""
-    bench, (simple,) = fitted([quick(dry)], "coulomb_friction")
-    comparison = Comparison(bench, {"spring.torque": 0.4})
-    more = tie(Dashpot(damping=number(1e-3, "N*m*s/rad"), domain=ROTATION), "motor")
-    twice = Candidate(
-        "second_damper", "motor", simple.assembly.with_part("second", more),
-        (Unknown("second.damping", (1e-3,), 1e-4, 1e-2),), "", "",
-    )  # fmt: skip
-    other = comparison.with_effect(simple, twice)
-    assert other is not None
-    off = replace(other, values={**other.values, "second.damping": other.values["second.damping"] + 2e-3})
-    found = next_experiment([simple, off], bench, limits=LIMITS, duration=4.0)
-    assert found is None or not found.decides
+    """D² = |δ|² less what the slopes of the other hypothesis hold of δ, as far as its numbers are open."""
+    rival = SimpleNamespace(information={"b": np.zeros((1, 1))})
+    plain = SimpleNamespace(stiff=False)
+    slope, aside = np.array([[3.0], [4.0], [0.0]]), np.array([0.0, 0.0, 2.0])
+
+    def squares(delta: Array, information: float) -> float:
+        rival.information["b"] = np.array([[information]])
+        one = {"b": BlockResponse(np.zeros(3), slope, cast(DrivenBlock, plain))}
+        other = {"b": BlockResponse(delta, slope, cast(DrivenBlock, plain))}
+        return apart([one], other, cast(ReadyHypothesis, rival), {"b": 1.0}).squares
+
+    along = 0.2 * slope.ravel()
+    assert squares(along, 0.0) == pytest.approx(0.0, abs=1e-12)
+    assert squares(along + aside, 0.0) == pytest.approx(4.0)
+    assert squares(along, 1e9) == pytest.approx(along @ along, rel=1e-6)
+    assert squares(along, 25.0) == pytest.approx(0.5 * along @ along)
 
 
 def test_every_command_stays_within_the_limits() -> None:
     time = np.arange(0.0, 6.0, STEP)
-    for limits in (LIMITS, Limits(-0.1, 1.0, speed=0.5, acceleration=10.0), Limits(0.0, 2.0)):
-        found = commands(time, 0.0, limits)
-        assert len(found) > 8
-        assert len({c.words for c in found}) == len(found)
-        for each in found:
+    for limits in (LIMITS, MachineLimits(-0.1, 1.0, speed=0.5, acceleration=10.0), MachineLimits(0.0, 2.0)):
+        experiment = commands(time, 0.0, limits)
+        assert len(experiment) > 8
+        assert len({c.words for c in experiment}) == len(experiment)
+        for each in experiment:
             slope = np.gradient(each.value, time)
             assert limits.low - 1e-9 <= each.value.min(), each.words
             assert each.value.max() <= limits.high + 1e-9, each.words
@@ -175,9 +181,9 @@ def test_every_command_stays_within_the_limits() -> None:
 def test_the_drive_stays_within_its_limit() -> None:
     bench, hypotheses = undecided()
     tight = replace(LIMITS, drive=(("motor.current", 4.0),))
-    found = next_experiment(hypotheses, bench, limits=tight, duration=4.0)
-    assert found is not None
-    assert np.max(np.abs(found.command["motor.current"])) <= 1.02 * 4.0
+    experiment = next_experiment(hypotheses, bench, limits=tight, duration=4.0)
+    assert experiment is not None
+    assert np.max(np.abs(experiment.command["motor.current"])) <= 1.02 * 4.0
     assert (
         next_experiment(hypotheses, bench, limits=replace(LIMITS, drive=(("motor.current", 1e-3),))) is None
     )
@@ -190,33 +196,34 @@ def test_limits_are_what_the_records_show() -> None:
     assert (seen.low, seen.high) == pytest.approx((-0.4, 0.4), rel=0.01)
     assert seen.speed == pytest.approx(0.4 * turn, rel=0.02)
     assert seen.acceleration == pytest.approx(0.4 * turn**2, rel=0.1)
-    assert dict(seen.drive)["motor.current"] == pytest.approx(7.0, abs=1.5)
+    torque = (STIFFNESS - INERTIA * turn**2) * 0.4, DAMPING * 0.4 * turn + 0.02
+    assert dict(seen.drive)["motor.current"] == pytest.approx(np.hypot(*torque) / TORQUE, rel=0.1)
 
 
 def test_a_command_is_written_with_the_head_and_unit_of_its_column(tmp_path: Path) -> None:
-    found = proposed()
-    write_command(found, tmp_path / "next_record.csv")
+    experiment = proposed()
+    write_command(experiment, tmp_path / "next_record.csv")
     lines = (tmp_path / "next_record.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "t_s,angle_deg"
-    assert len(lines) == len(found.command.time) + 1
+    assert len(lines) == len(experiment.command.time) + 1
     table = np.loadtxt(tmp_path / "next_record.csv", delimiter=",", skiprows=1)
-    assert np.radians(table[:, 1]) == pytest.approx(found.command["motor.angle"], abs=1e-8)
-    assert table[:, 0] == pytest.approx(found.command.time, abs=1e-8)
+    assert np.radians(table[:, 1]) == pytest.approx(experiment.command["motor.angle"], abs=1e-8)
+    assert table[:, 0] == pytest.approx(experiment.command.time, abs=1e-8)
     (tmp_path / "records.toml").write_text(
         '[time]\ncolumn = "t_s"\nunit = "s"\n[columns.angle_deg]\nsignal = "motor.angle"\nunit = "deg"\n',
         encoding="utf-8",
     )
     again = load_records(tmp_path, flatten(machine()))
     assert again.records[0].trace["motor.angle"][10] == pytest.approx(
-        found.command["motor.angle"][10], abs=1e-8
+        experiment.command["motor.angle"][10], abs=1e-8
     )
 
 
 def test_words_say_what_to_record_and_what_it_would_show() -> None:
-    found = proposed()
-    text = found.words()
+    experiment = proposed()
+    text = experiment.words()
     for part in (
-        found.motion,
+        experiment.motion,
         "motor.angle",
         "4 s",
         "coulomb_friction and stribeck_friction",
@@ -224,18 +231,18 @@ def test_words_say_what_to_record_and_what_it_would_show() -> None:
         "`motor`",
     ):
         assert part in text
-    assert found.to_dict()["separations"][0]["one"] == "coulomb_friction"
+    assert experiment.to_dict()["separations"][0]["one"] == "coulomb_friction"
 
 
 def test_an_open_loop_drive_is_commanded_through_the_model() -> None:
     """The motor alone with its current commanded: the motion that is expected is that of a simulation."""
     bench, hypotheses = undecided()
-    limits = Limits(-8.0, 8.0, travel=(("motor.angle", -1.0, 1.0),))
-    found = next_experiment(hypotheses, bench, commanded="motor.current", limits=limits, duration=2.0)
-    assert found is not None
-    assert found.signal == "motor.current"
-    assert np.max(np.abs(found.command["motor.current"])) <= 8.0
-    assert 0.01 < np.max(np.abs(found.command["motor.angle"])) <= 1.1
+    limits = MachineLimits(-8.0, 8.0, travel=(("motor.angle", -1.0, 1.0),))
+    experiment = next_experiment(hypotheses, bench, commanded="motor.current", limits=limits, duration=1.0)
+    assert experiment is not None
+    assert experiment.signal == "motor.current"
+    assert np.max(np.abs(experiment.command["motor.current"])) <= 8.0
+    assert 0.01 < np.max(np.abs(experiment.command["motor.angle"])) <= 1.1
 
 
 def test_what_cannot_be_commanded_is_said() -> None:

@@ -74,3 +74,42 @@ def _running(pid: int) -> bool:
             return file.read().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+INTERRUPTED_WHILE_FORKING = """
+import os
+import signal
+from nlsdesign.processes import parallel_map
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGINT))
+print(list(parallel_map(abs, 6)), flush=True)
+"""
+
+INTERRUPTED_WHILE_STARTING = """
+import os
+import signal
+from nlsdesign.processes import parallel_map
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+os.register_at_fork(after_in_parent=lambda: os.kill(os.getpid(), signal.SIGINT))
+try:
+    list(parallel_map(abs, 6))
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts on fork")
+@pytest.mark.parametrize(
+    ("program", "expected"),
+    [(INTERRUPTED_WHILE_FORKING, "[0, 1, 2, 3, 4, 5]"), (INTERRUPTED_WHILE_STARTING, "interrupted")],
+)
+def test_an_interrupt_at_the_moment_of_the_fork_leaves_nobody_waiting(program: str, expected: str) -> None:
+    """In the helper it is ignored; in the waiting process it is delivered once all helpers ignore it."""
+    cores = "import os; os.sched_getaffinity = lambda _: {0, 1}\n"
+    ended = subprocess.run(
+        [sys.executable, "-c", cores + program], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert ended.stdout.strip() == expected
+    assert "Traceback" not in ended.stderr

@@ -62,7 +62,7 @@ def _ripple(assembly: Assembly, body: str) -> Iterator[Edit]:
 
 
 def _drivers(assembly: Assembly, name: str) -> list[str]:
-    """Return the bodies that turn freely at the ends of a tie, what is commanded first."""
+    """Return the bodies that turn freely at the ends of a tie, in the order in which it names them."""
     part = assembly[name]
     ends = part.between if isinstance(part, Tie) else ()
     return [end for end in ends if isinstance(assembly[end], Free) and domain_of(assembly, end) == ROTATION]
@@ -70,6 +70,20 @@ def _drivers(assembly: Assembly, name: str) -> list[str]:
 
 def _driven_springs(assembly: Assembly) -> list[str]:
     return [name for name in restoring_ties(assembly) if _drivers(assembly, name)]
+
+
+def _without_shaft(assembly: Assembly) -> list[str]:
+    """Return the turning bodies that no spring ties to another body with a motion of its own."""
+    coupled = set()
+    for name in restoring_ties(assembly):
+        ends = _drivers(assembly, name)
+        coupled |= set(ends) if len(ends) > 1 else set()
+    return [body for body in turning_bodies(assembly) if body not in coupled]
+
+
+def _rigidly_driven_springs(assembly: Assembly) -> list[str]:
+    bodies = _without_shaft(assembly)
+    return [name for name in _driven_springs(assembly) if _drivers(assembly, name)[0] in bodies]
 
 
 def _backlash(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -205,18 +219,16 @@ drivetrain_resonance = Effect(
     175,
     (
         Form(
-            _driven_springs,
+            _rigidly_driven_springs,
             _two_masses,
             "an oscillation of its own frequency after each jolt, between drive and load",
             "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
-            "shaft",
         ),
         Form(
-            turning_bodies,
+            _without_shaft,
             _absorber,
             "an oscillation of its own frequency after each jolt of the drive",
             "Hooke 1678; Leonhard 2001 (drives with an elastic shaft)",
-            "shaft",
         ),
     ),
 )

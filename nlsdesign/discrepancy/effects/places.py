@@ -267,11 +267,13 @@ def beside(assembly: Assembly, path: str, name: str, law: Element) -> tuple[Asse
         return assembly.with_part(f"{path}.{free}", law), f"{path}.{free}"
     owner, _, own = path.rpartition(".")
     outer = "both" if owner else own
+    inner_name = own if owner else "declared"
+    name = f"{name}_2" if name == inner_name else name
 
     def around(inner: str, element: Element) -> Element:
         return parallel(**{inner: element, name: law})
 
-    edited = wrapped(assembly, path, outer if owner else "declared", around, read_outside=True)
+    edited = wrapped(assembly, path, outer if owner else inner_name, around, read_outside=True)
     return edited, f"{owner}.{outer}.{name}" if owner else f"{path}.{name}"
 
 

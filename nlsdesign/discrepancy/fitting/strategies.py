@@ -201,7 +201,13 @@ class Continuation(Strategy):
     takes_long: ClassVar[bool] = True
 
     def beginnings(self, problem: FitProblem, slow: Sequence[Evidence]) -> list[Start]:
-        """Return the starts that the simpler form leaves; nothing where it has no response."""
+        """Return the starts that the simpler form leaves; nothing where it has no response.
+
+        Raises
+        ------
+        ConvergenceError
+            If the simpler form explains so little of every block that the whole effect cannot be named.
+        """
         bench, first = problem.bench, problem.starts[0]
         every = blocks_of(flatten(self.through), bench.records.signals)
         blocks = [b for b in every if b.name in problem.blocks]
@@ -215,6 +221,13 @@ class Continuation(Strategy):
         limits = Limits(COARSE_EVALUATIONS, COARSE_TOLERANCE)
         try:
             best = best_fit(evidence, starts, limits)
+        except ConvergenceError:
+            return []
+        if not _explains_enough(problem, best.misfit):
+            raise ConvergenceError(
+                "fit", f"its simpler form explains less than {100.0 * LEAST_EXPLAINED:.0f} % of what is left"
+            )
+        try:
             held = [_held(best, name, self.hold) for name in problem.new if name in shared]
             ended = [best, *[best_fit(evidence, [start], limits) for start in held]]
         except ConvergenceError:
@@ -410,6 +423,25 @@ def _promise(evidence: Sequence[Evidence], start: Sequence[Parameter]) -> float:
         return predicted_cost(evidence, start)
     except ConvergenceError:
         return float("inf")
+
+
+def _explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:
+    """Tell whether a fit takes enough off the excess over the noise of any block.
+
+    Parameters
+    ----------
+    problem
+        With what was left over before.
+    misfit
+        Half the sum of squares by block and record.
+    """
+    for block in problem.blocks:
+        keys = [key for key in misfit if key[0] == block]
+        now = 0.5 * sum(problem.before[key].squares for key in keys)
+        excess = now - 0.5 * sum(problem.before[key].rows for key in keys)
+        if excess > 0.0 and now - sum(misfit[key] for key in keys) >= LEAST_EXPLAINED * excess:
+            return True
+    return False
 
 
 def _held(fitted: Fit, name: str, factor: float) -> Start:

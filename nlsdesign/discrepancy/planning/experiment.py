@@ -1,7 +1,7 @@
 """What to measure next: the experiment that tells the present hypotheses apart best.
 
-Candidates (:mod:`.commands`) are driven through every hypothesis within the limits of the machine
-(:mod:`.limits`); the one with the largest expected separation (:mod:`.separation`) is proposed.
+Candidates (:mod:`.candidate_commands`) are driven through every hypothesis within the limits of the machine
+(:mod:`.machine_limits`); the one with the largest expected separation (:mod:`.separation`) is proposed.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from ...simulation import Trace
 from ...writing import write_text
 from ..blocks.tearing import blocks_of
 from ..selection.hypothesis import Hypothesis
-from .commands import Command, commands
-from .limits import Limits, limits_seen
-from .separation import Rival, Values, apart, made_ready
-from .synthesis import MeasuredSignals, Rig, measured_signals
+from .candidate_commands import Command, commands
+from .expected_record import Machine, MeasuredSignals, check_command, measured_signals
+from .machine_limits import MachineLimits, limits_seen
+from .separation import ReadyHypothesis, Values, apart, made_ready
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ class Experiment:
     unit: str
     command: Trace
     separations: tuple[Separation, ...]
-    limits: Limits
+    limits: MachineLimits
 
     @property
     def duration(self) -> float:
@@ -145,7 +145,7 @@ def next_experiment(
     bench: Bench,
     *,
     commanded: str = "",
-    limits: Limits | None = None,
+    limits: MachineLimits | None = None,
     duration: float | None = None,
 ) -> Experiment | None:
     """Return the record that would tell hypotheses apart best.
@@ -157,7 +157,7 @@ def next_experiment(
     bench
         The records so far, with their noise.
     commanded
-        Measured signal that the bench is told to follow. By default the measured motion, as where it is
+        Measured signal that the bench is to follow. By default the measured motion, as where it is
         servoed or prescribed, and without one the first measured drive.
     limits
         Of the machine; by default what the records show that it has done.
@@ -235,6 +235,7 @@ class _Plan:
         self._measured = measured_signals(model, records.signals)
         self._declared = _declared_limits(model, self._measured)
         self.commanded = commanded or _usual(self._measured)
+        check_command(self._measured, self.commanded)
         traces = [r.trace for r in records.records]
         self.rest = {s: float(np.median([t[s][0] for t in traces])) for s in records.signals}
         self._largest = {s: max(float(np.max(np.abs(t[s]))) for t in traces) for s in records.signals}
@@ -243,9 +244,11 @@ class _Plan:
         first = self._rivals[0]
         self._blocks: tuple[Block, ...] = tuple(d.block for d in first.driven)
         self._open = _differing(hypotheses)
-        self._rig = Rig(model, first.driven, self._measured, dict(traces[0].units), self.rest, self._largest)
+        self._machine = Machine(
+            model, first.driven, self._measured, dict(traces[0].units), self.rest, self._largest
+        )
 
-    def _rival(self, hypothesis: Hypothesis, model: FlatModel) -> Rival:
+    def _rival(self, hypothesis: Hypothesis, model: FlatModel) -> ReadyHypothesis:
         driven = []
         for block in blocks_of(model, self._bench.records.signals):
             names = set(block.model.values)
@@ -253,7 +256,7 @@ class _Plan:
             driven.append(self._bench.driven(block, list(dict.fromkeys(free))))
         return made_ready(hypothesis, self._bench, driven, self._noise)
 
-    def limits(self) -> Limits:
+    def limits(self) -> MachineLimits:
         """Return what the records show that the machine has done; declared limits of drives stand first."""
         seen = limits_seen(
             self._bench.records.records,
@@ -268,24 +271,23 @@ class _Plan:
         records = self._bench.records.records
         step = float(np.median([r.step for r in records]))
         long = duration or max(float(r.trace.time[-1] - r.trace.time[0]) for r in records)
-        times: Array = np.arange(max(round(long / step), 1) + 1) * step
-        return times
+        return np.asarray(np.arange(max(round(long / step), 1) + 1) * step, dtype=np.float64)
 
-    def judged(self, time: Array, command: Command, limits: Limits) -> _Judged | None:
+    def judged(self, time: Array, command: Command, limits: MachineLimits) -> _Judged | None:
         """Return how well a candidate tells the hypotheses apart; nothing where it leaves the limits."""
         try:
-            record = self._rig.record(time, self.commanded, command.value)
+            record = self._machine.record(time, self.commanded, command.value)
             if not _inside(record, limits):
                 return None
             floors = self._floors(record)
-            said = [r.responses(record, floors) for r in self._rivals]
+            answers = [r.responses(record, floors) for r in self._rivals]
         except ConvergenceError:
             return None
         separations = []
         for i, j in itertools.combinations(range(len(self._rivals)), 2):
             ways = (
-                apart(said[i], said[j][0], self._rivals[j], self._noise),
-                apart(said[j], said[i][0], self._rivals[i], self._noise),
+                apart(answers[i], answers[j][0], self._rivals[j], self._noise),
+                apart(answers[j], answers[i][0], self._rivals[i], self._noise),
             )
             squares = 0.5 * (ways[0].squares + ways[1].squares)
             clearer = max(ways, key=lambda a: a.squares)
@@ -336,7 +338,7 @@ def _usual(measured: MeasuredSignals) -> str:
     return named[0]
 
 
-def _inside(record: Record, limits: Limits) -> bool:
+def _inside(record: Record, limits: MachineLimits) -> bool:
     trace = record.trace
     drives = all(float(np.max(np.abs(trace[n]))) <= _REACH * most for n, most in limits.drive)
     return drives and all(

@@ -46,7 +46,7 @@ _OUTLYING_SLOPE = 1e3
 tells hypotheses apart by chance alone."""
 
 
-class Response(NamedTuple):
+class BlockResponse(NamedTuple):
     """Residual of a block in units of the noise, shape (rows,), and slopes in the fitted scale."""
 
     residual: Array
@@ -55,7 +55,7 @@ class Response(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class ReadyHypothesis:
     """A hypothesis made ready to be evaluated on records that were not measured yet.
 
     Parameters
@@ -78,7 +78,7 @@ class Rival:
     information: Mapping[str, Array]
     values: tuple[Values, ...]
 
-    def responses(self, record: Record, floors: Mapping[str, Floor]) -> list[dict[str, Response]]:
+    def responses(self, record: Record, floors: Mapping[str, Floor]) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of the numbers that the hypothesis may have.
 
         Parameters
@@ -92,7 +92,7 @@ class Rival:
 
     def at(
         self, record: Record, floors: Mapping[str, Floor], values: Sequence[Values]
-    ) -> list[dict[str, Response]]:
+    ) -> list[dict[str, BlockResponse]]:
         """Return what each block says of a record, for each of some numbers.
 
         Parameters
@@ -102,13 +102,13 @@ class Rival:
         values
             Free numbers by name.
         """
-        result: list[dict[str, Response]] = [{} for _ in values]
+        result: list[dict[str, BlockResponse]] = [{} for _ in values]
         for driven in self.driven:
             name = driven.block.name
             if name not in floors:
                 continue
             evidence = Evidence(driven, record, floors[name], driven.samples(record, values[0]))
-            known: dict[tuple[float, ...], Response] = {}
+            known: dict[tuple[float, ...], BlockResponse] = {}
             for each, own in zip(result, values, strict=True):
                 key = tuple(own[n] for n in driven.free)
                 if key not in known:
@@ -116,7 +116,7 @@ class Rival:
                 each[name] = known[key]
         return result
 
-    def _response(self, evidence: Evidence, values: Values) -> Response:
+    def _response(self, evidence: Evidence, values: Values) -> BlockResponse:
         driven = evidence.driven
         residual, slope = evidence.residual(values)
         free = self.parameters.get(driven.block.name, ())
@@ -126,10 +126,12 @@ class Rival:
             if number in place:
                 k = place[number]
                 wide[:, k] = slope[:, j] * free[k].slope(values[number])
-        return Response(residual, wide, driven)
+        return BlockResponse(residual, wide, driven)
 
 
-def made_ready(hypothesis: Hypothesis, bench: Bench, driven: Sequence[DrivenBlock], noise: Values) -> Rival:
+def made_ready(
+    hypothesis: Hypothesis, bench: Bench, driven: Sequence[DrivenBlock], noise: Values
+) -> ReadyHypothesis:
     """Return a hypothesis ready to be evaluated, with the numbers that the records leave possible.
 
     Parameters
@@ -150,7 +152,7 @@ def made_ready(hypothesis: Hypothesis, bench: Bench, driven: Sequence[DrivenBloc
             parameters[name], information[name] = fit.parameters, matrix
     declared = {n: v for each in driven for n, v in each.block.model.values.items()}
     centre = {**declared, **hypothesis.values}
-    alone = Rival(hypothesis, tuple(driven), parameters, information, (centre,))
+    alone = ReadyHypothesis(hypothesis, tuple(driven), parameters, information, (centre,))
     others = [v for fit in hypothesis.fits.values() for v in _as_good(alone, bench, noise, fit)]
     return replace(alone, values=(centre, *others))
 
@@ -166,11 +168,11 @@ def _information(fit: Fit) -> Array:
     if not fit.parameters:
         return np.zeros((0, 0))
     low, high = _box(fit.parameters)
-    inverse: Array = np.linalg.pinv(fit.covariance, rcond=1e-12, hermitian=True)
-    return inverse + np.diag((0.5 * (high - low)) ** -2.0)
+    inverse = np.linalg.pinv(fit.covariance, rcond=1e-12, hermitian=True)
+    return np.asarray(inverse + np.diag((0.5 * (high - low)) ** -2.0), dtype=np.float64)
 
 
-def _as_good(rival: Rival, bench: Bench, noise: Values, fit: Fit) -> list[Values]:
+def _as_good(rival: ReadyHypothesis, bench: Bench, noise: Values, fit: Fit) -> list[Values]:
     """Return numbers elsewhere in their bounds that explain the records so far as well.
 
     The numbers that an effect has brought and the records leave open are put all over their bounds, all
@@ -234,7 +236,9 @@ class _Total:
     matrix: Array
 
     @classmethod
-    def of(cls, rival: Rival, bench: Bench, noise: Values, blocks: set[str], values: Values) -> _Total:
+    def of(
+        cls, rival: ReadyHypothesis, bench: Bench, noise: Values, blocks: set[str], values: Values
+    ) -> _Total:
         """Return it for some numbers; an infinite sum where there is no response."""
         parameters = rival.parameters[next(iter(blocks))]
         deviations = [
@@ -247,10 +251,10 @@ class _Total:
         for record in bench.records.of("fit"):
             floors = {b: f for (b, n), f in bench.floors.items() if n == record.name and b in blocks}
             try:
-                (said,) = rival.at(record, floors, [values])
+                (answers,) = rival.at(record, floors, [values])
             except ConvergenceError:
                 return cls(math.inf, gradient, matrix)
-            for name, response in said.items():
+            for name, response in answers.items():
                 total += float(response.residual @ response.residual) / noise[name]
                 gradient = gradient + response.slope.T @ response.residual / noise[name]
                 matrix = matrix + response.slope.T @ response.slope / noise[name]
@@ -276,7 +280,10 @@ class Apart(NamedTuple):
 
 
 def apart(
-    one: Sequence[Mapping[str, Response]], other: Mapping[str, Response], rival: Rival, noise: Values
+    one: Sequence[Mapping[str, BlockResponse]],
+    other: Mapping[str, BlockResponse],
+    rival: ReadyHypothesis,
+    noise: Values,
 ) -> Apart:
     """Return how badly a hypothesis would explain what another one leaves, when it is refitted.
 
@@ -295,7 +302,12 @@ def apart(
     return Apart(float(np.expm1(np.mean([np.log1p(a.squares) for a in results]))), best.block, best.row)
 
 
-def _once(one: Mapping[str, Response], other: Mapping[str, Response], rival: Rival, noise: Values) -> Apart:
+def _once(
+    one: Mapping[str, BlockResponse],
+    other: Mapping[str, BlockResponse],
+    rival: ReadyHypothesis,
+    noise: Values,
+) -> Apart:
     names = [n for n in one if n in other]
     groups: dict[int, list[str]] = {}
     for name in names:
@@ -306,9 +318,9 @@ def _once(one: Mapping[str, Response], other: Mapping[str, Response], rival: Riv
         for name in members:
             a, b, scale = one[name], other[name], 1.0 / np.sqrt(noise[name])
             delta, slope = (b.residual - a.residual) * scale, b.slope * scale
-            wild = _outlying(a) | _outlying(b)
-            rows.append(np.where(wild, 0.0, delta))
-            slopes.append(np.where(wild[:, None], 0.0, slope))
+            outlying = _outlying(a) | _outlying(b)
+            rows.append(np.where(outlying, 0.0, delta))
+            slopes.append(np.where(outlying[:, None], 0.0, slope))
         delta, slope = np.concatenate(rows), np.vstack(slopes)
         left = delta
         if slope.shape[1]:
@@ -325,7 +337,7 @@ def _once(one: Mapping[str, Response], other: Mapping[str, Response], rival: Riv
     return Apart(total, best.block, best.row)
 
 
-def _outlying(response: Response) -> NDArray[np.bool_]:
+def _outlying(response: BlockResponse) -> NDArray[np.bool_]:
     if not (response.driven.stiff and response.slope.shape[1]):
         return np.zeros(len(response.residual), dtype=bool)
     rows: NDArray[np.bool_] = np.abs(response.slope).max(axis=1) > _OUTLYING_SLOPE

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ...components.assembly.named_parts import Assembly
 from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
-from ...quantity import significant, three_digits, typeset_unit, with_unit
+from ...quantity import significant, three_digits, typeset_unit
 from ..effects.plain_names import capitalised, simpler_forms, title
 from ..selection.search import Skipped
 from .circumstances import DiagnosisRun, settings_of
-from .fitted_numbers import FittedNumber, fitted_numbers
+from .fitted_numbers import fitted_numbers
 from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
 
@@ -136,8 +136,8 @@ class Course:
 
     Parameters
     ----------
-    record, role
-        Which.
+    record
+        Name.
     quantity, unit
         What is shown: a measured signal, or the effort of the drive beside the one that the model needs.
     time
@@ -146,6 +146,8 @@ class Course:
         In the unit, shape (n,) each; the rms of the differences are those of :class:`RecordGap`.
     noise
         Standard deviation of the filtered noise, in the unit.
+    role
+        Of the record.
     """
 
     record: str
@@ -252,16 +254,6 @@ class Verdict:
         return 1.0 - after / before if before > 0.0 else 0.0
 
     @property
-    def assessed(self) -> str:
-        """Role of the records whose error is told: those that no fit has seen, where there are any."""
-        return "held_out" if any(g.role == "held_out" for g in self.gaps if g.block == self.block) else "fit"
-
-    @property
-    def numbers(self) -> tuple[FittedNumber, ...]:
-        """The declared numbers after the refit, with how far each moved."""
-        return fitted_numbers(self.fits)
-
-    @property
     def blocks(self) -> tuple[str, ...]:
         """Names of the blocks."""
         return tuple(dict.fromkeys(g.block for g in self.gaps))
@@ -274,9 +266,9 @@ class Verdict:
         block
             Name; by default that of the summed-up block.
         """
-        name, role = block or self.block, self.assessed
+        name = block or self.block
         own = [g for g in self.gaps if g.block == name]
-        seen = [g for g in own if g.role == role] or own
+        seen = [g for g in own if g.role == "held_out"] or own
         before, after, floor, signal = (
             rms_over(seen, which) for which in ("before", "after", "noise_floor", "signal")
         )
@@ -303,7 +295,7 @@ class Verdict:
                 f"They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
                 "would not show all that could be missing."
             )
-        sentences += [effect.words(self.actuator) + self._richer(effect) for effect in self.effects]
+        sentences += [effect.words(self.actuator) + _why_richer(self, effect) for effect in self.effects]
         if self.effects and not self.complete:
             sentences.append(
                 "That is not all: an error beyond the noise is left, for which there is no name."
@@ -326,31 +318,9 @@ class Verdict:
             alone = (
                 f"{title(name)} alone explains {three_digits(100.0 * share)} % of the excess over the noise"
             )
-            reason = why[0] if why else self._why_not(name, named)
+            reason = why[0] if why else _why_not(self, name, named)
             sentences.append(f"{capitalised(alone)}: {reason}.")
         return tuple(sentences)
-
-    def _why_not(self, name: str, named: Collection[str]) -> str:
-        nested = [simple for simple in simpler_forms(self.declared, name) if simple in named]
-        if nested:
-            return f"{title(nested[0])}, its simpler form, predicts as well"
-        return "what was named accounts for it" if named and self.complete else _NOT_NAMED
-
-    def _richer(self, effect: NamedEffect) -> str:
-        """Return why an effect was named and not its simpler form, from what each explains alone."""
-        shares = {name: share for name, share, *_ in self.runners_up}
-        simple = next((s for s in simpler_forms(self.declared, effect.name) if s in shares), None)
-        if simple is None or effect.name not in shares:
-            return ""
-        left, own = (three_digits(100.0 * (1.0 - shares[n])) for n in (simple, effect.name))
-        return (
-            f" {capitalised(title(simple))}, its simpler form, alone leaves {left} % of the excess over the "
-            f"noise, {title(effect.name)} {own} %."
-        )
-
-    def skipped_words(self) -> tuple[str, ...]:
-        """Return a sentence for each effect that was left out of the comparison."""
-        return tuple(f"not compared: {each}" for each in self.skipped)
 
     def to_dict(self, model: str = "model.toml") -> dict[str, Any]:
         """Return the content of ``verdict.json``.
@@ -392,7 +362,7 @@ class Verdict:
             "remarks": list(self.remarks),
             "unidentified": list(self.unidentified),
             "next": list(self.next_steps),
-            "numbers": [n._asdict() for n in self.numbers],
+            "numbers": [n._asdict() for n in fitted_numbers(self.fits)],
             "criteria": {
                 each.name: {"value": each.value, "meaning": each.meaning}
                 for each in settings_of(self.criteria)
@@ -402,20 +372,6 @@ class Verdict:
         }
         written: dict[str, Any] = _rounded(content, 9)
         return written
-
-    def rows(self) -> Sequence[tuple[str, ...]]:
-        """Return a table of the gap: block, record, role, before, after, noise floor."""
-        return [
-            (
-                g.block,
-                g.record,
-                g.role,
-                with_unit(f"{g.before:.3g}", g.unit),
-                with_unit(f"{g.after:.3g}", g.unit),
-                with_unit(f"{g.noise_floor:.3g}", g.unit),
-            )
-            for g in self.gaps
-        ]
 
     def __str__(self) -> str:
         return "\n".join(
@@ -427,10 +383,30 @@ class Verdict:
                 *self.findings,
                 *(self.tried_words() if self.verdict != "named" or not self.complete else ()),
                 *self.remarks,
-                *self.skipped_words(),
+                *(f"not compared: {each}" for each in self.skipped),
                 *self.next_steps,
             ]
         )
+
+
+def _why_not(verdict: Verdict, name: str, named: Collection[str]) -> str:
+    nested = [simple for simple in simpler_forms(verdict.declared, name) if simple in named]
+    if nested:
+        return f"{title(nested[0])}, its simpler form, predicts as well"
+    return "what was named accounts for it" if named and verdict.complete else _NOT_NAMED
+
+
+def _why_richer(verdict: Verdict, effect: NamedEffect) -> str:
+    """Return why an effect was named and not its simpler form, from what each explains alone."""
+    shares = {name: share for name, share, *_ in verdict.runners_up}
+    simple = next((s for s in simpler_forms(verdict.declared, effect.name) if s in shares), None)
+    if simple is None or effect.name not in shares:
+        return ""
+    left, own = (three_digits(100.0 * (1.0 - shares[n])) for n in (simple, effect.name))
+    return (
+        f" {capitalised(title(simple))}, its simpler form, alone leaves {left} % of the excess over the "
+        f"noise, {title(effect.name)} {own} %."
+    )
 
 
 def rms_over(gaps: Sequence[RecordGap], which: str) -> float:

@@ -25,6 +25,7 @@ from ..blocks.tearing import blocks_of
 from ..effects.candidate import Candidate, Unknown
 from .hypothesis import Hypothesis
 from .hypothesis_fit import FreeBlock, HypothesisFit
+from .prediction import Folds, by_pieces, by_records
 
 Array = NDArray[np.float64]
 
@@ -199,10 +200,22 @@ class Comparison:
         hypothesis
             Fitted.
         """
+        return self._rejudged(replace(hypothesis, coarse=False), by_pieces)
+
+    def without_whole_records(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis with what it leaves over on each record when that is left out.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted.
+        """
+        return self._rejudged(hypothesis, by_records)
+
+    def _rejudged(self, hypothesis: Hypothesis, folds: Folds) -> Hypothesis:
         groups = self._groups(hypothesis)
-        results = parallel_map(lambda k: self._fit.judged(hypothesis, groups[k]), len(groups))
-        tallies = {key: tally for result in results for key, tally in result.items()}
-        return replace(hypothesis.judged_by(tallies), coarse=False)
+        results = parallel_map(lambda k: self._fit.judged(hypothesis, groups[k], folds), len(groups))
+        return hypothesis.judged_by({key: tally for result in results for key, tally in result.items()})
 
     def judged(self, hypothesis: Hypothesis) -> tuple[Judged, ...]:
         """Return what all records say about all blocks of a hypothesis, on all samples.

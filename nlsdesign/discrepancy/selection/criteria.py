@@ -9,7 +9,7 @@ An effect may be named if
  1. it explains a share of the excess that is left in some open block, and more than noise explains;
  2. that gain in prediction does not rest on a single piece of a record;
  3. its numbers exclude "no effect", are known, and stand off the bounds of their search;
- 4. no record is predicted worse than without it.
+ 4. no record is predicted worse than without it, and records left out as a whole are predicted better.
 Of several such effects the one that predicts best is taken, unless a simpler one predicts about as well.
 """
 
@@ -321,6 +321,22 @@ def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:
         From one hypothesis to another.
     """
     return gained.rest >= criteria.noise_margin
+
+
+def predicts_records(criteria: Criteria, before: Excesses, after: Excesses) -> bool:
+    """Tell whether whole records are predicted better with an effect, its numbers fitted to the others.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    before, after
+        Of the hypotheses without and with the effect, each record with the numbers of the others. Nothing is
+        asked where only declared numbers are open.
+    """
+    if not any(one.open for name, one in before.items() if name != DECLARED):
+        return True
+    return gain(before, after).value >= criteria.noise_margin
 
 
 def records_made_worse(criteria: Criteria, before: Excesses, after: Excesses) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ...errors import ConvergenceError
@@ -17,7 +17,7 @@ from ..effects.candidate import Unknown
 from ..fitting.strategies import FitProblem, Plain, Start, method_for, refusal
 from ..fitting.unpredictable import Key, Tally
 from .hypothesis import Hypothesis
-from .prediction import tallies_of
+from .prediction import Folds, by_pieces, tallies_of
 
 
 class FreeBlock(NamedTuple):
@@ -98,19 +98,22 @@ class HypothesisFit:
             return error
         return GroupFit(best, tallies, problem.has_free_flight, aside)
 
-    def judged(self, hypothesis: Hypothesis, group: Sequence[FreeBlock]) -> Mapping[Key, Tally]:
-        """Return what a hypothesis leaves over on all samples, its numbers as they are.
+    def judged(
+        self, hypothesis: Hypothesis, group: Sequence[FreeBlock], folds: Folds = by_pieces
+    ) -> Mapping[Key, Tally]:
+        """Return what a hypothesis leaves over, its numbers as they are.
 
         Parameters
         ----------
         hypothesis
-            Fitted, coarsely or not.
+            Fitted; on thinned records where it is coarse.
         group
             Blocks that share free numbers.
+        folds
+            What is left out in turn.
         """
         names = tuple(each.block.name for each in group)
-        problem = self._problem(replace(hypothesis, coarse=False), group, ())
-        return _tallies(problem, hypothesis.fits[names])
+        return _tallies(self._problem(hypothesis, group, ()), hypothesis.fits[names], folds)
 
     def _problem(
         self, hypothesis: Hypothesis, group: Sequence[FreeBlock], new: Sequence[Unknown]
@@ -174,6 +177,6 @@ class HypothesisFit:
         )
 
 
-def _tallies(problem: FitProblem, best: Fit) -> dict[Key, Tally]:
-    # Behind a free flight a slope holds at its point only, so no step without a record can be taken.
-    return tallies_of(problem.evidence, best, leave_out=not problem.has_free_flight)
+def _tallies(problem: FitProblem, best: Fit, folds: Folds = by_pieces) -> dict[Key, Tally]:
+    # Behind a free flight a slope holds at its point only, so no step without a fold can be taken.
+    return tallies_of(problem.evidence, best, None if problem.has_free_flight else folds)

@@ -4,14 +4,17 @@ Each record is cut into pieces in time, and the pieces are dealt out to folds, s
 of every record. Each fold in turn is left out; the numbers that the others would give follow from the optimum
 by one Gauss–Newton step without that fold, inside the bounds (approximate leave-one-out, Beirami et al. 2017,
 with pieces of records in place of samples, as Burman et al. 1994 ask for where samples are dependent). The
-fold is then predicted with those numbers, exactly. Whole records are not left out: of six motions of six
-kinds, five rarely identify what the sixth shows, and the models that leave it out would be rewarded.
+fold is then predicted with those numbers, exactly.
+
+By pieces hypotheses are compared. Leaving whole records out asks more: of six motions of six kinds five may
+not identify what the sixth shows, so it would choose the models that leave that out. But an effect that does
+not predict whole records at all describes the records it was fitted to and nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +47,42 @@ class _Piece(NamedTuple):
     fold: NDArray[np.int64]
 
 
-def tallies_of(evidence: Sequence[Evidence], best: Fit, *, leave_out: bool) -> dict[Key, Tally]:
+Folds: TypeAlias = Callable[[Sequence[Evidence]], list[NDArray[np.int64]]]
+"""From evidence to the fold of each of its rows; below zero for rows that no fit has seen."""
+
+
+def by_pieces(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
+    """Return folds that hold pieces of every record.
+
+    Parameters
+    ----------
+    evidence
+        Of all blocks that share numbers.
+    """
+    folds = []
+    for each in evidence:
+        cuts = [len(part) for part in np.array_split(np.arange(len(each.floor.sigma)), SEGMENTS)]
+        fold = np.repeat(np.arange(SEGMENTS) % _FOLDS, cuts)
+        folds.append(fold if each.record.role == "fit" else np.full_like(fold, -1))
+    return folds
+
+
+def by_records(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
+    """Return folds that are whole records.
+
+    Parameters
+    ----------
+    evidence
+        Of all blocks that share numbers.
+    """
+    names = sorted({e.record.name for e in evidence if e.record.role == "fit"})
+    return [
+        np.full(len(e.floor.sigma), names.index(e.record.name) if e.record.role == "fit" else -1)
+        for e in evidence
+    ]
+
+
+def tallies_of(evidence: Sequence[Evidence], best: Fit, folds: Folds | None) -> dict[Key, Tally]:
     """Return what a fit leaves over on each record, and what it would leave over on a record it has not seen.
 
     Parameters
@@ -53,14 +91,14 @@ def tallies_of(evidence: Sequence[Evidence], best: Fit, *, leave_out: bool) -> d
         Of all blocks that share the numbers, on records for fits and for selection.
     best
         The fitted numbers.
-    leave_out
-        Whether records are left out; otherwise every record is predicted with the numbers as they are.
+    folds
+        What is left out in turn; with ``None`` everything is predicted with the numbers as they are.
     """
     rows = Rows(evidence, best.parameters)
     x = np.array([p.inward(best.values[p.name]) for p in best.parameters])
-    pieces = _pieces(rows, evidence, x)
+    pieces = _pieces(rows, evidence, x, folds)
     predicted = [piece.residual for piece in pieces]
-    if leave_out and len(x):
+    if folds is not None and len(x):
         predicted = _predicted(rows, pieces, x)
     return {
         (p.evidence.driven.block.name, p.evidence.record.name): Tally(
@@ -73,16 +111,9 @@ def tallies_of(evidence: Sequence[Evidence], best: Fit, *, leave_out: bool) -> d
     }
 
 
-def _pieces(rows: Rows, evidence: Sequence[Evidence], x: Array) -> list[_Piece]:
-    pieces = []
-    for each in evidence:
-        residual, slope = rows.of(each, x)
-        cuts = [len(part) for part in np.array_split(residual, SEGMENTS)]
-        fold = np.repeat(np.arange(SEGMENTS) % _FOLDS, cuts)
-        pieces.append(
-            _Piece(each, residual, slope, fold if each.record.role == "fit" else np.full_like(fold, -1))
-        )
-    return pieces
+def _pieces(rows: Rows, evidence: Sequence[Evidence], x: Array, folds: Folds | None) -> list[_Piece]:
+    numbers = folds(evidence) if folds else [np.zeros(len(e.floor.sigma), dtype=np.int64) for e in evidence]
+    return [_Piece(each, *rows.of(each, x), fold) for each, fold in zip(evidence, numbers, strict=True)]
 
 
 def _predicted(rows: Rows, pieces: Sequence[_Piece], x: Array) -> list[Array]:

@@ -29,6 +29,7 @@ from .criteria import (
     is_superfluous,
     lacking,
     objections,
+    predicts_records,
     total_excess,
 )
 from .excess import excesses
@@ -179,6 +180,7 @@ class _Search:
     progress: Callable[[str], None]
     skipped: list[Skipped] = field(default_factory=list)
     tried: tuple[Tried, ...] = ()
+    on_other_records: dict[Hypothesis, Excesses] = field(default_factory=dict)
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.comparison.coarsely(base)
@@ -217,15 +219,13 @@ class _Search:
                 if step is not None:
                     break
             self.tried = self.tried or self._account(present, tried)
-            if step is not None:
-                steps.append(step)
-            elif not steps:
-                # Beside an effect whose form is not exact, any two others would help a little.
-                steps += self._pair(tried, present, open_blocks[0])
-            else:
+            further = [step] if step else []
+            if not steps and not further:
+                # Beside an effect that was named, most of what is left over is the inexactness of its form.
+                further = self._pair(tried, present, open_blocks[0])
+            if not further:
                 break
-            if not steps:
-                break
+            steps += further
             present = steps[-1].chosen
         return steps
 
@@ -259,12 +259,26 @@ class _Search:
 
     def _step(self, present: Hypothesis, fresh: Sequence[Hypothesis], block: str) -> Step | None:
         """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples."""
-        before = self._excesses(present)
-        if before[block].open:
-            return self._chosen(before, {h: self._excesses(h) for h in fresh}, block)
-        best = sorted(fresh, key=lambda h: self._excesses(h)[block].chi2)[:_PAIRED]
-        on_all = {h: self._on_all(h) for h in best}
-        return self._chosen(self._on_all(present), on_all, block)
+        before, left = self._excesses(present), {h: self._excesses(h) for h in fresh}
+        if not before[block].open:
+            best = sorted(fresh, key=lambda h: self._excesses(h)[block].chi2)[:_PAIRED]
+            before, left = self._on_all(present), {h: self._on_all(h) for h in best}
+        while step := self._chosen(before, left, block):
+            if self._predicts_records(present, step.chosen):
+                return step
+            del left[step.chosen]
+        return None
+
+    def _predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
+        """Tell whether an effect predicts whole records that its numbers were not fitted to."""
+        before, after = self._on_other_records(present), self._on_other_records(chosen)
+        return predicts_records(self.criteria, before, after)
+
+    def _on_other_records(self, hypothesis: Hypothesis) -> Excesses:
+        if hypothesis not in self.on_other_records:
+            again = self.comparison.without_whole_records(hypothesis)
+            self.on_other_records[hypothesis] = self._excesses(again)
+        return self.on_other_records[hypothesis]
 
     def _candidates(self, present: Hypothesis) -> list[Candidate]:
         return [c for effect in self.catalogue for c in effect(present.assembly)]
@@ -367,17 +381,18 @@ class _Search:
 
     def _account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
         """Return how far each effect goes alone and what speaks against it, the best first."""
-        before = self._excesses(present)
-        whole = max(total_excess(before), 1.0)
+        whole = max(total_excess(self._excesses(present)), 1.0)
         every = [
-            Tried(
-                h.newest,
-                1.0 - total_excess(self._excesses(h)) / whole,
-                objections(self.criteria, before, _rival(h, self._excesses(h))),
-            )
+            Tried(h.newest, 1.0 - total_excess(self._excesses(h)) / whole, self._objections(present, h))
             for h in tried
         ]
         return tuple(sorted(every, key=lambda each: -each.share))
+
+    def _objections(self, present: Hypothesis, tried: Hypothesis) -> tuple[str, ...]:
+        words = objections(self.criteria, self._excesses(present), _rival(tried, self._excesses(tried)))
+        if tried in self.on_other_records and not self._predicts_records(present, tried):
+            words = (*words, "it does not predict records that are left out as a whole")
+        return words
 
 
 def _rival(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:

@@ -19,15 +19,19 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _MANY = 0.01
-"""A channel with a larger share of faulty samples is suspect: each takes 41 samples of a filter of 4 with it, so
-a third of the residuals would be lost."""
+"""A channel with a larger share of faulty samples is suspect: each takes 41 samples of a filter of 4 with
+it, so a third of the residuals would be lost."""
 _SHOWN = 3
 _CLIPPED_RUN = 5
 """Smallest number of equal extreme samples that may be clipping."""
 _APPROACH, _MISSING_COUNTS = 3, 3.0
 """Samples before and after a run from which its slope is taken, and the missing peak height in counts."""
-_MOVES = 10.0
-"""A channel moves where its range is so many times its noise and its count."""
+_MOVES, _DRIFT = 10.0, 3.0
+"""A channel moves where its range is so many times its noise and its count; it goes on over a few samples
+where means of a third of them differ by so many times their noise, and its count."""
+_FASTEST, _LEAST_PERIOD = 98.0, 20.0
+"""Percentile of the changes that counts as the fastest, and the samples a period below which a rate is lost:
+a central difference over it is 2 % too small."""
 _TURN = {"rad": 2.0 * np.pi, "deg": 360.0}
 
 
@@ -110,6 +114,7 @@ def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_
             rows = rows_in_words(np.arange(len(now)), first_row)
             rests = column.shows_input or _all_rest(others)
             (remarks if rests else findings).append(Finding(f"{place}, {rows}", f"is constant at {now[0]:g}"))
+        remarks += _too_coarse(place, column, now, time)
         for finding, suspect in _clipped(place, column, now, others, first_row):
             (findings if suspect else remarks).append(finding)
     return Checked(values, masked, tuple(findings), tuple(remarks))
@@ -170,6 +175,22 @@ class _Words:
         return rows_in_words(np.arange(group.first, max(group.behind, group.first + 1)), self.first_row)
 
 
+def _too_coarse(place: str, column: Sampled, values: Array, time: Array) -> Iterable[Finding]:
+    """Yield how often a motion would have to be sampled, where that was too seldom for its rates.
+
+    A sine of amplitude A and n samples a period changes by at most 2πA/n from one sample to the next.
+    """
+    fastest = float(np.percentile(np.abs(np.diff(values)), _FASTEST))
+    if not column.motion or fastest <= _DRIFT * max(noise_of(values), quantum_of(values)):
+        return
+    period = np.pi * float(np.ptp(values)) / fastest
+    if period < _LEAST_PERIOD:
+        rate = (len(time) - 1) / float(time[-1] - time[0])
+        wanted = float(f"{rate * _LEAST_PERIOD / period:.2g}")
+        text = f"has about {period:.2g} samples a period where it is fastest, too few for its rates"
+        yield Finding(place, f"{text}: record at {wanted:g} Hz or more")
+
+
 def _all_rest(others: Sequence[Witness]) -> bool:
     return bool(others) and not any(_moves(each.values) for each in others)
 
@@ -207,10 +228,9 @@ def _clipped(
 
 def _changes(values: Array, run: NDArray[np.intp]) -> bool:
     """Tell whether a channel goes on while another one rests: by more than its noise and counts."""
-    inside = values[run[0] : run[-1] + 1]
-    third = max(len(inside) // 3, 1)
-    drift = abs(float(np.mean(inside[-third:]) - np.mean(inside[:third])))
-    return drift > 2.0 * max(noise_of(values) / np.sqrt(third), quantum_of(values))
+    thirds = np.array_split(values[run[0] : run[-1] + 1], 3)
+    changes = float(np.ptp([part.mean() for part in thirds]))
+    return changes > _DRIFT * max(noise_of(values) / np.sqrt(len(thirds[-1])), quantum_of(values))
 
 
 def _cut_off(values: Array, run: NDArray[np.intp]) -> bool:

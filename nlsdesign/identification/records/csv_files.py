@@ -1,4 +1,4 @@
-"""Tables from text: commas, semicolons or tabs between cells, points or commas in numbers, comments on top."""
+"""Tables from text: commas, semicolons or tabs between cells, decimal points or commas, comments on top."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ class CsvTable:
 def read_csv(file: Path) -> CsvTable:
     """Read a text file of numbers.
 
-    Heads stand in the first row that is no comment (``#``, ``%``, ``//``), or in the last comment where numbers
-    follow at once. Below them a row of units may stand. With semicolons or tabs between the cells, numbers
-    may have decimal commas.
+    Heads stand in the first row that is no comment (``#``, ``%``, ``//``), or in the last comment where
+    numbers follow at once. Below them a row of units may stand. With semicolons or tabs between the cells,
+    numbers may have decimal commas.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _uneven(layout: _Layout, row: int, cells: int) -> MeasurementError:
 
 
 def _cell_by_cell(file: Path, layout: _Layout) -> dict[str, Array]:
-    """Return columns of different length, as two clocks side by side give them, or name the cell that is odd."""
+    """Return columns that may end early, as two clocks side by side do, or name the cell that is odd."""
     columns: dict[str, list[float]] = {head: [] for head in layout.heads}
     ended: dict[str, int] = {}
     for row, cells in _rows(file, layout):

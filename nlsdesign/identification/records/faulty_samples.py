@@ -1,10 +1,10 @@
 """Samples that a sensor or a recorder got wrong: spikes, dropouts, stuck values, and jumps of a position.
 
-A group of samples is faulty where it begins and ends abruptly, while the samples on both sides of it lie on one
-cubic from which the group is off by many times their scatter (after Hampel 1974: a robust scale, taken from
-the neighbours). So a step, a jump of stick–slip, the start of a motion or coarse counts are not faults: there
-the two sides do not continue each other, or scatter as much as the group. A change that another channel shows
-at the same time is no fault of a sensor either. All scales come from the channel itself.
+A group of samples is faulty where it begins and ends abruptly, while the samples on both sides of it lie on
+one cubic from which the group is off by many times their scatter (after Hampel 1974: a robust scale, taken
+from the neighbours). So a step, a jump of stick–slip, the start of a motion or coarse counts are not faults:
+there the two sides do not continue each other, or scatter as much as the group. A change that another
+channel shows at the same time is no fault of a sensor either. All scales come from the channel itself.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _SIDE = 12
 """Samples on either side of a group that must continue each other."""
 _LEAST_SIDE = 6
 _NEXT, _SHORT = 2, 3
-"""Samples beside a group that must be good already, and up to which length a cubic bridges it; else a parabola."""
+"""Samples beside a group that must be good, and the length that a cubic bridges; beyond it, a parabola."""
 _ABRUPT, _OFF = 5.0, 8.0
-"""A change between two samples is abrupt, and a group is faulty, beyond so many times the scatter. White noise
-reaches 4.9 once in a million samples."""
+"""A change between two samples is abrupt, and a group is faulty, beyond so many times the scatter. White
+noise reaches 4.9 once in a million samples."""
 _SLOPE_SPAN, _SCATTER_SPAN = 11, 51
 """Samples over which the usual change between samples, and the scatter of the changes, are taken."""
 _TO_DEVIATION = 1.4826
@@ -41,8 +41,8 @@ _TAIL = 1.96 * _TO_DEVIATION
 _SHARE_OF_RANGE = 1e-4
 """Scatter is taken to be at least this share of the range: smaller faults do not matter."""
 _MEDIAN_SPAN, _LONG_TAIL, _HALF_WAY = 5, 2, 2e-5
-"""Faults are extremes of the channel itself where so many times more samples are half as far from the median of
-their neighbours. White noise has this share of samples at half of the least fault."""
+"""Faults are extremes of the channel itself where so many times more samples are half as far from the median
+of their neighbours. White noise has this share of samples at half of the least fault."""
 _BUSY = 0.05
 """Where a larger share of all changes is abrupt, this is how the channel moves."""
 _COMMAND = 3
@@ -50,8 +50,8 @@ _COMMAND = 3
 _CHANCE = 1e-4
 """Largest expected number of runs of equal values, as long, that chance would leave in the record."""
 _FREE_SIGNS = 0.6
-"""Share of fourth differences that turn the sign, from which on a channel is noise about a slower course: 0.80 for
-white noise, 0 for a smooth motion."""
+"""Share of fourth differences that turn the sign, from which on a channel is noise about a slower course:
+0.80 for white noise, 0 for a smooth motion."""
 _JUMP, _JUMP_OVER_ALL = 10.0, 3.0
 """A position jumps where it changes by more than these times the largest change nearby, and anywhere else."""
 _CONFIRMS = 4.0
@@ -94,13 +94,13 @@ class Witness:
     @cached_property
     def least(self) -> float:
         """Scatter that its samples have at least."""
-        return _least_scatter(self.values)
+        return max(noise_of(self.values), quantum_of(self.values))
 
     def turns(self, first: int, behind: int, reach: int) -> bool:
         """Tell whether it changes its course where a group is.
 
-        Then its samples around the group are better described by two parabolas, one before and one behind, than
-        by one polynomial of as many coefficients over both.
+        Then its samples around the group are better described by two parabolas, one before and one behind,
+        than by one polynomial of as many coefficients over both.
 
         Parameters
         ----------
@@ -164,8 +164,9 @@ def faulty_groups(values: Array, around: Surroundings) -> list[Group]:
 def repaired(values: Array, groups: Sequence[Group]) -> tuple[Array, Mask]:
     """Return the channel with faulty samples interpolated, and which these are.
 
-    A cubic through the good samples on both sides is put in; at an end of the record, and in a group longer than
-    :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as it is.
+    A cubic through the good samples on both sides is put in; at an end of the record, and in a group longer
+    than :data:`LONGEST`, a straight line between the nearest good samples. What is behind a jump is left as
+    it is.
 
     Parameters
     ----------
@@ -264,7 +265,7 @@ def _least_scatter(values: Array) -> float:
 
 
 def _count(values: Array) -> float:
-    """Return the usual smallest change: the count where there is one, also behind a jump by a part of a count."""
+    """Return the usual smallest change: the count, if there is one, also behind a jump by a part of it."""
     changes = np.abs(np.diff(values))
     changes = changes[changes > 0.0]
     return float(np.percentile(changes, 5.0)) if len(changes) else 0.0
@@ -296,8 +297,8 @@ def _excursions(scatter: _Scatter, around: Surroundings) -> list[Group]:
 def _standing_clear(scatter: _Scatter, groups: list[Group]) -> list[Group]:
     """Leave out groups that are only the far end of a distribution with long tails.
 
-    Where faults are the extremes of what the channel does anyway, more samples are off by a half of the smallest of
-    them than by all of it.
+    Where faults are the extremes of what the channel does anyway, more samples are off by a half of the
+    smallest of them than by all of it.
     """
     if not groups:
         return groups
@@ -331,13 +332,17 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
     if noise_of(values) < 2.0 * _count(values):
         return
     extremes = float(values.min()), float(values.max())
+    abrupt = _JUMP * max(noise_of(values), float(np.median(np.abs(np.diff(values)))))
     equal = np.diff(values) == 0.0
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]])))
     starts, ends = bounds[::2], bounds[1::2] + 1
     long = ends - starts >= 4
     usual = (np.sum(equal) - np.sum((ends - starts - 1)[long])) / len(equal)
     for first, behind in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
-        if values[first] in extremes:
+        at_an_end = first == 0 or behind == len(values)
+        pairs = () if at_an_end else ((first - 1, first), (behind - 1, behind))
+        ends = [float(abs(values[b] - values[a])) for a, b in pairs] or [0.0]
+        if values[first] in extremes and min(ends) < abrupt:
             continue  # it may be clipped, or slack
         length = behind - first
         span = max(_SCATTER_SPAN, 2 * length)
@@ -348,8 +353,7 @@ def _stuck(values: Array, around: Surroundings) -> Iterator[Group]:
         sides = values[max(first - span, 0) : first + 1], values[behind - 1 : behind + span]
         goes_on = not around.others or any(np.ptp(each.values[first:behind]) > 0.0 for each in around.others)
         if goes_on and all(_is_noise(side) for side in sides):
-            size = float(max(abs(values[behind] - values[first]), abs(values[first - 1] - values[first])))
-            yield Group(first, behind, "stuck", size)
+            yield Group(first, behind, "stuck", max(ends))
 
 
 def _is_noise(side: Array) -> bool:
@@ -366,9 +370,9 @@ def _jumps(scatter: _Scatter, groups: Sequence[Group], around: Surroundings) -> 
         near = rest[max(edge - _SIDE, 0) : edge + _SIDE + 1]
         least = max(_JUMP * max(float(near.max()), scatter.least), _JUMP_OVER_ALL * float(rest.max()))
         group = Group(edge + 1, edge + 1, "jump", float(scatter.changes[edge]))
-        if size[edge] > least and not any(g.first - 1 <= edge <= g.behind for g in groups):
-            if not _confirmed(edge + 1, edge + 1, around.others):
-                yield group
+        known = any(g.first - 1 <= edge <= g.behind for g in groups)
+        if size[edge] > least and not known and not _confirmed(edge + 1, edge + 1, around.others):
+            yield group
 
 
 def _overlaps(group: Group, groups: Sequence[Group]) -> bool:

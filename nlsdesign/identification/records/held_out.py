@@ -1,4 +1,4 @@
-"""Which records to hold out where nobody says: those that the others surround, whatever the files are called."""
+"""Which records to hold out by default: those most like another one, whatever the files are called."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _PER_SIGNAL = 4
 _LAGS = 100
 """Rates are taken over this part of the shortest record, where noise counts little."""
 _DIGITS = 9
-"""Depths that agree to so many digits are equal: they must not depend on the order of a sum."""
+"""Distances that agree to so many digits are equal: they must not depend on the order of a sum."""
 
 
 def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     """Return the indices of records to hold out: a third, rounded, and at least one of two.
 
-    A record is described by its length and, for every signal, by its smallest and largest value, its usual rate,
-    and how unevenly it moves: the root mean square of the rate over its mean size, large where motion alternates
-    with rest.
-    Held out, one after the other, is the record that lies deepest inside the range of those that are left, so that
-    it is predicted by interpolation. Among equals it is the one of the smallest motion.
+    A record is described by its length and, for every signal, by its smallest and largest value, its usual
+    rate, and how unevenly it moves: the root mean square of the rate over its mean size, large where motion
+    alternates with rest. Held out, one after the other, is a record of the pair that is most alike among those
+    that are left, so that fits keep every kind of motion: the one nearer to the middle of the range of all, so
+    that it is predicted by interpolation, and among equals the one of the smaller motion.
 
     Parameters
     ----------
@@ -40,8 +40,10 @@ def surrounded(traces: Sequence[Trace]) -> tuple[int, ...]:
     left = list(range(len(traces)))
     chosen: list[int] = []
     while len(chosen) < (len(traces) + 1) // _SHARE:
-        depth = dict(zip(left, _depth(marks[left]), strict=True))
-        best = min(left, key=lambda k: (-depth[k], _extent(marks, k), content_digest(traces[k])))
+        distance = dict(zip(left, _distance(marks[left]), strict=True))
+        apart = dict(zip(left, _to_nearest(marks[left]), strict=True))
+        rank = {k: (apart[k], distance[k], _extent(marks, k), content_digest(traces[k])) for k in left}
+        best = min(left, key=rank.__getitem__)
         chosen.append(best)
         left.remove(best)
     return tuple(sorted(chosen))
@@ -83,11 +85,24 @@ def _log(value: float) -> float:
     return float(np.log(max(value, 1e-300)))
 
 
-def _depth(marks: Array) -> list[float]:
-    """Return how deep each record lies inside the range of all, from 0 at its edge to 1/2, mean over the marks."""
+def _distance(marks: Array) -> list[float]:
+    """Return how far each record lies from the middle of the range of all.
+
+    The mean fourth power over the marks: a record that is extreme in one of them is outside, whatever the
+    others.
+    """
     low, high = marks.min(axis=0), marks.max(axis=0)
     share = (marks - low) / np.where(high > low, high - low, 1.0)
-    return [round(float(d), _DIGITS) for d in np.mean(np.minimum(share, 1.0 - share), axis=1)]
+    return [round(float(d), _DIGITS) for d in np.mean((share - 0.5) ** 4, axis=1)]
+
+
+def _to_nearest(marks: Array) -> list[float]:
+    """Return the distance of each record to the one most like it, marks counted in their ranges."""
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    share = (marks - low) / np.where(high > low, high - low, 1.0)
+    apart = np.sqrt(np.mean((share[:, None] - share[None]) ** 2, axis=2))
+    np.fill_diagonal(apart, np.inf)
+    return [round(float(d), _DIGITS) for d in apart.min(axis=1)]
 
 
 def _extent(marks: Array, row: int) -> float:

@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 _YEAR = 3.16e7
 _SINCE_1970, _NO_TIME = 1e8, 1e11
-"""A clock that begins later than this, in s, counts from 1970; beyond the second its unit must be another one."""
+"""A clock that begins later than this, in s, counts from 1970; beyond the second it has another unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,9 @@ def _from_zero(table: RecordTable, mapping: ColumnMap) -> tuple[RecordTable, str
     if first * factor < _SINCE_1970:
         return table, ""
     shifted = {name: table.given[name] - first for name in clocks}
-    return replace(table, given={**table.given, **shifted}), f" (time counted from {first:.9g})"
+    return replace(
+        table, given={**table.given, **shifted}
+    ), f" (time counted from {first:.15g} {mapping.time.unit})"
 
 
 def _checked(table: RecordTable, mapping: ColumnMap) -> Checked:

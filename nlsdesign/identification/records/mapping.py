@@ -13,9 +13,12 @@ from ...errors import MeasurementError, UnitError, nearest
 from ...model import FlatModel
 from ...model.readings import reading_of
 from ...quantity import parse_unit, same_dimension, typeset_unit
+from .toml_fields import globs_at, number_at, table_at, text_at
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 _TIME_NAMES = ("t", "time")
+_FASTEST = 1e6
+"""Highest rate in Hz of a common clock: beyond it a record of minutes does not fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -205,27 +208,46 @@ def read_mapping(path: Path) -> ColumnMap:
     """
     try:
         tables = tomllib.loads(path.read_text(encoding="utf8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: bad TOML, or no text in UTF-8
         raise MeasurementError(path.name, f"cannot be read as a mapping: {error}") from None
     known = ("time", "columns", "held_out", "selection", "held_out_after", "resample_Hz", "align")
     _check_fields(path.name, tables, known)
-    columns = tuple(_mapped(path, head, table) for head, table in tables.get("columns", {}).items())
-    time = tables.get("time", {"column": "t_s"})
+    given = table_at(path.name, "columns", tables.get("columns", {}), 'write [columns.<head>] signal = "..."')
+    columns = tuple(_mapped(path, head, table) for head, table in given.items())
     if not columns:
         raise MeasurementError(
             path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."'
         )
     mapping = ColumnMap(
-        Column(str(time.get("column", "t_s")), "time", str(time.get("unit", "s"))),
+        _time(path.name, tables.get("time", {})),
         columns,
-        tuple(tables.get("held_out", ())),
-        tuple(tables.get("selection", ())),
+        globs_at(path.name, "held_out", tables.get("held_out", [])),
+        globs_at(path.name, "selection", tables.get("selection", [])),
         _seconds(f"{path.name}: held_out_after", tables.get("held_out_after")),
         _rate(path.name, tables.get("resample_Hz")),
         tuple(_align(f"{path.name}: align", table) for table in _list_of_tables(path.name, tables)),
     )
     _check_clock(path.name, mapping)
     return mapping
+
+
+def _time(file: str, given: Any) -> Column:
+    table = table_at(file, "time", given, 'write [time] column = "t_ms", unit = "ms"')
+    _check_fields(f"{file}: time", table, ("column", "unit"), ".")
+    head = text_at(f"{file}: time", "column", table.get("column", "t_s"))
+    unit = text_at(f"{file}: time", "unit", table.get("unit", "s"))
+    if not _is_time(unit):
+        raise MeasurementError(
+            f"{file}: time.unit", f"'{unit}' is no unit of time", next_step='write "s", "ms" or "min"'
+        )
+    return Column(head, "time", unit)
+
+
+def _is_time(unit: str) -> bool:
+    try:
+        return same_dimension(unit, "s")
+    except UnitError:
+        return False
 
 
 def _check_fields(where: str, given: Mapping[str, Any], known: Sequence[str], between: str = ": ") -> None:
@@ -240,8 +262,10 @@ def _seconds(where: str, given: Any) -> float | None:
     if given is None:
         return None
     try:
-        return float(given["value"]) * parse_unit(given["unit"]).factor
-    except (KeyError, TypeError, ValueError, UnitError):
+        if not same_dimension(given["unit"], "s"):
+            raise TypeError
+        return number_at(where, "value", given["value"], "") * parse_unit(given["unit"]).factor
+    except (KeyError, TypeError, ValueError, AttributeError, UnitError, MeasurementError):
         field = where.rpartition(" ")[2].rpartition(".")[2]
         raise MeasurementError(
             where, "is not a time", next_step=f'write {field} = {{value = 12.5, unit = "s"}}'
@@ -251,14 +275,14 @@ def _seconds(where: str, given: Any) -> float | None:
 def _rate(file: str, given: Any) -> float | None:
     if given is None:
         return None
-    number = isinstance(given, int | float) and not isinstance(given, bool)
-    if not number or not 0.0 < given < float("inf"):
+    rate = number_at(file, "resample_Hz", given, "write for instance resample_Hz = 500")
+    if not 0.0 < rate <= _FASTEST:
         raise MeasurementError(
             f"{file}: resample_Hz",
-            f"{given!r} is not a rate",
+            f"{given!r} is not a rate between 0 and {_FASTEST:g} Hz",
             next_step="write for instance resample_Hz = 500",
         )
-    return float(given)
+    return rate
 
 
 def _list_of_tables(file: str, tables: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
@@ -277,10 +301,11 @@ def _align(where: str, table: Mapping[str, Any]) -> Align:
     for key in ("column", "to"):
         if not isinstance(table.get(key), str):
             raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "<head of a column>"')
+    own = text_at(where, "time", table.get("time", ""))
     longest = _seconds(f"{where}.longest", table.get("longest"))
     if longest is not None and longest <= 0.0:
         raise MeasurementError(f"{where}.longest", "must be above zero")
-    return Align(table["column"], table["to"], str(table.get("time", "")), longest)
+    return Align(table["column"], table["to"], own, longest)
 
 
 def _check_clock(file: str, mapping: ColumnMap) -> None:
@@ -300,21 +325,32 @@ def _without_rate(where: str, what: str) -> MeasurementError:
     )
 
 
-def _mapped(path: Path, head: str, table: Mapping[str, Any]) -> Column:
+def _mapped(path: Path, head: str, given: Any) -> Column:
     where = f"{path.name}: columns.{head}"
+    way_out = f'write [columns.{head}] signal = "...", unit = "..."'
+    table = table_at(path.name, f"columns.{head}", given, way_out)
     for key in ("signal", "unit"):
         if key not in table:
             raise MeasurementError(where, f"has no {key}", next_step=f'add {key} = "..."')
     _check_fields(where, table, ("signal", "unit", "noise", "quantum", "time"), ".")
+    unit = text_at(where, "unit", table["unit"])
     try:
-        factor = parse_unit(table["unit"]).factor
+        factor = parse_unit(unit).factor
     except UnitError as error:
         raise MeasurementError(
             where, f"{error.thing} {error.rule}", did_you_mean=error.did_you_mean
         ) from None
-    noise, quantum = float(table.get("noise", 0.0)) * factor, float(table.get("quantum", 0.0)) * factor
-    own = str(table.get("time", ""))
-    return Column(head, str(table["signal"]), str(table["unit"]), noise, quantum, own)
+    noise, quantum = (_size(where, key, table.get(key, 0.0)) * factor for key in ("noise", "quantum"))
+    signal, own = text_at(where, "signal", table["signal"]), text_at(where, "time", table.get("time", ""))
+    return Column(head, signal, unit, noise, quantum, own)
+
+
+def _size(where: str, field: str, given: Any) -> float:
+    way_out = f"write {field} = 0.01, in the unit of the file"
+    size = number_at(where, field, given, way_out, ".")
+    if size < 0.0:
+        raise MeasurementError(f"{where}.{field}", f"{given!r} is negative", next_step=way_out)
+    return size
 
 
 def default_mapping(heads: Sequence[str], model: FlatModel, file: str) -> ColumnMap:

@@ -55,8 +55,8 @@ class Record:
     resolution
         Noise and count of signals that were interpolated or filtered; their samples no longer show it.
     masked
-        Samples of a signal that are faulty, shape (n,), by signal: they stand interpolated in the trace, and a
-        residual that depends on one of them does not count.
+        Samples of a signal that are faulty, shape (n,), by signal: they stand interpolated in the trace, and
+        a residual that depends on one of them does not count.
     """
 
     name: str
@@ -284,7 +284,7 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
 
 
 def _table(file: Path, mapping: ColumnMap | None) -> RecordTable:
-    """Return the table of a file; units that stand below its heads become part of them where nothing maps them."""
+    """Return the table of a file; units below its heads become part of them where no mapping names these."""
     table = read_table(file)
     if mapping is not None or not table.units:
         return table
@@ -312,10 +312,8 @@ def _left_out(file: Path) -> Finding:
 
 def _by_default(records: Sequence[Record]) -> Finding:
     held = ", ".join(sorted(r.name for r in records if r.role == "held_out"))
-    return Finding(
-        "records",
-        f"held out by default: {held}, inside the range of the others; to choose, write held_out in records.toml",
-    )
+    text = f"held out by default: {held}, inside the range of the others"
+    return Finding("records", f"{text}; to choose, write held_out in records.toml")
 
 
 def _is_run(heads: Sequence[str], mapping: ColumnMap | None) -> bool:

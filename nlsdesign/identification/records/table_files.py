@@ -112,7 +112,8 @@ def table_files(folder: Path) -> list[Path]:
 def read_table(file: Path) -> RecordTable:
     """Read the columns of one file.
 
-    A CSV file is read by :func:`~.csv_files.read_csv`. In a MAT file every numeric vector is a column, fields of a
+    A CSV file is read by :func:`~.csv_files.read_csv`. In a MAT file every numeric vector is a column,
+    fields of a
     structure under ``structure.field``; in an HDF5 file every numeric vector under its path, ``group/name``.
 
     Parameters

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .limits import Limits
+from .machine_limits import MachineLimits
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def smooth_step(x: Array) -> Array:
     return result
 
 
-def commands(time: Array, rest: float, limits: Limits) -> list[Command]:
+def commands(time: Array, rest: float, limits: MachineLimits) -> list[Command]:
     """Return the candidates.
 
     Parameters
@@ -92,11 +92,12 @@ def commands(time: Array, rest: float, limits: Limits) -> list[Command]:
 class _Family:
     """The candidates of one machine, relative to rest."""
 
-    def __init__(self, time: Array, up: float, down: float, limits: Limits) -> None:
+    def __init__(self, time: Array, up: float, down: float, limits: MachineLimits) -> None:
         self._time, self._up, self._down = time, up, down
         self._speed, self._acceleration = limits.speed, limits.acceleration
         self._duration = float(time[-1] - time[0])
         self._step = self._duration / (len(time) - 1)
+        self._highest = 1.0 / (_SAMPLES_PER_PERIOD * self._step)
         rise = _RISE * self._duration
         self._window = smooth_step(time / rise) * smooth_step((self._duration - time) / rise)
 
@@ -105,52 +106,38 @@ class _Family:
         both = min(self._up, self._down)
         if both >= _SMALL_SIDE * max(self._up, self._down):
             yield from self._about(0.0, both, "")
+            yield "a multisine", self._multisine(both)
+            yield "a sweep of frequency", self._sweep(both)
         for side, size in (("upwards", self._up), ("downwards", -self._down)):
-            yield from self._about(0.5 * size, abs(0.5 * size), f" {side} only")
+            one_sided = abs(size) >= (1.0 - _SMALL_SIDE) * (self._up + self._down)
+            yield from self._about(0.5 * size, abs(0.5 * size), f" {side} only", fewer=not one_sided)
             yield from self._preloaded(size, f" about a preload {side}")
         yield from self._levels()
 
-    def _about(self, centre: float, size: float, where: str) -> Iterator[tuple[str, Array]]:
+    def _about(
+        self, centre: float, size: float, where: str, *, fewer: bool = False
+    ) -> Iterator[tuple[str, Array]]:
         """Yield motions of some size about a centre; a one-sided one begins at its end, at rest."""
         if size <= 0.0:
             return
-        for share in _SIZES if not where else _SIZES[:1]:
-            for frequency in self._frequencies(share * size)[-1 if where else 0 :]:
-                wave = self._wave(frequency, centre != 0.0)
-                words = f"a sine of {self._share(share)}{where} at {frequency:.2g} Hz"
-                yield words, self._window * share * self._placed(centre, size, wave)
-        for slowness in _SLOWNESS[1 if where else 0 :]:
-            wave = self._triangle(slowness * self._speed / size, centre != 0.0)
-            if wave is not None:
-                yield (
-                    f"a ramp to and fro{where} at {100 * slowness:.0f} % of the largest speed",
-                    self._placed(centre, size, wave),
-                )
+        for share in _SIZES[:1] if fewer else _SIZES:
+            for frequency in self._frequencies(share * size)[-1 if fewer else 0 :]:
+                wave = _wave(frequency * self._time, centre != 0.0)
+                words = f"a sine of {_share(share)}{where} at {frequency:.2g} Hz"
+                yield words, self._window * share * _placed(centre, size, wave)
+        for slowness in _SLOWNESS[1 if fewer else 0 :]:
+            rate = slowness * min(self._speed / size, 2.0 * math.pi * self._highest)
+            triangle = self._triangle(rate, centre != 0.0)
+            if triangle is not None:
+                words = f"a ramp to and fro{where} at {100 * slowness:.0f} % of the largest speed"
+                yield words, _placed(centre, size, triangle)
         yield from self._growing(centre, size, where)
-        if not where:
-            yield "a multisine", self._multisine(centre, size)
-            yield "a sweep of frequency", self._sweep(centre, size)
-
-    def _share(self, share: float) -> str:
-        return "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"
-
-    def _placed(self, centre: float, size: float, wave: Array) -> Array:
-        """Return a wave in (−1, 1), or for one side in (0, 2), with its size and the side of its centre."""
-        return (np.sign(centre) or 1.0) * size * wave
-
-    def _wave(self, frequency: float, one_sided: bool) -> Array:
-        turn = 2.0 * np.pi * frequency * self._time
-        wave: Array = 1.0 - np.cos(turn) if one_sided else np.sin(turn)
-        return wave
 
     def _frequencies(self, size: float) -> Array:
         quickest = min(self._speed / size, math.sqrt(self._acceleration / size))
-        highest = min(self._highest(), 0.95 * quickest / (2.0 * np.pi))
+        highest = min(self._highest, 0.95 * quickest / (2.0 * np.pi))
         lowest = min(_PERIODS / self._duration, highest)
         return np.unique(np.geomspace(lowest, highest, _FREQUENCIES))
-
-    def _highest(self) -> float:
-        return 1.0 / (_SAMPLES_PER_PERIOD * self._step)
 
     def _triangle(self, rate: float, one_sided: bool) -> Array | None:
         """Return a rounded triangle of unit size; nothing where it would have no time to move."""
@@ -182,13 +169,13 @@ class _Family:
         kernel = np.hanning(max(3, int(0.04 * len(height)) | 1))
         padded = np.pad(height, len(kernel), mode="edge")
         height = np.convolve(padded, kernel / kernel.sum(), mode="same")[len(kernel) : -len(kernel)]
-        wave = self._wave(frequency, centre != 0.0)
-        shape = 0.98 * self._window * height * self._placed(centre, size, wave)
+        wave = _wave(frequency * self._time, centre != 0.0)
+        shape = 0.98 * self._window * height * _placed(centre, size, wave)
         yield f"slow cycles, small, then large, then small again{where}", shape
 
-    def _multisine(self, centre: float, size: float) -> Array:
+    def _multisine(self, size: float) -> Array:
         """Return tones of falling size, with the phases of Schroeder 1970, so that their peak is low."""
-        frequencies = np.geomspace(_PERIODS / self._duration, 0.5 * self._highest(), _TONES)
+        frequencies = np.geomspace(_PERIODS / self._duration, 0.5 * self._highest, _TONES)
         if np.isfinite(self._speed):
             top = max(4.0 * self._speed / (2.0 * np.pi * size), 2.0 * frequencies[0])
             frequencies = np.geomspace(frequencies[0], min(frequencies[-1], top), _TONES)
@@ -196,21 +183,18 @@ class _Family:
         turns = 2.0 * np.pi * np.outer(frequencies, self._time) + phases[:, None]
         wave = (frequencies[:, None] ** -0.5 * np.sin(turns)).sum(axis=0)
         wave /= np.max(np.abs(wave))
-        if centre != 0.0:
-            wave = 1.0 + wave
-        return self._bounded(self._window * self._placed(centre, size, wave))
+        return self._bounded(self._window * size * wave)
 
-    def _sweep(self, centre: float, size: float) -> Array:
+    def _sweep(self, size: float) -> Array:
         """Return a sine whose frequency grows and whose size falls so that its speed stays."""
-        low, high = _PERIODS / self._duration, 0.5 * self._highest()
+        low, high = _PERIODS / self._duration, 0.5 * self._highest
         rate = np.log(high / low) / self._duration
         frequency = low * np.exp(rate * self._time)
         turns = 2.0 * np.pi * (frequency - low) / rate
         turn = 2.0 * np.pi * frequency
         shrink = np.minimum(1.0, 0.8 * self._speed / (turn * size))
         shrink = np.minimum(shrink, 0.8 * self._acceleration / (turn**2 * size))
-        wave = 1.0 - np.cos(turns) if centre != 0.0 else np.sin(turns)
-        return self._bounded(self._window * self._placed(centre, size, shrink * wave))
+        return self._bounded(self._window * size * shrink * np.sin(turns))
 
     def _preloaded(self, size: float, where: str) -> Iterator[tuple[str, Array]]:
         """Yield small motions about a preload."""
@@ -224,7 +208,7 @@ class _Family:
         if small <= 0.0:
             return
         for frequency in self._frequencies(small)[1:]:
-            wave = self._wave(frequency, False)
+            wave = _wave(frequency * self._time, False)
             yield (
                 f"a small sine{where} at {frequency:.2g} Hz",
                 self._bounded(0.8 * size * rise + small * later * wave),
@@ -253,3 +237,17 @@ class _Family:
         rate = max(float(np.max(np.abs(slope))), 1e-300)
         push = max(float(np.max(np.abs(np.gradient(slope, self._time)))), 1e-300)
         return value * min(1.0, self._speed / rate, self._acceleration / push)
+
+
+def _share(share: float) -> str:
+    return "full travel" if share == 1.0 else f"{100 * share:.0f} % of the travel"
+
+
+def _placed(centre: float, size: float, wave: Array) -> Array:
+    """Return a wave in (−1, 1), or for one side in (0, 2), with its size and the side of its centre."""
+    return (np.sign(centre) or 1.0) * size * wave
+
+
+def _wave(turns: Array, one_sided: bool) -> Array:
+    wave: Array = 1.0 - np.cos(2.0 * np.pi * turns) if one_sided else np.sin(2.0 * np.pi * turns)
+    return wave

@@ -15,7 +15,7 @@ _WIDTH = 4.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class MachineLimits:
     """Bounds of an experiment, in SI.
 
     Parameters
@@ -41,7 +41,7 @@ class Limits:
 
 def limits_seen(
     records: Sequence[Record], commanded: str, *, drives: Sequence[str] = (), motions: Sequence[str] = ()
-) -> Limits:
+) -> MachineLimits:
     """Return as limits what the records show that the machine has done.
 
     Parameters
@@ -69,7 +69,7 @@ def limits_seen(
         return min(float(v.min()) for v in values), max(float(v.max()) for v in values)
 
     others = [m for m in motions if m != commanded]
-    return Limits(
+    return MachineLimits(
         *span(commanded),
         float("inf") if commanded in drives else largest(commanded, 1),
         float("inf") if commanded in drives else largest(commanded, 2),

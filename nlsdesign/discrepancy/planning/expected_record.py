@@ -73,8 +73,41 @@ def measured_signals(model: FlatModel, signals: Sequence[str]) -> MeasuredSignal
     return MeasuredSignals(motions, rates, tuple(drives), tuple(efforts))
 
 
+def check_command(measured: MeasuredSignals, commanded: str) -> None:
+    """Check that all measured signals follow from the commanded one.
+
+    Parameters
+    ----------
+    measured
+        The measured signals.
+    commanded
+        One of them.
+
+    Raises
+    ------
+    MeasurementError
+        If it is neither a motion nor a drive, or another measured motion does not follow from it.
+    """
+    if commanded in measured.drives:
+        return
+    if commanded not in measured.motions:
+        raise MeasurementError(
+            f"commanded signal '{commanded}'",
+            "is neither a measured motion nor a measured drive",
+            next_step="command one of: " + ", ".join([*measured.motions, *measured.drives]),
+        )
+    body = measured.motions[commanded]
+    others = [s for s, b in measured.motions.items() if b != body and not b.prescribed]
+    if others:
+        raise MeasurementError(
+            f"measured motion '{others[0]}'",
+            f"does not follow from '{commanded}' alone",
+            next_step="command a drive",
+        )
+
+
 @dataclass(frozen=True, eq=False)
-class Rig:
+class Machine:
     """What is needed to say which record an experiment would leave.
 
     Parameters
@@ -116,8 +149,6 @@ class Rig:
 
         Raises
         ------
-        MeasurementError
-            If a motion is measured that does not follow from the commanded one.
         ConvergenceError
             If the model cannot be simulated.
         """
@@ -125,7 +156,6 @@ class Rig:
             return self._simulated(time, commanded, value)
         signals = {s: np.full(len(time), v) for s, v in self.rest.items()}
         signals[commanded] = value
-        self._check_motions(commanded)
         body = self.measured.motions[commanded]
         for signal, other in (*self.measured.motions.items(), *self.measured.rates.items()):
             if other == body and signal != commanded:
@@ -141,22 +171,6 @@ class Rig:
         for each in balances:
             self._balance(each, time, signals)
         return self._as_record(time, signals)
-
-    def _check_motions(self, commanded: str) -> None:
-        if commanded not in self.measured.motions:
-            raise MeasurementError(
-                f"commanded signal '{commanded}'",
-                "is neither a measured motion nor a measured drive",
-                next_step="command one of: " + ", ".join([*self.measured.motions, *self.measured.drives]),
-            )
-        body = self.measured.motions[commanded]
-        others = [s for s, b in self.measured.motions.items() if b != body and not b.prescribed]
-        if others:
-            raise MeasurementError(
-                f"measured motion '{others[0]}'",
-                f"does not follow from '{commanded}' alone",
-                next_step="command a drive",
-            )
 
     def _response(self, driven: DrivenBlock, time: Array, signals: Mapping[str, Array]) -> Array:
         record = self._as_record(time, signals)

@@ -114,9 +114,7 @@ class _Form:
         """Return the matrix of squared second differences."""
         count = self.spans + 3
         bend = np.diff(np.eye(count), n=2, axis=0)
-        one = bend.T @ bend
-        result: Array = np.kron(np.eye(self.spring + self.friction), one)
-        return result
+        return np.asarray(np.kron(np.eye(self.spring + self.friction), bend.T @ bend), dtype=np.float64)
 
 
 _FORMS = tuple(
@@ -270,11 +268,11 @@ class _Fold(NamedTuple):
     """Part and rows of it that are left out together."""
 
     part: int
-    rows: Array
+    rows: NDArray[np.intp]
 
 
 def _folds(parts: Sequence[_Part]) -> list[list[_Fold]]:
-    everything = [np.arange(len(p.residual)) for p in parts]
+    everything = [np.arange(len(p.residual), dtype=np.intp) for p in parts]
     if len(parts) >= _LEAST_RECORDS:
         return [[_Fold(k, rows)] for k, rows in enumerate(everything)]
     pieces = [np.array_split(rows, _FOLDS) for rows in everything]
@@ -347,7 +345,7 @@ class _Regression:
         matrix, vector = self._ridge.copy(), np.zeros(len(self._ridge))
         for k, (every, target) in enumerate(zip(self._columns, self._targets, strict=True)):
             keep = np.ones(len(every), dtype=bool)
-            keep[out.get(k, np.zeros(0, dtype=int))] = False
+            keep[out.get(k, np.zeros(0, dtype=np.intp))] = False
             matrix += every[keep].T @ every[keep]
             vector += every[keep].T @ target[keep]
         factor = np.linalg.cholesky(matrix)
@@ -357,14 +355,14 @@ class _Regression:
 
     def squares(self, folds: Sequence[Sequence[_Fold]]) -> Array:
         """Return the sum of squares on each stretch, when its fold was not used."""
-        found = []
+        sums = []
         for fold in folds:
             x = self.solved(fold)
             for part, rows in fold:
                 left = (self._targets[part][rows] - self._columns[part][rows] @ x) ** 2
                 pieces = max(1, _BLOCKS * len(rows) // len(self._targets[part]))
-                found += [float(piece.sum()) for piece in np.array_split(left, pieces)]
-        return np.array(found)
+                sums += [float(piece.sum()) for piece in np.array_split(left, pieces)]
+        return np.array(sums)
 
 
 def _candidate(

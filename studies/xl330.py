@@ -1,0 +1,222 @@
+"""A servo with a weight on its arm: what its linear model lacks, judged by the closed loop at a gain held out.
+
+Twelve logs of a Dynamixel XL330-M288-T, four gains of its position controller and three motions, from the
+public repository Rhoban/bam (Apache-2.0). They are read where they are. The position is simulated from the
+goal alone, over the whole log, with numbers fitted to the logs of the other three gains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+import nlsdesign as nls
+from nlsdesign.components import (
+    Assembly,
+    CommandCompression,
+    CoulombFriction,
+    DriveDelay,
+    LoadFriction,
+    StribeckFriction,
+    tie,
+)
+from nlsdesign.model import FlatModel
+from nlsdesign.quantity import Quantity
+from nlsdesign.report import TableSection
+
+from ._measured import data_folder, write_skipped
+
+Array = NDArray[np.float64]
+
+MAPPING = Path(__file__).with_name("xl330_records.toml")
+GAIN_PER_KP = 8.517 / 400.0  # V/rad for each unit of kp
+CREEP = 0.05  # rad/s
+SUBSTEPS, SKIP = 5, 4
+SIGMA = 0.03  # rad; errors far beyond it count less
+DECLARED = {"servo.inertia": 0.006, "servo.torque_constant": 0.27, "bearing.damping": 0.015}
+"""Where fits begin; the data sheet's numbers are known to a third."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """One log: gain, goal, position, and the time between samples in s."""
+
+    kp: int
+    goal: Array
+    position: Array
+    step: float
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A model, and the numbers that it leaves open with their starts."""
+
+    name: str
+    servo: Assembly
+    starts: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Results:
+    """Mean absolute error of the position in rad by variant, mean of four gains held out, and numbers."""
+
+    errors: Mapping[str, float]
+    fitted: Mapping[str, float]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The claimed numbers by name."""
+        return {**{f"{name}_error_mrad": 1e3 * e for name, e in self.errors.items()}, **self.fitted}
+
+
+def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | None:
+    """Fit the closed loop with and without what the linear model lacks, one gain held out at a time.
+
+    Parameters
+    ----------
+    out
+        Folder for ``report.html`` and the better deck.
+    fast
+        Without effect.
+    data
+        Folder with the logs; see :func:`data_folder`.
+
+    Returns
+    -------
+    Results or None
+        ``None`` where the measurements are not on this machine.
+    """
+    folder = data_folder("xl330", data)
+    if folder is None:
+        write_skipped("xl330", out)
+        return None
+    steps = nls.progress.Steps()
+    declared = nls.declare(nls.load_deck("xl330_pendulum"))
+    logs = load_logs(folder, declared)
+    errors, numbers = {}, dict[str, float]()
+    for variant in variants(declared):
+        with steps.step(variant.name):
+            errors[variant.name], numbers = held_out_error(variant, logs)
+    better = variants(declared)[-1].servo.with_values(numbers)
+    nls.write_deck(better, out / "refitted.toml")
+    fitted = {
+        "load_friction_ratio": numbers["weight.ratio"],
+        "delay_ms": 1e3 * numbers["servo.late.delay"],
+        "halving_V": numbers["servo.compression.halving"],
+    }
+    results = Results(errors, fitted)
+    rows = tuple((name.replace("_", " "), f"{error:.4f}") for name, error in errors.items())
+    nls.write_report(
+        out / "report.html",
+        TableSection("Closed loop, one gain held out", ("model", "mean absolute error / rad"), rows),
+        title="XL330: what is missing",
+    )
+    return results
+
+
+def variants(declared: Assembly) -> list[Variant]:
+    """Return the linear servo, and what may be missing in it."""
+
+    def number(value: float, unit: str) -> Quantity:
+        return Quantity(value, unit, "to be fitted")
+
+    coulomb = CoulombFriction(sliding_effort=number(0.02, "N*m")).smooth(CREEP)
+    stribeck = StribeckFriction(
+        sliding_effort=number(0.02, "N*m"),
+        breakaway=number(0.02, "N*m"),
+        stribeck_speed=number(0.3, "rad/s"),
+    ).smooth(CREEP)
+    dry, falling = (declared.with_part("dry", tie(law, "servo")) for law in (coulomb, stribeck))
+    weight = LoadFriction(members=(("held", declared.element("weight")),), ratio=number(0.3, "1"))
+    loaded = declared.with_part("weight", tie(weight.smooth(CREEP), "servo"))
+    late = loaded.with_part("servo.late", DriveDelay(delay=number(0.012, "s")))
+    whole = late.with_part("servo.compression", CommandCompression(halving=number(24.0, "V")))
+    ratio, level = {"weight.ratio": 0.3}, {"dry.sliding_effort": 0.02}
+    edges = {"dry.breakaway": 0.02, "dry.stribeck_speed": 0.3}
+    rest = {"servo.late.delay": 0.012, "servo.compression.halving": 24.0}
+    return [
+        Variant("linear", declared, DECLARED),
+        Variant("coulomb", dry, {**DECLARED, **level}),
+        Variant("stribeck", falling, {**DECLARED, **level, **edges}),
+        Variant("load_friction", loaded, {**DECLARED, **ratio}),
+        Variant("load_friction_and_drive", whole, {**DECLARED, **ratio, **rest}),
+    ]
+
+
+def load_logs(folder: Path, declared: Assembly) -> list[Log]:
+    """Return the logs on one clock, all of the length of the shortest."""
+    model = nls.flatten(declared)
+    records = nls.load_records(folder, model, mapping=MAPPING)
+    least = min(len(r.trace) for r in records.records)
+    return [
+        Log(
+            int(r.name.partition("_")[0].removeprefix("kp")),
+            r.trace["servo.goal"][:least],
+            r.trace["encoder.reading"][:least],
+            r.step,
+        )
+        for r in records.records
+    ]
+
+
+def held_out_error(variant: Variant, logs: Sequence[Log]) -> tuple[float, dict[str, float]]:
+    """Return the mean over the gains of the error at a gain held out, and the numbers of the last fold."""
+    model, names = nls.flatten(variant.servo), list(variant.starts)
+    run = closed_loop(model, len(logs[0].goal) - 1, logs[0].step)
+    errors, values = [], dict[str, float]()
+    for kp in sorted({log.kp for log in logs}):
+        seen = [log for log in logs if log.kp != kp]
+
+        def residual(scaled: Array, seen: Sequence[Log] = seen) -> Array:
+            numbers = dict(zip(names, np.exp(scaled), strict=True))
+            rest = [(predicted(run, model, numbers, log) - log.position)[::SKIP] for log in seen]
+            return np.nan_to_num(np.clip(np.concatenate(rest), -5.0, 5.0), nan=5.0) / SIGMA
+
+        start = np.log(list(variant.starts.values()))
+        best = least_squares(residual, start, loss="soft_l1", max_nfev=15, diff_step=1e-4)
+        values = {name: float(v) for name, v in zip(names, np.exp(best.x), strict=True)}
+        own = [log for log in logs if log.kp == kp]
+        errors.append(np.mean([np.abs(predicted(run, model, values, g) - g.position) for g in own]))
+    return float(np.mean(errors)), values
+
+
+def closed_loop(model: FlatModel, count: int, step: float) -> ca.Function:
+    """Return the states along a record, by Runge and Kutta's steps of fourth order with lines between goals."""
+    s = model.symbols()
+    rate = ca.Function("rate", [s.state, s.input, s.parameter], [s.derivative])
+    sizes = [len(model.states), 2, len(model.parameters)]
+    state, ends, parameter = (ca.MX.sym(n, size) for n, size in zip("xup", sizes, strict=True))
+    h, now = step / SUBSTEPS, state
+    for k in range(SUBSTEPS):
+        left, middle, right = (
+            ends[0] + (ends[1] - ends[0]) * ((k + share) / SUBSTEPS) for share in (0, 0.5, 1)
+        )
+        k1 = rate(now, left, parameter)
+        k2 = rate(now + h / 2 * k1, middle, parameter)
+        k3 = rate(now + h / 2 * k2, middle, parameter)
+        k4 = rate(now + h * k3, right, parameter)
+        now = now + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return ca.Function("step", [state, ends, parameter], [now]).expand().mapaccum("run", count)
+
+
+def predicted(run: ca.Function, model: FlatModel, values: Mapping[str, float], log: Log) -> Array:
+    """Return the position over a log, from its first position at rest and the goal."""
+    gain = {"servo.loop.proportional": GAIN_PER_KP * log.kp}
+    numbers = {**model.values, **values, **gain}
+    parameter = np.array([numbers[v.name] for v in model.parameters])
+    state = np.zeros(len(model.states))
+    names = [v.name for v in model.states]
+    state[names.index("servo.angle")] = log.position[0]
+    if "servo.late.lag" in names:
+        state[names.index("servo.late.lag")] = gain["servo.loop.proportional"] * (
+            log.goal[0] - log.position[0]
+        )
+    ends = np.vstack([log.goal[:-1], log.goal[1:]])
+    path = np.array(run(state, ends, np.repeat(parameter[:, None], ends.shape[1], axis=1)))
+    return np.concatenate([log.position[:1], path[names.index("servo.angle")]])

@@ -1,0 +1,34 @@
+"""When the search looks for two effects at once."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import pytest
+
+from nlsdesign.components import Fixed
+from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.discrepancy.selection.comparison import Comparison
+from nlsdesign.discrepancy.selection.criteria import Criteria
+from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.discrepancy.selection.search import Step, _Search
+
+
+@pytest.mark.parametrize(("alone", "paired"), [(0, 1), (1, 0)])
+def test_pairs_are_tried_where_no_effect_was_named_and_there_alone(
+    monkeypatch: pytest.MonkeyPatch, alone: int, paired: int
+) -> None:
+    start = Hypothesis(assembly("blank", load=Fixed()))
+    named, pairs = iter([Step(start, 0.9)] * alone), list[Any]()
+
+    def pair(self: _Search, *given: Any) -> list[Step]:
+        pairs.append(given)
+        return []
+
+    monkeypatch.setattr(_Search, "_lacking", lambda *given: ["motor"])
+    monkeypatch.setattr(_Search, "_tried", lambda *given: [])
+    monkeypatch.setattr(_Search, "_account", lambda *given: ())
+    monkeypatch.setattr(_Search, "_step", lambda *given: next(named, None))
+    monkeypatch.setattr(_Search, "_pair", pair)
+    steps = _Search(cast(Comparison, None), (), Criteria(), lambda text: None)._forward(start)
+    assert (len(steps), len(pairs)) == (alone, paired)
