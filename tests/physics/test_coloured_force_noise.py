@@ -14,6 +14,7 @@ from nlsdesign.components import Assembly
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
+from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.excess import excesses
 from nlsdesign.identification import RecordSet, load_records
 from nlsdesign.identification.equation_error.evidence import Bench
@@ -60,7 +61,7 @@ def judged(declared: Assembly, records: RecordSet) -> tuple[Bench, dict[str, tup
     """The bench, and of each block the mean square in units of its floor, and whether it is open."""
     bench = Bench(records, blocks_of(flatten(declared), records.signals))
     comparison = Comparison(bench, typical_sizes(declared, bench.records))
-    found = excesses(comparison.base(declared), bench)
+    found = excesses(comparison.base(declared), bench, Criteria())
     return bench, {name: (e.mean_square, e.open) for name, e in found.items() if name in bench.units}
 
 

@@ -40,6 +40,8 @@ _LEFT = 0.5
 _COARSEST = 6.0
 """Samples per period of the typical motion below which derivatives are not known."""
 _STEP = 2.0**0.25
+_LEAST_ROWS = 200
+"""Rows that the shortest record is read in, at least."""
 _PROBES = 2000
 """Rows of a record on which the power of a motion is estimated at most."""
 
@@ -152,7 +154,9 @@ def chosen_filters(
     least, span = (READING if block.target else BALANCE) / pace, SPAN / pace
     spacing = SPACING * BALANCE / pace
     width = _unbiased_width(block, records, noise, (least, span)) if moving else least
-    return Filters(width, span, max(spacing, SPACING * width))
+    # A record shorter than a few radians of its motion keeps rows that overlap.
+    most = min(r.step * len(r.trace) for r in records) / _LEAST_ROWS
+    return Filters(width, span, min(max(spacing, SPACING * width), most))
 
 
 def output_slopes(block: Block, inputs: Array, stride: int) -> Array:

@@ -153,7 +153,8 @@ def fit(
         behind = place + len(each.floor.sigma)
         own = residual[place:behind]
         misfit[block, record.name] = 0.5 * float(own @ own)
-        parts.append(Piece(block, record.name, record.step * each.floor.places, own, slope[place:behind]))
+        time = np.asarray(record.step * each.floor.places, dtype=np.float64)
+        parts.append(Piece(block, record.name, time, own, slope[place:behind]))
         place = behind
     covariance = robust_covariance(parts, slope[: len(parameters)])
     return Fit(tuple(parameters), rows.values(ended.x), covariance, ended.cost, misfit, ended.converged)
