@@ -23,6 +23,7 @@ PRIOR = 0.4
 
 def evidence(name: str) -> Evidence:
     """A record of a linear block."""
+
     def residual(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         return DATA[name] - SLOPES[name] @ [values["a"], values["b"]], -SLOPES[name]
 

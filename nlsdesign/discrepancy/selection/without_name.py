@@ -38,6 +38,8 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
         if tried is None:
             continue
         after = excesses(tried, comparison.bench, criteria)
-        if is_more_than_noise(criteria, gain(before, after)) and not records_made_worse(criteria, before, after):
+        if is_more_than_noise(criteria, gain(before, after)) and not records_made_worse(
+            criteria, before, after
+        ):
             present = tried
     return present
