@@ -31,7 +31,7 @@ _OPTIONS: dict[str, Any] = {
 
 
 @dataclass(frozen=True, eq=False)
-class StackedRows:
+class Rows:
     """Constraints lower ≤ expression ≤ upper on a column, scaled to about 1."""
 
     expression: Expression
@@ -87,7 +87,7 @@ class Program:
     lower: Floats
     upper: Floats
     cost: Expression
-    rows: tuple[StackedRows, ...]
+    rows: tuple[Rows, ...]
 
     def with_unknowns(self, symbols: Expression, lower: float, upper: float) -> Program:
         """Return a copy with more unknowns at the end, all between the same bounds.

@@ -15,6 +15,7 @@ from ...identification.estimation.least_squares import Fit
 from ...identification.statistics.residuals import Binned
 from ...quantity import significant, three_digits, typeset_unit
 from ..effects.plain_names import capitalised, simpler_forms, title
+from ..planning.experiment import Experiment
 from ..selection.search import Skipped
 from .circumstances import DiagnosisRun, settings_of
 from .fitted_numbers import fitted_numbers
@@ -210,7 +211,7 @@ class Verdict:
     unnamed
         Tables in the place of effects that have no name.
     experiment
-        The record that would tell apart what these records do not; ``None`` where nothing is to be told apart.
+        The record that would tell apart what these do not; ``None`` where nothing is to be told apart.
     """
 
     verdict: str

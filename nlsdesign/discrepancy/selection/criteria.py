@@ -1,8 +1,8 @@
 """The decision rule: what is open, what an effect must show to be named, and which of several is named.
 
 Everything here is a function of numbers. For each block and record they are sums of squared residuals in
-units of the noise floor, *predicted*: with numbers that come from other pieces of the records
-(:mod:`.cross_validation`). Records with the role ``held_out`` are not among them. The *excess* of a block is what its sum has beyond the
+units of the noise floor, *predicted*: with numbers that come from other pieces of the records, see
+:mod:`.cross_validation`. Records with the role ``held_out`` are not among them. The *excess* of a block is what its sum has beyond the
 number of residuals, which is what noise alone would leave. ``docs/decision.md`` is the rule in prose.
 
 An effect may be named if

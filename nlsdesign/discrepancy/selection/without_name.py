@@ -1,4 +1,4 @@
-"""What has no name: a smooth, passive table in the place of an effect, if it predicts what it has not seen."""
+"""What has no name: a smooth, passive table in place of an effect, if it predicts what it has not seen."""
 
 from __future__ import annotations
 
