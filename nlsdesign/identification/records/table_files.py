@@ -154,7 +154,7 @@ def _csv(file: Path) -> RecordTable:
 def _parquet(file: Path) -> RecordTable:
     parquet = _library("pyarrow.parquet", file)
     with _damage_named(file):
-        table = parquet.read_table(file)
+        table = parquet.ParquetFile(file).read()
         names = table.column_names
         vectors = [column.to_numpy() for column in table.columns]
     for place, name in enumerate(names):
