@@ -25,7 +25,7 @@ from ...components import (
 )
 from ...components.mechanics.bodies import Free
 from ...quantity import Quantity
-from ..fitting.strategies import Continuation
+from ..fitting.strategies import Continuation, PlainButLong
 from .candidate import Unknown, free_name, wrapped
 from .effect import Edit, Effect, Form
 from .friction import number, tied
@@ -187,7 +187,7 @@ def _two_masses(assembly: Assembly, name: str) -> Iterator[Edit]:
     assert isinstance(part, Tie)
     edited, body, unknowns = _shaft(assembly, driver, (4.0,))
     ends = tuple(body if end == driver else end for end in part.between)
-    yield Edit(edited.with_part(name, replace(part, between=ends)), unknowns)
+    yield Edit(edited.with_part(name, replace(part, between=ends)), unknowns, {"strategy": PlainButLong()})
 
 
 torque_ripple = Effect(

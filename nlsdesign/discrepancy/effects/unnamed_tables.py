@@ -348,9 +348,11 @@ class _Regression:
             keep[out.get(k, np.zeros(0, dtype=np.intp))] = False
             matrix += every[keep].T @ every[keep]
             vector += every[keep].T @ target[keep]
-        factor = np.linalg.cholesky(matrix)
-        whitened = np.linalg.solve(factor, vector)
-        result: Array = lsq_linear(factor.T, whitened, bounds=(self._least, np.inf), method="bvls").x
+        strength, axes = np.linalg.eigh(matrix)
+        root = np.sqrt(np.maximum(strength, 1e-13 * strength[-1]))
+        result: Array = lsq_linear(
+            root[:, None] * axes.T, (axes.T @ vector) / root, bounds=(self._least, np.inf), method="bvls"
+        ).x
         return result
 
     def squares(self, folds: Sequence[Sequence[_Fold]]) -> Array:

@@ -180,6 +180,13 @@ class Plain(Strategy):
 
 
 @dataclass(frozen=True)
+class PlainButLong(Plain):
+    """Begin where the unknowns say; a fit takes long, since the effect moves faster than the samples."""
+
+    takes_long: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
 class Continuation(Strategy):
     """Begin where a simpler form of the effect ends, fitted to slow motion, and beside that.
 

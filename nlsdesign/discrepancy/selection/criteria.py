@@ -2,9 +2,9 @@
 
 Everything here is a function of numbers. For each block and record they are sums of squared residuals in
 units of the noise floor, *predicted*: with numbers that come from other pieces of the records, see
-:mod:`.cross_validation`. Records with the role ``held_out`` are not among them. The *excess* of a block is what
-its sum has beyond the number of residuals, which is what noise alone would leave. ``docs/decision.md`` is the
-rule in prose.
+:mod:`.cross_validation`. Records with the role ``held_out`` are not among them. The *excess* of a block is
+what its sum has beyond the number of residuals, which is what noise alone would leave. The rule in prose is
+``docs/decision.md``.
 
 An effect may be named if
  1. it explains a share of the excess that is left in some open block, and more than noise explains;

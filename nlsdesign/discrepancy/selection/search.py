@@ -41,6 +41,9 @@ from .standing import standing_of
 _PAIRED = 4
 """Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice. Six pairs
 take about as long as the catalogue did."""
+_NEARLY_CLOSED = 5.0
+"""Mean square above the noise floor below which, beside other effects, nothing is tried that takes long: that
+is mostly what inexact forms leave over."""
 _MOST_EFFECTS_IN_FREE_FLIGHT = 2
 """Effects that are looked for where a body flies freely: a third takes minutes, and rests on less."""
 
@@ -309,13 +312,20 @@ class _Search:
         tasks = [(present, c) for c in self._candidates(present) if (c.effect, c.location) not in known]
         wanted = () if block == DECLARED else (block,)
         quick = self._fits([task for task in tasks if not task[1].strategy.takes_long], wanted)
-        step = self._step(present, quick, block)
         long = [task for task in tasks if task[1].strategy.takes_long]
-        if step is None or self._excesses(step.chosen)[block].open:
-            return quick + self._fits(long, wanted)
-        reason = f"takes long, and {step.effect} explains the block down to its noise"
-        self.skipped += [Skipped(c.effect, c.location, present.names, reason) for _, c in long]
-        return quick
+        if reason := self._why_not_long(present, quick, block):
+            self.skipped += [Skipped(c.effect, c.location, present.names, reason) for _, c in long]
+            return quick
+        return quick + self._fits(long, wanted)
+
+    def _why_not_long(self, present: Hypothesis, quick: Sequence[Hypothesis], block: str) -> str:
+        """Return why what takes long is not tried; empty if it is."""
+        if present.added and self._excesses(present)[block].mean_square < _NEARLY_CLOSED:
+            return f"takes long, and {' and '.join(present.names)} leave little in the block"
+        step = self._step(present, quick, block)
+        if step is not None and not self._excesses(step.chosen)[block].open:
+            return f"takes long, and {step.effect} explains the block down to its noise"
+        return ""
 
     def _fits(
         self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()

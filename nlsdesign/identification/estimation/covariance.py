@@ -27,6 +27,8 @@ _SEGMENTS = 60
 _LEAST_ROWS = 8
 _LEAST_INFORMATION = 1e-6
 """Information on the fitted scale that is taken for granted, so that a covariance is never infinite."""
+_LEAST_STRENGTH = 1e-13
+"""Smallest eigenvalue of a correlation matrix that is more than rounding."""
 _OWN_SHARE = 0.98
 """Share of the information that a segment may have on its own before it is left in: without it nothing would
 be known."""
@@ -147,8 +149,12 @@ def _half(matrix: Array) -> Array:
 
 def _at_least(covariance: Array, least: Array) -> Array:
     """Return a covariance that in no direction is smaller than another."""
-    lower = np.linalg.cholesky(least)
-    inside = np.linalg.solve(lower, np.linalg.solve(lower, covariance).T)
+    # In the units of the numbers themselves, in which rounding leaves no direction negative.
+    size = np.sqrt(np.diag(least))
+    strength, axes = np.linalg.eigh(least / np.outer(size, size))
+    deviation = np.sqrt(np.maximum(strength, _LEAST_STRENGTH))
+    lower, upper = size[:, None] * axes * deviation, (axes / deviation).T / size
+    inside = upper @ covariance @ upper.T
     strength, axes = np.linalg.eigh(0.5 * (inside + inside.T))
     whole = lower @ axes
     result: Array = (whole * np.maximum(strength, 1.0)) @ whole.T
