@@ -56,7 +56,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
-    from ..discrepancy import DiagnosisRun, records_of_run, write_verdict
+    from ..discrepancy import DiagnosisRun, records_of_run, write_command, write_verdict
     from ..discrepancy import diagnose as find_what_is_missing
     from ..identification import load_records
     from ..locations import version
@@ -76,6 +76,8 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     verdict = replace(verdict, run=run)
     out.mkdir(parents=True, exist_ok=True)
     write_verdict(verdict, out)
+    if verdict.experiment is not None:
+        write_command(verdict.experiment, out / "next_record.csv")
     content, text = verdict.to_dict(str(out / "model.toml")), str(verdict)
     sections = verdict_sections(verdict)
     facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
@@ -91,6 +93,8 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
         show_json(content)
         return
     click.echo(text)
+    if verdict.experiment is not None:
+        click.echo(f"command of the next record: {out / 'next_record.csv'}")
     click.echo(f"report: {out / 'report.html'}")
 
 

@@ -170,6 +170,7 @@ def _verdict(
     unpredictable = [k for k in case.comparison.keys if k in better.unpredictable]
     # From here on, nothing is chosen any more.
     every = case.comparison.with_records(records)
+    experiment = _experiment(case, base, outcome, decision)
     return Verdict(
         verdict,
         tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
@@ -186,13 +187,16 @@ def _verdict(
         shapes_of(base, better, every, worst),
         tuple(better.fits.values()),
         _remainder(case.comparison, better, after) if verdict not in ("none", "data_suspect") else None,
-        _next_steps(case.comparison, steps, tuple(better.fits.values())),
+        (
+            *_next_steps(case.comparison, steps, tuple(better.fits.values())),
+            *((experiment.words(),) if experiment else ()),
+        ),
         outcome.skipped,
         complete=is_complete(after),
         criteria=case.criteria,
         remarks=tuple(str(each) for each in records.remarks),
         unnamed=tuple(_unnamed(better, each) for each in better.added[len(steps) :]),
-        experiment=_experiment(case, base, outcome, decision),
+        experiment=experiment,
     )
 
 

@@ -24,11 +24,18 @@ ROWS = 1000
 LONG = Continuation(through=BLANK)
 
 
-def effect(name: str, numbers: int = 1, *, strategy: Plain | Continuation | None = None) -> EffectFunction:
+def effect(
+    name: str,
+    numbers: int = 1,
+    *,
+    strategy: Plain | Continuation | None = None,
+    simpler: tuple[str, ...] = (),
+) -> EffectFunction:
     unknowns = tuple(Unknown(f"{name}.{k}", (1.0,), 0.1, 10.0) for k in range(numbers))
 
     def of(assembly: Assembly) -> Sequence[Candidate]:
-        return [Candidate(name, "motor", assembly, unknowns, "sign", "source", strategy or Plain())]
+        way = strategy or Plain()
+        return [Candidate(name, "motor", assembly, unknowns, "sign", "source", way, simpler=simpler)]
 
     return of
 
@@ -236,3 +243,17 @@ def test_what_does_not_predict_whole_records_is_not_named_and_the_next_best_is()
     assert names(found) == ["b"]
     assert found.tried[0].candidate.effect == "a"
     assert found.tried[0].objections == ("it does not predict records that are left out as a whole",)
+
+
+def test_a_richer_form_takes_its_place_once_the_other_effects_are_named() -> None:
+    """Alone the richer form leaves hardly less than the simpler one; beside b it leaves nothing."""
+    left = {
+        (): (1e5, 1e6), ("plain",): (2e4, 1e6), ("rich",): (1.9e4, 1e6), ("b",): (1e5, 10.0),
+        ("b", "plain"): (2e4, 10.0), ("b", "rich"): (10.0, 10.0),
+    }  # fmt: skip
+    effects = effect("plain"), effect("rich", 3, simpler=("plain",)), effect("b")
+    found = outcome(Table(left), *effects)
+    assert names(found) == ["b", "rich"]
+    assert found.complete
+    left["b", "rich"] = (1.5e4, 10.0)
+    assert names(outcome(Table(left), *effects)) == ["b", "plain"], "not half of what is left"

@@ -90,18 +90,23 @@ class Setting(NamedTuple):
 
 
 def settings_of(criteria: Any) -> tuple[Setting, ...]:
-    """Return the fields of a dataclass with their meanings, from its docstring.
+    """Return the fields of a dataclass with their meanings, from their metadata or its docstring.
 
     Parameters
     ----------
     criteria
-        A dataclass whose docstring describes each field below ``Parameters``; ``None`` has no fields.
+        A dataclass whose fields say their ``meaning``, or whose docstring describes each below ``Parameters``;
+        ``None`` has no fields.
     """
     if criteria is None:
         return ()
     meaning = dict(_described(inspect.getdoc(type(criteria)) or ""))
     return tuple(
-        Setting(field.name, getattr(criteria, field.name), meaning.get(field.name, ""))
+        Setting(
+            field.name,
+            getattr(criteria, field.name),
+            str(field.metadata.get("meaning", meaning.get(field.name, ""))),
+        )
         for field in fields(criteria)
     )
 

@@ -307,6 +307,11 @@ class Verdict:
             sentences.append(
                 "That is not all: an error beyond the noise is left, for which there is no name."
             )
+        sentences += [
+            f"What has no name at `{each.location}` was added as a smooth table: it predicts what it was not "
+            "fitted to, within the range of these records and nowhere else."
+            for each in self.unnamed
+        ]
         if self.remainder is not None:
             sentences.append(self.remainder.words())
         return tuple(sentences)
@@ -369,6 +374,8 @@ class Verdict:
             "remarks": list(self.remarks),
             "unidentified": list(self.unidentified),
             "next": list(self.next_steps),
+            "experiment": None if self.experiment is None else self.experiment.to_dict(),
+            "unnamed": [each.to_dict() for each in self.unnamed],
             "numbers": [n._asdict() for n in fitted_numbers(self.fits)],
             "criteria": {
                 each.name: {"value": each.value, "meaning": each.meaning}

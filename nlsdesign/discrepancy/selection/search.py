@@ -200,7 +200,8 @@ class _Search:
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.comparison.coarsely(base)
-        steps = self._explaining(start, self._backward(start, self._forward(start)))
+        steps = self._enriched(start, self._backward(start, self._forward(start)))
+        steps = self._explaining(start, steps)
         skipped = tuple(dict.fromkeys(self.skipped))
         if not steps:
             return Outcome(base, (), self.tried, is_complete(self._on_all(start)), skipped)
@@ -265,6 +266,27 @@ class _Search:
                 steps = fewer
             else:
                 place += 1
+        return steps
+
+    def _enriched(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
+        """Put the richer form of an effect in its place where it leaves much less.
+
+        Beside effects that were not named yet the simpler form may have done.
+        """
+        if len(steps) < 2 or is_complete(self._excesses(steps[-1].chosen)):
+            return steps
+        for place, step in enumerate(steps):
+            before = steps[place - 1].chosen if place else start
+            for candidate in self._candidates(before):
+                if step.effect in candidate.simpler and candidate.location == step.chosen.newest.location:
+                    self.progress(f"trying {candidate.effect} in place of {step.effect}")
+                    richer = self._rebuilt(start, steps, {place: candidate})
+                    if richer and not is_superfluous(
+                        self.criteria,
+                        self._excesses(steps[-1].chosen),
+                        self._excesses(richer[-1].chosen),
+                    ):
+                        steps = richer
         return steps
 
     def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
@@ -376,11 +398,13 @@ class _Search:
         ends = [c for c in same if c.location.split(".")[-1] == wanted.location.split(".")[-1]]
         return next(iter(ends or same), None)
 
-    def _rebuilt(self, start: Hypothesis, steps: Sequence[Step]) -> list[Step]:
-        """Return the steps anew on another beginning; nothing if one of them no longer fits."""
+    def _rebuilt(
+        self, start: Hypothesis, steps: Sequence[Step], changed: Mapping[int, Candidate] | None = None
+    ) -> list[Step]:
+        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits."""
         present, rebuilt = start, list[Step]()
-        for step in steps:
-            candidate = self._again(present, step.chosen.newest)
+        for place, step in enumerate(steps):
+            candidate = self._again(present, (changed or {}).get(place, step.chosen.newest))
             if candidate is None:
                 return []
             try:
