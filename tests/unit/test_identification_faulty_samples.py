@@ -15,6 +15,8 @@ from nlsdesign.identification.records.faulty_samples import (
     faulty_groups,
     repaired,
 )
+from tests.rig import ACTUATORS, make_records
+from tests.rig.conditions import Conditions
 
 COUNT, STEP, AT = 6000, 0.002, 2345
 NOISE, QUANTUM = 0.6, 7.67e-4
@@ -172,3 +174,13 @@ def test_no_measured_record_has_a_fault(name: str, shared_folder: Path) -> None:
         columns = {head: table[head] for head in table.dtype.names[1:]}
         for head in columns:
             assert groups_of(columns, head) == [], (file.name, head)
+
+
+def test_a_sample_that_is_off_is_no_jump_of_the_position() -> None:
+    """A spike of the encoder of the simulated bench, 6 ms before the force turns at zero angle."""
+    spiked = Conditions(spikes=3)
+    name = "sine_45deg_0.5Hz"
+    rows = make_records(ACTUATORS["shoulder"], {}, 216, conditions=spiked, only=(name,))[name]
+    columns = dict(zip(("angle", "current", "force"), rows.T[1:], strict=True))
+    assert abs(rows[3195, 1] - rows[3194, 1]) > 0.09, "or the test would show nothing"
+    assert "jump" not in {kind for _, _, kind in groups_of(columns, "angle", motion=True)}

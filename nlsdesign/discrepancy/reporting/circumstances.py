@@ -95,7 +95,7 @@ def settings_of(criteria: Any) -> tuple[Setting, ...]:
     Parameters
     ----------
     criteria
-        A dataclass whose fields say their ``meaning``, or whose docstring describes each below ``Parameters``;
+        A dataclass whose fields say their ``meaning``, or its docstring does below ``Parameters``;
         ``None`` has no fields.
     """
     if criteria is None:

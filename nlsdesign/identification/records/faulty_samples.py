@@ -52,6 +52,8 @@ _CHANCE = 1e-4
 _FREE_SIGNS = 0.6
 """Share of fourth differences that turn the sign, from which on a channel is noise about a slower course:
 0.80 for white noise, 0 for a smooth motion."""
+_RETURN = 3
+"""Samples within which a position that returns has not jumped."""
 _JUMP, _JUMP_OVER_ALL = 10.0, 3.0
 """A position jumps where it changes by more than these times the largest change nearby, and anywhere else."""
 _CONFIRMS = 4.0
@@ -387,7 +389,10 @@ def _jumps(scatter: _Scatter, groups: Sequence[Group], around: Surroundings) -> 
         least = max(_JUMP * max(float(near.max()), scatter.least), _JUMP_OVER_ALL * float(rest.max()))
         group = Group(edge + 1, edge + 1, "jump", float(scatter.changes[edge]))
         known = any(g.first - 1 <= edge <= g.behind for g in groups)
-        if size[edge] > least and not known and not _confirmed(edge + 1, edge + 1, around.others):
+        # A sample that is off jumps there and back; after a reset the position stays where it jumped to.
+        beside = scatter.changes[max(edge - _RETURN, 0) : edge + _RETURN + 1]
+        stays = abs(float(np.sum(beside))) > 0.5 * size[edge]
+        if size[edge] > least and stays and not known and not _confirmed(edge + 1, edge + 1, around.others):
             yield group
 
 
