@@ -41,30 +41,33 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
         return
     _work = work
     # An interrupt between fork and the first line of a helper would end that helper, and the pool would wait
-    # for it for ever. So none is delivered until all helpers ignore it, nor while they are ended.
-    with _interrupts_held():
-        pool = multiprocessing.get_context("fork").Pool(cores, initializer=_ignore_interrupts)
+    # for it for ever; a request to end that comes there is lost where this process handles such requests, since
+    # Python forgets after a fork what it has not handled. So neither is delivered until helpers are ready.
+    with _signals_held():
+        pool = multiprocessing.get_context("fork").Pool(cores, initializer=_made_ready)
     try:
         yield from pool.imap(_call, range(count))
     finally:
-        with _interrupts_held():
+        with _signals_held():
             pool.terminate()
             pool.join()
 
 
 @contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold interrupts back until the end of the block, where they are delivered."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+def _signals_held() -> Iterator[None]:
+    """Hold interrupts and requests to end back until the end of the block, where they are delivered."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _ignore_interrupts() -> None:
-    """Let the parent handle interruptions, and end when the parent ends."""
+def _made_ready() -> None:
+    """Let the parent handle interruptions, and end at once when it asks for it or ends itself."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGTERM)
 

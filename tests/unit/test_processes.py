@@ -113,3 +113,22 @@ def test_an_interrupt_at_the_moment_of_the_fork_leaves_nobody_waiting(program: s
     )
     assert ended.stdout.strip() == expected
     assert "Traceback" not in ended.stderr
+
+
+ASKED_TO_END_WHILE_FORKING = """
+import signal
+import sys
+from nlsdesign.processes import parallel_map
+
+signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))
+for _ in range(300):
+    assert list(parallel_map(abs, 2)) == [0, 1]
+print("done")
+"""
+
+
+def test_short_maps_end_where_the_process_handles_requests_to_end() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", ASKED_TO_END_WHILE_FORKING], capture_output=True, text=True, timeout=120
+    )
+    assert ended.stdout == "done\n", ended.stderr
