@@ -41,8 +41,8 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
         return
     _work = work
     # An interrupt between fork and the first line of a helper would end that helper, and the pool would wait
-    # for it for ever; a request to end that comes there is lost where this process handles such requests, since
-    # Python forgets after a fork what it has not handled. So neither is delivered until helpers are ready.
+    # for it for ever. A request to end that comes there is lost where this process handles such requests, for
+    # after a fork Python forgets what it has not handled. So neither is delivered until helpers are ready.
     with _signals_held():
         pool = multiprocessing.get_context("fork").Pool(cores, initializer=_made_ready)
     try:
