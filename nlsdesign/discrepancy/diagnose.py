@@ -39,12 +39,14 @@ from .screening.causality import lagging_forces
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
 from .selection.comparison import Comparison
-from .selection.criteria import DECLARED, Criteria, Excess, Excesses, Standing, is_complete
+from .selection.criteria import Criteria, is_complete
 from .selection.excess import excesses
 from .selection.hypothesis import Hypothesis
+from .selection.measures import DECLARED, Excess, Excesses, Standing
 from .selection.probability import CALIBRATION
-from .selection.search import Outcome, Step, search
+from .selection.search import Outcome, search
 from .selection.standing import standing_of
+from .selection.trials import Step
 from .selection.without_name import with_what_has_no_name
 
 _CRITERIA = Criteria()
@@ -167,9 +169,9 @@ def _verdict(
     better = better.as_written()
     before, after = case.excesses(base), case.excesses(better)
     worst = _furthest([n for n in before if n != DECLARED], before)
-    unpredictable = [k for k in case.comparison.keys if k in better.unpredictable]
+    unpredictable = [k for k in case.bench.floors if k in better.unpredictable]
     # From here on, nothing is chosen any more.
-    every = case.comparison.with_records(records)
+    every = Comparison(case.bench.with_records(records), case.comparison.sizes)
     experiment = _experiment(case, base, outcome, decision)
     return Verdict(
         verdict,

@@ -14,8 +14,8 @@ from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects import ALL, backlash
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.criteria import total_excess
 from nlsdesign.discrepancy.selection.excess import excesses
+from nlsdesign.discrepancy.selection.measures import total_excess
 from nlsdesign.identification import load_records
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten

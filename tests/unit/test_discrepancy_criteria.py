@@ -11,15 +11,9 @@ import pytest
 from scipy.stats import chi2, norm
 
 from nlsdesign.discrepancy.selection.criteria import (
-    DECLARED,
     Criteria,
-    EffectNumber,
-    Excess,
     Rival,
-    Standing,
     choose,
-    explained,
-    gain,
     is_beyond_noise,
     is_beyond_prior,
     is_complete,
@@ -28,8 +22,16 @@ from nlsdesign.discrepancy.selection.criteria import (
     lacking,
     objections,
     records_made_worse,
-    total_excess,
     unexplained,
+)
+from nlsdesign.discrepancy.selection.measures import (
+    DECLARED,
+    EffectNumber,
+    Excess,
+    Standing,
+    explained,
+    gain,
+    total_excess,
 )
 
 RULE, ROWS, RECORDS, PIECES = Criteria(), 1000, ("slow", "quick"), 5

@@ -16,9 +16,10 @@ from nlsdesign.discrepancy.effects.candidate import Candidate, Unknown
 from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.screening.other_rig import numbers_explain, other_numbers
 from nlsdesign.discrepancy.selection.comparison import Comparison
-from nlsdesign.discrepancy.selection.criteria import DECLARED, Criteria
+from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.excess import excesses
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.discrepancy.selection.measures import DECLARED
 from nlsdesign.identification import Fit, Parameter
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.quantity import Quantity

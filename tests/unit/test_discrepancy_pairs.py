@@ -11,7 +11,8 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.discrepancy.selection.search import Step, _Search
+from nlsdesign.discrepancy.selection.search import _Search
+from nlsdesign.discrepancy.selection.trials import Step, Trials
 
 
 @pytest.mark.parametrize(("alone", "paired"), [(0, 1), (1, 0)])
@@ -26,9 +27,9 @@ def test_pairs_are_tried_where_no_effect_was_named_and_there_alone(
         return []
 
     monkeypatch.setattr(_Search, "_lacking", lambda *given: ["motor"])
-    monkeypatch.setattr(_Search, "_tried", lambda *given: [])
-    monkeypatch.setattr(_Search, "_account", lambda *given: ())
-    monkeypatch.setattr(_Search, "_step", lambda *given: next(named, None))
+    monkeypatch.setattr(Trials, "tried_on", lambda *given: [])
+    monkeypatch.setattr(Trials, "account", lambda *given: ())
+    monkeypatch.setattr(Trials, "step", lambda *given: next(named, None))
     monkeypatch.setattr(_Search, "_pair", pair)
-    steps = _Search(cast(Comparison, None), (), Criteria(), lambda text: None)._forward(start)
+    steps = _Search(Trials(cast(Comparison, None), (), Criteria(), lambda text: None))._forward(start)
     assert (len(steps), len(pairs)) == (alone, paired)

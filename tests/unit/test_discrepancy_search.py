@@ -16,7 +16,8 @@ from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
-from nlsdesign.discrepancy.selection.search import Outcome, Skipped, search
+from nlsdesign.discrepancy.selection.search import Outcome, search
+from nlsdesign.discrepancy.selection.trials import Skipped
 from nlsdesign.errors import ConvergenceError
 
 BLANK = assembly("blank", load=Fixed())
@@ -99,7 +100,7 @@ class Table:
 def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work done here, so that the table sees what it is asked."""
     monkeypatch.setattr(
-        "nlsdesign.discrepancy.selection.search.parallel_map", lambda work, count: map(work, range(count))
+        "nlsdesign.discrepancy.selection.trials.parallel_map", lambda work, count: map(work, range(count))
     )
 
 

@@ -34,7 +34,7 @@ from nlsdesign.discrepancy.effects.plain_names import (
 from nlsdesign.discrepancy.reporting.circumstances import DiagnosisRun, RecordOfRun, settings_of
 from nlsdesign.discrepancy.reporting.named_effect import EffectEvidence, NamedEffect
 from nlsdesign.discrepancy.reporting.verdict import Course, RecordGap
-from nlsdesign.discrepancy.selection.search import Skipped
+from nlsdesign.discrepancy.selection.trials import Skipped
 from nlsdesign.figures import alternative_text
 from nlsdesign.identification.estimation.least_squares import Fit
 from nlsdesign.identification.estimation.parameters import declared_parameter

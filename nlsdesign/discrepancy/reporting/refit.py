@@ -185,7 +185,7 @@ def refit(
         fits, window_errors = (fit,), window_gaps(actuator, values, records, window)
     numbers = fitted_numbers(fits)
     fitted = fitted.as_written()
-    gaps = gaps_of(comparison.declared(actuator), fitted, comparison)
+    gaps = gaps_of(Hypothesis(actuator), fitted, comparison)
     return Refit(sourced(fitted), fits, numbers, (*gaps, *window_errors), findings)
 
 

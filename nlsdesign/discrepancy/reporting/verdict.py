@@ -16,7 +16,7 @@ from ...identification.statistics.residuals import Binned
 from ...quantity import significant, three_digits, typeset_unit
 from ..effects.plain_names import capitalised, simpler_forms, title
 from ..planning.experiment import Experiment
-from ..selection.search import Skipped
+from ..selection.trials import Skipped
 from .circumstances import DiagnosisRun, settings_of
 from .fitted_numbers import fitted_numbers
 from .named_effect import NamedEffect as NamedEffect

@@ -19,9 +19,10 @@ from ...model import flatten
 from ...model.readings import reading_of
 from ...quantity import with_unit
 from ..selection.comparison import Comparison
-from ..selection.criteria import DECLARED, Criteria
+from ..selection.criteria import Criteria
 from ..selection.excess import excesses
 from ..selection.hypothesis import Hypothesis
+from ..selection.measures import DECLARED
 
 _AT_END = 3.4
 """Prior standard deviations at which a refit is stopped: twice the declared range is 3.46."""

@@ -17,7 +17,7 @@ from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
 from ...identification.estimation.least_squares import Fit, fit
 from ...identification.estimation.parameters import declared_parameter, free_parameter
-from ...identification.records.measurement import Record, RecordSet
+from ...identification.records.measurement import Record
 from ...model import Variable, flatten
 from ...processes import parallel_map
 from ...quantity import Quantity
@@ -74,24 +74,9 @@ class Comparison:
     """
 
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
-        self.bench, self._sizes = bench, sizes
+        self.bench, self.sizes = bench, sizes
         self._fit = HypothesisFit(bench, sizes)
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
-
-    def with_records(self, records: RecordSet) -> Comparison:
-        """Return a comparison on more records, with the noise that was estimated before.
-
-        Parameters
-        ----------
-        records
-            All of them, with those that were held out.
-        """
-        return Comparison(self.bench.with_records(records), self._sizes)
-
-    @property
-    def keys(self) -> tuple[tuple[str, str], ...]:
-        """Names of the blocks and records that are compared, in a fixed order."""
-        return tuple(self.bench.floors)
 
     def base(self, assembly: Assembly) -> Hypothesis:
         """Refit the declared assembly, so that a wrong number is not taken for a wrong structure.
@@ -103,16 +88,6 @@ class Comparison:
         """
         blank = Hypothesis(assembly)
         return self._refitted(blank, self._groups(blank))
-
-    def declared(self, assembly: Assembly) -> Hypothesis:
-        """Return the declared assembly as it is, nothing fitted.
-
-        Parameters
-        ----------
-        assembly
-            As declared.
-        """
-        return Hypothesis(assembly)
 
     def coarsely(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis as the coarse look sees it.

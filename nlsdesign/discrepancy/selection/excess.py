@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from ...identification.equation_error.evidence import Bench
-from .criteria import DECLARED, Criteria, Excess, is_beyond_noise, is_beyond_prior
+from .criteria import Criteria, is_beyond_noise, is_beyond_prior
 from .hypothesis import Hypothesis
+from .measures import DECLARED, Excess
 
 
 def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[str, Excess]:

@@ -10,7 +10,7 @@ import numpy as np
 from ...identification.estimation.least_squares import Fit
 from ...identification.estimation.parameters import Parameter, box
 from ..effects.candidate import Unknown
-from .criteria import EffectNumber, Standing
+from .measures import EffectNumber, Standing
 
 _CLOSE = 0.005
 """Share of the range of a search within which a number stands at its bound."""

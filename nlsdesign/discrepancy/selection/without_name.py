@@ -5,9 +5,10 @@ from __future__ import annotations
 from ...errors import ConvergenceError
 from ..effects.unnamed_tables import unnamed_part
 from .comparison import Comparison
-from .criteria import Criteria, gain, is_more_than_noise, lacking, records_made_worse
+from .criteria import Criteria, is_more_than_noise, lacking, records_made_worse
 from .excess import excesses
 from .hypothesis import Hypothesis
+from .measures import gain
 
 
 def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criteria: Criteria) -> Hypothesis:

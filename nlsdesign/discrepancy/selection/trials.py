@@ -1,0 +1,356 @@
+"""Trials of candidates on a hypothesis: what is fitted, and what the rule says of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ...errors import ConvergenceError
+from ...processes import parallel_map
+from ..effects.candidate import Candidate, EffectFunction
+from .comparison import Comparison
+from .criteria import Criteria, Rival, choose, is_undecided, objections, predicts_records
+from .excess import excesses
+from .hypothesis import Hypothesis
+from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, total_excess
+from .probability import distance_to_next
+from .standing import standing_of
+
+PAIRED = 4
+"""Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice. Six pairs
+take about as long as the catalogue did."""
+_NEARLY_CLOSED = 5.0
+"""Mean square above the noise floor below which, beside other effects, nothing is tried that takes long: that
+is mostly what inexact forms leave over."""
+_UNKNOWN_GAIN = Gain(math.nan, math.nan, math.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One effect that was added.
+
+    Parameters
+    ----------
+    chosen
+        Hypothesis with the effect in it.
+    block
+        In which something was lacking.
+    share
+        Share of the excess that was left in a block before, of the block of which it explains most.
+    distance
+        How many times as much the best other name leaves, natural logarithm.
+    gain, gains
+        What prediction gains by it, over all records and on each.
+    equals
+        Hypotheses with another last effect that predict as well with as few numbers.
+    """
+
+    chosen: Hypothesis
+    block: str
+    share: float
+    distance: float = 0.0
+    gain: Gain = _UNKNOWN_GAIN
+    gains: Mapping[str, float] = field(default_factory=dict)
+    equals: tuple[Hypothesis, ...] = ()
+
+    @property
+    def effect(self) -> str:
+        """Identifier of what was added."""
+        return self.chosen.newest.effect
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A candidate that was fitted beside nothing else, and why it was not named.
+
+    Parameters
+    ----------
+    hypothesis
+        Fitted with it.
+    share
+        Share of the whole excess that it explains alone.
+    objections
+        Clauses of the rule that speak against it; empty for one that may be named.
+    undecided
+        Whether it explains what is missing, but the records do not determine its numbers.
+    """
+
+    hypothesis: Hypothesis
+    share: float
+    objections: tuple[str, ...]
+    undecided: bool = False
+
+    @property
+    def candidate(self) -> Candidate:
+        """The effect at its place."""
+        return self.hypothesis.newest
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A candidate that was left out of the comparison.
+
+    Parameters
+    ----------
+    effect, location
+        Which.
+    beside
+        Effects that had been added before.
+    reason
+        Too expensive, or not converged.
+    """
+
+    effect: str
+    location: str
+    beside: tuple[str, ...]
+    reason: str
+
+    def __str__(self) -> str:
+        beside = f" beside {' and '.join(self.beside)}" if self.beside else ""
+        return f"{self.effect} at {self.location}{beside}: {self.reason}"
+
+
+@dataclass(eq=False)
+class Trials:
+    """Fits candidates on all cores, asks the rule, and keeps account of what could not be fitted.
+
+    Parameters
+    ----------
+    comparison
+        Fits hypotheses to the records.
+    catalogue
+        Effects to try.
+    criteria
+        Of the decision.
+    progress
+        Told what is being tried.
+    skipped
+        What could not be compared, and why.
+    on_other_records
+        What hypotheses leave over on records that are left out as a whole, as far as that was asked.
+    """
+
+    comparison: Comparison
+    catalogue: Sequence[EffectFunction]
+    criteria: Criteria
+    progress: Callable[[str], None]
+    skipped: list[Skipped] = field(default_factory=list)
+    on_other_records: dict[Hypothesis, Excesses] = field(default_factory=dict)
+
+    def excesses_of(self, hypothesis: Hypothesis) -> Excesses:
+        """Return what a hypothesis leaves over, block by block.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted.
+        """
+        return excesses(hypothesis, self.comparison.bench, self.criteria)
+
+    def on_all(self, hypothesis: Hypothesis) -> Excesses:
+        """Return what a hypothesis leaves over on all samples, its numbers as they are.
+
+        Parameters
+        ----------
+        hypothesis
+            Fitted.
+        """
+        return self.excesses_of(self.comparison.on_all_samples(hypothesis))
+
+    def candidates(self, present: Hypothesis) -> list[Candidate]:
+        """Return what the catalogue has to offer beside what is named already.
+
+        Parameters
+        ----------
+        present
+            Hypothesis to add to.
+        """
+        return [c for effect in self.catalogue for c in effect(present.assembly)]
+
+    def tried_on(self, present: Hypothesis, block: str, done: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return fits of the candidates that act on a block and were not tried before.
+
+        What takes long is tried only where nothing else explains the block down to its noise.
+
+        Parameters
+        ----------
+        present
+            Hypothesis to add to.
+        block
+            Where something is lacking.
+        done
+            What was tried before.
+        """
+        known = {(h.newest.effect, h.newest.location) for h in done}
+        tasks = [(present, c) for c in self.candidates(present) if (c.effect, c.location) not in known]
+        wanted = () if block == DECLARED else (block,)
+        quick = self.fits([task for task in tasks if not task[1].strategy.takes_long], wanted)
+        long = [task for task in tasks if task[1].strategy.takes_long]
+        if reason := self._why_not_long(present, quick, block):
+            self.skipped += [Skipped(c.effect, c.location, present.names, reason) for _, c in long]
+            return quick
+        return quick + self.fits(long, wanted)
+
+    def _why_not_long(self, present: Hypothesis, quick: Sequence[Hypothesis], block: str) -> str:
+        """Return why what takes long is not tried; empty if it is."""
+        if present.added and self.excesses_of(present)[block].mean_square < _NEARLY_CLOSED:
+            return f"takes long, and {' and '.join(present.names)} leave little in the block"
+        step = self.step(present, quick, block)
+        if step is not None and not self.excesses_of(step.chosen)[block].open:
+            return f"takes long, and {step.effect} explains the block down to its noise"
+        return ""
+
+    def fits(
+        self, tasks: Sequence[tuple[Hypothesis, Candidate]], wanted: Collection[str] = ()
+    ) -> list[Hypothesis]:
+        """Return fits in the order of the tasks; what cannot be fitted is in :attr:`skipped`.
+
+        Parameters
+        ----------
+        tasks
+            Hypotheses, and what to add to each.
+        wanted
+            Blocks of which a candidate must touch one; empty for any.
+        """
+        # What takes longest begins first, so that no core waits for it at the end.
+        order = sorted(range(len(tasks)), key=lambda number: not tasks[number][1].strategy.takes_long)
+
+        def fitted(place: int) -> Hypothesis | ConvergenceError | None:
+            try:
+                return self.comparison.with_effect(*tasks[order[place]], wanted)
+            except ConvergenceError as error:
+                return error  # no response anywhere near its starts, or too expensive: it explains nothing
+
+        results: dict[int, Hypothesis] = {}
+        skipped: dict[int, Skipped] = {}
+        for number, result in zip(order, parallel_map(fitted, len(tasks)), strict=True):
+            before, candidate = tasks[number]
+            self.progress(f"trying {candidate.effect} at {candidate.location}")
+            if isinstance(result, ConvergenceError):
+                skipped[number] = Skipped(candidate.effect, candidate.location, before.names, result.rule)
+                self.progress(f"left out: {result}")
+            elif result:
+                results[number] = result
+        self.skipped += [skipped[number] for number in sorted(skipped)]
+        return [results[number] for number in sorted(results)]
+
+    def step(self, present: Hypothesis, fresh: Sequence[Hypothesis], block: str) -> Step | None:
+        """Return the best of fresh fits; what is too weak for the coarse look is judged on all samples.
+
+        Parameters
+        ----------
+        present
+            Hypothesis that the fits add to.
+        fresh
+            Fits with one more effect each.
+        block
+            Where something is lacking.
+        """
+        before, left = self.excesses_of(present), {h: self.excesses_of(h) for h in fresh}
+        if not before[block].open:
+            best = sorted(fresh, key=lambda h: self.excesses_of(h)[block].chi2)[:PAIRED]
+            before, left = self.on_all(present), {h: self.on_all(h) for h in best}
+        while step := self.chosen(before, left, block):
+            if self._predicts_records(present, step.chosen):
+                return step
+            del left[step.chosen]
+        return None
+
+    def _predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
+        """Tell whether an effect predicts whole records that its numbers were not fitted to."""
+        before, after = self._on_other_records(present), self._on_other_records(chosen)
+        return predicts_records(self.criteria, before, after)
+
+    def _on_other_records(self, hypothesis: Hypothesis) -> Excesses:
+        if hypothesis not in self.on_other_records:
+            again = self.comparison.without_whole_records(hypothesis)
+            self.on_other_records[hypothesis] = self.excesses_of(again)
+        return self.on_other_records[hypothesis]
+
+    def chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
+        """Return the best of some hypotheses, by what each leaves.
+
+        Parameters
+        ----------
+        before
+            What the hypothesis leaves that all add to.
+        tried
+            What each of them leaves.
+        block
+            Where something is lacking.
+        """
+        rivals = [rival_of(h, after) for h, after in tried.items()]
+        choice = choose(self.criteria, before, rivals, block)
+        if choice is None:
+            return None
+        return replace(
+            self.made(before, choice.taken, block),
+            distance=distance_to_next(self.criteria, choice, rivals, block),
+            equals=tuple(r.hypothesis for r in choice.equals),
+        )
+
+    def made(self, before: Excesses, rival: Rival[Hypothesis], block: str) -> Step:
+        """Return a step with what it gains.
+
+        Parameters
+        ----------
+        before
+            What the hypothesis leaves without it.
+        rival
+            With it.
+        block
+            Where something is lacking.
+        """
+        share = max(explained(before, rival.excesses).values(), default=0.0)
+        gained, gains = gain(before, rival.excesses), gains_by_record(before, rival.excesses)
+        return Step(rival.hypothesis, block, share, gain=gained, gains=gains)
+
+    def account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
+        """Return how far each effect goes alone and what speaks against it, the best first.
+
+        Parameters
+        ----------
+        present
+            Hypothesis that they add to.
+        tried
+            Each with one more effect.
+        """
+        whole = max(total_excess(self.excesses_of(present)), 1.0)
+        every = [
+            Tried(
+                h,
+                1.0 - total_excess(self.excesses_of(h)) / whole,
+                self._objections(present, h),
+                is_undecided(self.criteria, self.excesses_of(present), rival_of(h, self.excesses_of(h))),
+            )
+            for h in tried
+        ]
+        return tuple(sorted(every, key=lambda each: -each.share))
+
+    def _objections(self, present: Hypothesis, tried: Hypothesis) -> tuple[str, ...]:
+        words = objections(self.criteria, self.excesses_of(present), rival_of(tried, self.excesses_of(tried)))
+        if tried in self.on_other_records and not self._predicts_records(present, tried):
+            words = (*words, "it does not predict records that are left out as a whole")
+        return words
+
+
+def rival_of(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
+    """Return a hypothesis as the rule sees it.
+
+    Parameters
+    ----------
+    hypothesis
+        Fitted, with at least one effect.
+    after
+        What it leaves.
+    """
+    newest = hypothesis.newest
+    return Rival(
+        hypothesis,
+        newest.effect,
+        len(newest.unknowns),
+        after,
+        standing_of(newest.unknowns, hypothesis.fits.values()),
+        newest.simpler,
+    )
