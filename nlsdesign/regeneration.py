@@ -64,7 +64,7 @@ class ObserverChoice:
     measured: str | None = None
 
 
-class TorqueError(NamedTuple):
+class ObserverTorqueError(NamedTuple):
     """Root mean square error of the estimated torque on one record, in its unit.
 
     Parameters
@@ -112,7 +112,7 @@ class Regeneration:
     reasons: tuple[str, ...] = ()
     quantity: str = ""
     unit: str = "N*m"
-    errors: tuple[TorqueError, ...] = ()
+    errors: tuple[ObserverTorqueError, ...] = ()
     spread_before: tuple[float, ...] = ()
     spread_after: tuple[float, ...] = ()
     course: tuple[Array, Array, Array, Array] | None = None
@@ -210,7 +210,7 @@ def regenerate(
         return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
-        TorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
+        ObserverTorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
         for run, (a, b) in zip(runs, pairs, strict=True)
     )
     progress("designing observers over the spread of the numbers")

@@ -5,7 +5,7 @@ from .cam_section import CamSection
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
 from .page import report_text, write_report
-from .regeneration import regeneration_sections
+from .regeneration_sections import regeneration_sections
 from .sections import (
     Chapter,
     FigureSection,

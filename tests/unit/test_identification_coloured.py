@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from nlsdesign.identification.statistics.coloured import Part, Stretch, colour_of, variance_behind
+from nlsdesign.identification.statistics.coloured import NoisePart, Stretch, colour_of, variance_behind
 from nlsdesign.identification.statistics.filters import filter_weights
 
 STEP = 0.002
@@ -26,7 +26,7 @@ def remembering(count: int, time: float, variance: float, draw: np.random.Genera
 def test_the_variance_behind_a_filter_is_that_of_a_long_process(time: float) -> None:
     process = remembering(400_000, time, 2.0, np.random.default_rng(1))
     seen = np.var(np.convolve(process, WEIGHTS, mode="valid"))
-    assert variance_behind([Part(2.0, time)], WEIGHTS, STEP) == pytest.approx(seen, rel=0.05)
+    assert variance_behind([NoisePart(2.0, time)], WEIGHTS, STEP) == pytest.approx(seen, rel=0.05)
     assert variance_behind([], WEIGHTS, STEP) == 0.0
 
 
@@ -44,7 +44,7 @@ def test_level_and_colour_are_told_at_rest_and_from_differences_over_a_period(ti
         assert colour is not None
         assert colour.parts
         behind = colour.white * float(WEIGHTS @ WEIGHTS) + variance_behind(colour.parts, WEIGHTS, STEP)
-        true = 0.36 * float(WEIGHTS @ WEIGHTS) + variance_behind([Part(0.4, time)], WEIGHTS, STEP)
+        true = 0.36 * float(WEIGHTS @ WEIGHTS) + variance_behind([NoisePart(0.4, time)], WEIGHTS, STEP)
         ratios.append(behind / true)
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.25)
 

@@ -33,14 +33,14 @@ def _drives(assembly: Assembly) -> list[str]:
     """
     bodies = {name: part for name, part in assembly.parts if isinstance(part, Free)}
     read = {assembly.measured(f"{name}.reading")[0] for name in assembly.sensors()}
-    told = [
+    driven = [
         name
         for name, body in bodies.items()
         if body.chain
         or not same_dimension(body.command[1], body.domain.effort_unit)
         or f"{name}.{body.command[0]}" in read
     ]
-    return told or list(bodies)
+    return driven or list(bodies)
 
 
 def _without(*kinds: type[DrivePart]) -> Places:

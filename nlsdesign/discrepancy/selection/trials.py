@@ -259,14 +259,12 @@ class Trials:
 
     def _predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether an effect predicts whole records that its numbers were not fitted to."""
-        before, after = self._on_other_records(present), self._on_other_records(chosen)
+        for each in (present, chosen):
+            if each not in self.on_other_records:
+                again = self.comparison.without_whole_records(each)
+                self.on_other_records[each] = self.excesses_of(again)
+        before, after = self.on_other_records[present], self.on_other_records[chosen]
         return predicts_records(self.criteria, before, after)
-
-    def _on_other_records(self, hypothesis: Hypothesis) -> Excesses:
-        if hypothesis not in self.on_other_records:
-            again = self.comparison.without_whole_records(hypothesis)
-            self.on_other_records[hypothesis] = self.excesses_of(again)
-        return self.on_other_records[hypothesis]
 
     def chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
         """Return the best of some hypotheses, by what each leaves.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -15,7 +15,7 @@ from ..records.measurement import Record
 from ..statistics.filters import derivative, without_rounding
 from .batch import ChainFunction, ColumnFunction, PointFunction
 from .block import Block, Drive
-from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, rosenbrock_step, stages_of
+from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
 
 Array = NDArray[np.float64]
 
@@ -444,7 +444,7 @@ def _walk_functions(
         inner = ca.SX(ca.vertcat(*[e.state[i] for i in stage.states]))
         rate = ca.SX(ca.vertcat(*[e.derivative[i] for i in stage.states]))
         n, ends = inner.numel(), (ca.vertcat(e.state, e.digested), ca.vertcat(new, right))
-        at = _placed(rate, e, stage.states)
+        at = placed(rate, (e.state, e.digested), stage.states)
         if stage.linear:
             table = ca.SX.sym("table", n, 3 * n)
             tables.append(ca.vec(ca.densify(exact_step(ca.jacobian(rate, inner), h))))
@@ -458,7 +458,7 @@ def _walk_functions(
                 guess + short_steps.guess,
                 guessed + short_steps.guessed,
             )
-            seen, count = _placed(e.output, e, stage.states), len(short_steps.states)
+            seen, count = placed(e.output, (e.state, e.digested), stage.states), len(short_steps.states)
             corners = [ends[0] + (ends[1] - ends[0]) * ((k + 1) / count) for k in range(count)]
             outputs += [seen(x, v) / count for x, v in zip(short_steps.states, corners, strict=True)]
         else:
@@ -490,20 +490,6 @@ def _walk_functions(
     return prepare, ca.Function(
         "step", [everything, e.digested, right, constant], [ca.cse(ca.densify(column))]
     )
-
-
-def _placed(
-    value: Expression, e: _Equations, states: Sequence[int]
-) -> Callable[[Expression, Expression], Expression]:
-    """Return an expression as a function of some states and of everything else, all states and samples."""
-
-    def at(x: Expression, v: Expression) -> Expression:
-        place = ca.SX(v)
-        for k, i in enumerate(states):
-            place[i] = x[k]
-        return ca.SX(ca.substitute(value, ca.vertcat(e.state, e.digested), place))
-
-    return at
 
 
 def _column(items: Sequence[Expression]) -> Expression:

@@ -141,6 +141,11 @@ def chosen_filters(
     Raises
     ------
     MeasurementError
+        If the motion is sampled too coarsely for its derivatives.
+
+    Raises
+    ------
+    MeasurementError
         If the motion is sampled too coarsely for derivatives.
     """
     moving = any(d.order > 0 for d in block.drives.values())
@@ -276,7 +281,9 @@ def _power(
     return (squares - own) / max(count, 1), own / max(count, 1)
 
 
-def _too_coarse(block: Block, signals: Sequence[str], pace: float, records: Sequence[Record]) -> Exception:
+def _too_coarse(
+    block: Block, signals: Sequence[str], pace: float, records: Sequence[Record]
+) -> MeasurementError:
     now = 1.0 / max(r.step for r in records)
     frequency = pace / (2.0 * math.pi)
     return MeasurementError(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..records.measurement import Record, RecordSet
-from ..statistics.coloured import Part, Stretch, colour_of, variance_behind
+from ..statistics.coloured import NoisePart, Stretch, colour_of, variance_behind
 
 Array = NDArray[np.float64]
 Evidence: TypeAlias = Literal["rest", "repetition", "white only"]
@@ -46,7 +46,7 @@ class Noise:
 
     level: Mapping[str, float]
     rounded: Mapping[str, bool]
-    parts: Mapping[str, tuple[Part, ...]] = field(default_factory=dict)
+    parts: Mapping[str, tuple[NoisePart, ...]] = field(default_factory=dict)
     evidence: Mapping[str, Evidence] = field(default_factory=dict)
 
     def deviation(self, signal: str) -> float:
@@ -106,7 +106,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
         rounded[column.signal] = white < 2.0 * rounding
         quanta[column.signal] = quantum
     motions = {name: quanta[name] for name, coarse in rounded.items() if coarse and name not in targets}
-    parts: dict[str, tuple[Part, ...]] = {}
+    parts: dict[str, tuple[NoisePart, ...]] = {}
     evidence: dict[str, Evidence] = dict.fromkeys(level, "white only")
     quiet = [(r, *_quiet(r, motions)) for r in seen] if motions else []
     for signal in targets:
@@ -114,13 +114,13 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             continue
         at_rest = [Stretch(r.trace[signal][s], r.step, 0) for r, rest, _ in quiet for s in rest]
         repeated = [_difference(r, signal, *pair) for r, _, repeats in quiet for pair in repeats]
-        found = colour_of(at_rest + repeated)
-        if found is None:
+        colour = colour_of(at_rest + repeated)
+        if colour is None:
             continue
         evidence[signal] = "rest" if _length(at_rest) >= _length(repeated) else "repetition"
-        if found.parts:
+        if colour.parts:
             least = quanta[signal] / math.sqrt(12.0)
-            level[signal], parts[signal] = max(math.sqrt(found.white), least), found.parts
+            level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
     return Noise(level, rounded, parts, evidence)
 
 

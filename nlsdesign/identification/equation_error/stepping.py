@@ -14,7 +14,7 @@ Source: Hochbruck and Ostermann 2010 (φ functions); Verwer et al. 1999 (ROS2).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from graphlib import TopologicalSorter
 from typing import NamedTuple
 
@@ -224,3 +224,28 @@ def is_short(expression: Expression) -> bool:
     return bool(
         ca.Function("f", [ca.vertcat(*ca.symvar(expression))], [expression]).n_instructions() < _SHORT
     )
+
+
+def placed(
+    value: Expression, symbols: tuple[Expression, Expression], states: Sequence[int]
+) -> Callable[[Expression, Expression], Expression]:
+    """Return an expression as a function of some states and of everything else, all states and samples.
+
+    Parameters
+    ----------
+    value
+        Over the symbols.
+    symbols
+        Of all states, and of the samples.
+    states
+        Indices of the states that come first.
+    """
+    state, digested = symbols
+
+    def at(x: Expression, v: Expression) -> Expression:
+        place = ca.SX(v)
+        for k, i in enumerate(states):
+            place[i] = x[k]
+        return ca.SX(ca.substitute(value, ca.vertcat(state, digested), place))
+
+    return at

@@ -47,7 +47,7 @@ class Stretch(NamedTuple):
     lag: int
 
 
-class Part(NamedTuple):
+class NoisePart(NamedTuple):
     """A first-order process: its variance, and the time in s after which it has forgotten all but 37 %."""
 
     variance: float
@@ -58,10 +58,10 @@ class Colour(NamedTuple):
     """White variance, and the parts that remember."""
 
     white: float
-    parts: tuple[Part, ...]
+    parts: tuple[NoisePart, ...]
 
 
-def variance_behind(parts: Sequence[Part], weights: Array, step: float) -> float:
+def variance_behind(parts: Sequence[NoisePart], weights: Array, step: float) -> float:
     """Return the variance of first-order processes behind a filter.
 
     Parameters
@@ -108,7 +108,7 @@ def colour_of(stretches: Sequence[Stretch]) -> Colour | None:
         model = np.maximum(columns @ solution, 1e-12 * density.max())
     if model.max() < _PLAIN * max(solution[0], model.min()):
         return Colour(float(np.sum(model * count) / np.sum(count)), ())
-    parts = tuple(Part(float(v), t) for v, t in zip(solution[1:], times, strict=True) if v > 0.0)
+    parts = tuple(NoisePart(float(v), t) for v, t in zip(solution[1:], times, strict=True) if v > 0.0)
     return Colour(float(solution[0]), parts)
 
 
