@@ -14,6 +14,7 @@ from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects import ALL, backlash
 from nlsdesign.discrepancy.screening.scale_check import typical_sizes
 from nlsdesign.discrepancy.selection.comparison import Comparison
+from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.excess import excesses
 from nlsdesign.discrepancy.selection.measures import total_excess
 from nlsdesign.identification import load_records
@@ -21,6 +22,8 @@ from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig, with_true_contact
 from tests.rig import ACTUATORS, make_records, with_slack_cable, write_set
+
+RULE = Criteria()
 
 CASES = {
     "drive_delay": "arm",
@@ -53,11 +56,11 @@ def test_an_effect_is_seen_and_mostly_explained(tmp_path: Path, effect: str) -> 
     bench = Bench(records, blocks_of(flatten(declared), records.signals))
     comparison = Comparison(bench, typical_sizes(declared, records))
     base = comparison.coarsely(comparison.base(declared))
-    before = excesses(base, bench)
+    before = excesses(base, bench, RULE)
     assert any(each.open for each in before.values()), "the refitted declared model lacks nothing"
     (tried,) = [e for e in ALL if e.__name__ == effect]
     with_it = [comparison.with_effect(base, candidate) for candidate in tried(declared)]
-    left = min(total_excess(excesses(h, bench)) for h in with_it)
+    left = min(total_excess(excesses(h, bench, RULE)) for h in with_it)
     assert left < 0.5 * total_excess(before)
 
 
@@ -72,5 +75,5 @@ def test_a_deck_that_declares_backlash_is_looked_at_coarsely(tmp_path: Path) -> 
         records = load_records(tmp_path, flatten(declared))
         bench = Bench(records, blocks_of(flatten(declared), records.signals))
         comparison = Comparison(bench, typical_sizes(declared, records))
-        left.append(total_excess(excesses(comparison.coarsely(comparison.base(declared)), bench)))
+        left.append(total_excess(excesses(comparison.coarsely(comparison.base(declared)), bench, RULE)))
     assert left[1] < 0.5 * left[0]

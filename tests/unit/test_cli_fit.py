@@ -96,7 +96,7 @@ def test_the_deck_that_is_written_is_accepted_and_says_where_its_numbers_come_fr
     # Unfiltered, so that the noise of the sensor is in both.
     noise = ACTUATORS["arm"].sensors.force_noise
     assert errors[0] == pytest.approx(noise, rel=0.05)
-    assert errors[1] ** 2 - noise**2 > 10.0 * abs(errors[0] ** 2 - noise**2)
+    assert errors[1] ** 2 - errors[0] ** 2 > 0.2 * noise**2
 
 
 def test_a_number_at_the_end_of_its_range_is_not_passed_over(bench: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -102,8 +103,23 @@ def test_without_leaving_out_every_piece_is_as_fitted() -> None:
     assert tally.predicted == pytest.approx(tally.squares)
 
 
-def test_a_whole_record_is_predicted_with_the_numbers_of_the_other_records() -> None:
-    tallies = tallies_of(EVERY, fitted(), by_records)
-    for name, other in (("one", "two"), ("two", "one")):
-        left = DATA[name] - SLOPES[name] @ solved(SLOPES[other], DATA[other])
+def test_a_whole_record_is_predicted_with_the_numbers_of_the_other_records(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("three", "four"):
+        monkeypatch.setitem(ROLES, name, "fit")
+        monkeypatch.setitem(SLOPES, name, RANDOM.standard_normal((ROWS, 2)))
+        monkeypatch.setitem(DATA, name, SLOPES[name] @ [1.5, -0.7] + 3.0 * RANDOM.standard_normal(ROWS))
+    fits = [name for name, role in ROLES.items() if role == "fit"]
+    best = solved(np.vstack([SLOPES[n] for n in fits]), np.concatenate([DATA[n] for n in fits]))
+    whole = replace(fitted(), values={"a": float(best[0]), "b": float(best[1])})
+    tallies = tallies_of([evidence(name) for name in ROLES], whole, by_records)
+    for name in fits:
+        others = [n for n in fits if n != name]
+        numbers = solved(np.vstack([SLOPES[n] for n in others]), np.concatenate([DATA[n] for n in others]))
+        left = DATA[name] - SLOPES[name] @ numbers
         assert tallies["spring", name].predicted == pytest.approx(float(left @ left))
+
+
+def test_of_two_records_none_is_left_out_as_a_whole() -> None:
+    assert tallies_of(EVERY, fitted(), by_records) == tallies_of(EVERY, fitted(), by_pieces)

@@ -279,7 +279,7 @@ def test_a_gap_names_the_clock_on_which_it_is_none(tmp_path: Path, model: object
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("250", '"fast"', r"records.toml: resample_Hz: 'fast' is not a rate.*resample_Hz = 500"),
+        ("250", '"fast"', r"records.toml: resample_Hz: 'fast' is not a finite number.*resample_Hz = 500"),
         ("250", "-250", r"records.toml: resample_Hz: -250 is not a rate"),
         ("resample_Hz", "resampel_Hz", r"resampel_Hz: no such field; did you mean 'resample_Hz'"),
         ("resample_Hz = 250", "", r"columns.torque_Nm.time: is a clock of its own.*add resample_Hz"),

@@ -51,7 +51,7 @@ class CommandSaturation(DriveFault):
     Examples
     --------
     >>> CommandSaturation(saturation=9.0, domain=VOLTAGE).title()
-    'CommandSaturation(saturation = 9 V, domain = voltage)'
+    'CommandSaturation(saturation = 9 V)'
     """
 
     saturation: Quantity = parameter(
@@ -76,7 +76,7 @@ class CommandCompression(DriveFault):
     Examples
     --------
     >>> CommandCompression(halving=40.0, domain=VOLTAGE).title()
-    'CommandCompression(halving = 40 V, domain = voltage)'
+    'CommandCompression(halving = 40 V)'
     """
 
     halving: Quantity = parameter("{effort}", "command u_h of which half acts", minimum=1e-9, maximum=1e9)

@@ -76,7 +76,7 @@ class UnnamedSpring(_Tabled):
 
     E is a uniform cubic B-spline on [``lowest``, ``highest``]; outside of it the end values are held. It is
     no law of nature and says nothing beyond its range; as a function of one motion it has a potential, so it
-    stores work and gives it back. Source: bench records.
+    stores work and gives it back. Source: definition (what was measured, as a table).
 
     Raises
     ------
@@ -117,7 +117,7 @@ class UnnamedFriction(WithFriction, _Tabled):
     D is a uniform cubic B-spline on [``lowest``, ``highest``] with control values ≥ 0, so D ≥ 0 and T·ω ≥ 0:
     it only takes work. Outside of its range the end values are held. With
     ``contact=Regularised(creep_speed=...)`` tanh(ω/ω_s) stands for the sign. It is no law of nature and says
-    nothing beyond its range. Source: bench records.
+    nothing beyond its range. Source: definition (what was measured, as a table).
 
     Raises
     ------

@@ -106,7 +106,7 @@ def _large(values: NDArray[np.float64]) -> tuple[float, int]:
 
 def _rate(motion: NDArray[np.float64], step: float, span: float) -> NDArray[np.float64]:
     """Return the rate of a motion; at both ends of a record, where the filter reaches beyond, that beside."""
-    rate, reach = derivative(motion, step, order=1, span=span), max(2, round(span / step))
+    rate, reach = derivative(motion, step, order=1, span=span), max(2, round(0.5 * span / step) + 1)
     if len(rate) > 2 * reach:
         rate[:reach], rate[-reach:] = rate[reach], rate[-reach - 1]
     return rate

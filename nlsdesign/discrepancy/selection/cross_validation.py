@@ -33,6 +33,8 @@ SEGMENTS = 6
 """Pieces of a record whose sums of squares are kept apart: their scatter is the standard error of a sum."""
 _FOLDS = 3
 """A fold is two pieces of each record: enough is left to identify what shows in one record alone."""
+_LEAST_RECORDS = 3
+"""Records from which one is left out as a whole: a single other one rarely identifies every number."""
 _AT_BOUND = 1e-6
 _LEAST_INFORMATION = 1e-6
 """Information on the fitted scale that is taken for granted, as in the covariance of a fit."""
@@ -68,7 +70,7 @@ def by_pieces(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
 
 
 def by_records(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
-    """Return folds that are whole records.
+    """Return folds that are whole records; pieces where there are too few to leave one out.
 
     Parameters
     ----------
@@ -76,6 +78,8 @@ def by_records(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
         Of all blocks that share numbers.
     """
     names = sorted({e.record.name for e in evidence if e.record.role == "fit"})
+    if len(names) < _LEAST_RECORDS:
+        return by_pieces(evidence)
     return [
         np.full(len(e.floor.sigma), names.index(e.record.name) if e.record.role == "fit" else -1)
         for e in evidence

@@ -40,6 +40,8 @@ _LEFT = 0.5
 _COARSEST = 6.0
 """Samples per period of the typical motion below which derivatives are not known."""
 _STEP = 2.0**0.25
+_WIDTHS = 60
+"""Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
 _LEAST_ROWS = 200
 """Rows that the shortest record is read in, at least."""
 _PROBES = 2000
@@ -156,9 +158,13 @@ def chosen_filters(
         return Filters(0.0, 0.0, shortest)
     if moving and 2.0 * math.pi < _COARSEST * pace * max(r.step for r in records):
         raise _too_coarse(block, list(seen), pace, records)
-    least, span = (READING if block.target else BALANCE) / pace, SPAN / pace
+    # A motion that hardly changes its rate, such as a slow ramp, has no pace of its own: its record sets one.
+    usual = float(np.median([r.step * len(r.trace) for r in records]))
+    widest = usual / _WIDTHS
+    least = min((READING if block.target else BALANCE) / pace, widest)
+    span = min(SPAN / pace, SPAN / BALANCE * widest)
     spacing = SPACING * BALANCE / pace
-    width = _unbiased_width(block, records, noise, (least, span)) if moving else least
+    width = min(_unbiased_width(block, records, noise, (least, span)), widest) if moving else least
     # A record shorter than a few radians of its motion keeps rows that overlap.
     most = min(r.step * len(r.trace) for r in records) / _LEAST_ROWS
     return Filters(width, span, min(max(spacing, SPACING * width), most))

@@ -100,6 +100,8 @@ def colour_of(stretches: Sequence[Stretch]) -> Colour | None:
     number = max(1, round(_TIMES_PER_DECADE * math.log10(max(longest / step, 1.0))))
     times = [float(t) for t in np.geomspace(step, max(longest, 2.0 * step), number + 1)[1:]]
     columns = np.column_stack([np.ones_like(frequency), *[_density(t, frequency, step) for t in times]])
+    if not np.any(density > 0.0):
+        return None
     model = np.full_like(density, np.exp(np.mean(np.log(np.maximum(density, 1e-300)))))
     for _ in range(_ROUNDS):
         # Relative errors count: a periodogram scatters in proportion to its mean.
