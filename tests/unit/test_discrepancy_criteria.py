@@ -317,3 +317,11 @@ def test_an_effect_at_two_places_is_one_alias() -> None:
     assert choice is not None
     assert choice.taken.hypothesis == "ripple at 0"
     assert [r.effect for r in choice.equals] == ["other"]
+
+
+def test_of_several_forms_of_one_effect_the_best_is_told() -> None:
+    worse, better = (replace(rival("heat", 2, left), hypothesis=str(left)) for left in (1200.0, 1000.0))
+    for order in ((worse, better), (better, worse)):
+        choice = choose(RULE, FIRST, order, "spring")
+        assert choice is not None
+        assert choice.taken.hypothesis == "1000.0"

@@ -247,8 +247,8 @@ def effort_over_motion(assembly: Assembly, path: str) -> tuple[str, str]:
 def beside(assembly: Assembly, path: str, name: str, law: Element) -> tuple[Assembly, str]:
     """Return the assembly with a law that shares the motion of another, and the path of the new one.
 
-    In a piece of material, and among laws in parallel, it takes its place beside them; anything else is put
-    in parallel with it, and sensors that read it read both from now on.
+    A law of stress in a piece of material, and one among laws in parallel, takes its place beside them; any
+    other is put in parallel with the piece, and sensors that read it read both from now on.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def beside(assembly: Assembly, path: str, name: str, law: Element) -> tuple[Asse
         In the domain of what it stands beside.
     """
     piece = assembly.element(path)
-    if isinstance(piece, Specimen):
+    if isinstance(piece, Specimen) and law.domain != piece.domain:
         free = free_inside(piece, name)
         return assembly.with_part(f"{path}.{free}", law), f"{path}.{free}"
     owner, _, own = path.rpartition(".")

@@ -388,7 +388,11 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
 
     near = [rival for rival in able if is_near(rival)]
     simplest = min(rival.numbers for rival in near)
-    alike = {rival.effect: rival for rival in reversed(near) if rival.numbers == simplest}
+    alike = dict[str, Rival[T]]()
+    for rival in reversed(near):
+        # Of several forms or places of one effect the best is told.
+        if rival.numbers == simplest and left(rival) <= left(alike.get(rival.effect, rival)):
+            alike[rival.effect] = rival
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
     return Choice(taken, tuple(alike.values()))
