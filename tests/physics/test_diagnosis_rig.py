@@ -123,6 +123,7 @@ def test_practice_records_get_the_right_verdict(
         assert np.allclose(predicted[found.course.quantity], found.course.after, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_periodic_disturbance_is_said_to_be_one(shared_folder: Path) -> None:
     folder = shared_folder / "practice"
     rig = declared_rig(folder / "rig.toml", folder / "cam.csv")
