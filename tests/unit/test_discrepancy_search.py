@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, cast
 
+import numpy as np
 import pytest
 
 from nlsdesign.components import Assembly, Fixed
@@ -16,6 +17,7 @@ from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.discrepancy.selection.measures import EffectNumber, Standing
 from nlsdesign.discrepancy.selection.search import Outcome, search
 from nlsdesign.discrepancy.selection.trials import Skipped
 from nlsdesign.errors import ConvergenceError
@@ -258,3 +260,21 @@ def test_a_richer_form_takes_its_place_once_the_other_effects_are_named() -> Non
     assert found.complete
     left["b", "rich"] = (1.5e4, 10.0)
     assert names(outcome(Table(left), *effects)) == ["b", "plain"], "not half of what is left"
+
+
+def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On thinned records nothing speaks against a; fitted to all samples its number is one error from none."""
+    table = Table({(): (1e5, 1e5), ("a",): (10.0, 1e5), ("b",): (1e5, 10.0), ("a", "b"): (10.0, 10.0)})
+    weak = Standing((EffectNumber("a.0", 0.1, True, 0.1, False),), np.array([[0.01]]))
+
+    def standing(unknowns: Sequence[Unknown], fits: Any) -> Standing:
+        return weak if unknowns[0].name == "a.0" else Standing()
+
+    monkeypatch.setattr("nlsdesign.discrepancy.selection.search.standing_of", standing)
+    found = outcome(table, effect("a"), effect("b"))
+    assert names(found) == ["b"]
+    assert [s.reason for s in found.skipped] == [
+        "on all samples its numbers are 1.0 standard errors from no effect"
+    ]

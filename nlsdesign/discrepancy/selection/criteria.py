@@ -273,7 +273,7 @@ def is_undecided(criteria: Criteria, before: Excesses, rival: Rival[T]) -> bool:
         With it.
     """
     explains = max(explained(before, rival.excesses).values(), default=0.0) >= criteria.closed_share
-    unknown = _objections_of_numbers(criteria, rival.standing)
+    unknown = objections_of_numbers(criteria, rival.standing)
     return explains and bool(unknown) and list(objections(criteria, before, rival)) == unknown
 
 
@@ -302,10 +302,19 @@ def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[s
         words.append(
             f"without its best piece of a record the prediction gains {gained.rest:.3g} squares of the noise"
         )
-    return (*words, *_objections_of_numbers(criteria, rival.standing), *_worse(criteria, before, after))
+    return (*words, *objections_of_numbers(criteria, rival.standing), *_worse(criteria, before, after))
 
 
-def _objections_of_numbers(criteria: Criteria, standing: Standing) -> list[str]:
+def objections_of_numbers(criteria: Criteria, standing: Standing) -> list[str]:
+    """Return in words what the numbers of an effect have against it.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    standing
+        Of the fitted numbers.
+    """
     words = []
     if standing.exclusion < criteria.exclusion:
         words.append(f"its numbers are {standing.exclusion:.1f} standard errors from no effect")

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from ...errors import ConvergenceError
 from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
-from .criteria import Criteria, is_complete, is_superfluous, lacking, unexplained
+from .criteria import Criteria, is_complete, is_superfluous, lacking, objections_of_numbers, unexplained
 from .hypothesis import Hypothesis
 from .measures import explained, total_excess
+from .standing import standing_of
 from .trials import PAIRED, Skipped, Step, Trials, Tried, rival_of
 
 _MOST_EFFECTS_IN_FREE_FLIGHT = 2
@@ -82,12 +83,31 @@ class _Search:
         start = self.trials.comparison.coarsely(base)
         steps = self._enriched(start, self._backward(start, self._forward(start)))
         steps = self._explaining(start, steps)
+        last = self._fitted_to_all(start, steps)
         skipped = tuple(dict.fromkeys(self.trials.skipped))
-        if not steps:
+        if last is None:
             return Outcome(base, (), self.tried, is_complete(self.trials.on_all(start)), skipped)
-        self.trials.progress("fitting what was named to all samples")
-        last = self.trials.comparison.polished(steps[-1].chosen)
-        return Outcome(last, tuple(steps), self.tried, is_complete(self.trials.excesses_of(last)), skipped)
+        done = self.trials.excesses_of(last)
+        return Outcome(last, tuple(steps), self.tried, is_complete(done), skipped)
+
+    def _fitted_to_all(self, start: Hypothesis, steps: list[Step]) -> Hypothesis | None:
+        """Return the last hypothesis fitted to all samples, without effects whose numbers fail there."""
+        while steps:
+            self.trials.progress("fitting what was named to all samples")
+            last = self.trials.comparison.polished(steps[-1].chosen)
+            words = [
+                objections_of_numbers(self.trials.criteria, standing_of(each.unknowns, last.fits.values()))
+                for each in last.added
+            ]
+            if not any(words):
+                return last
+            for step, why in zip(steps, words, strict=True):
+                reason = f"on all samples {'; '.join(why)}"
+                added = step.chosen.newest
+                self.trials.skipped += [Skipped(added.effect, added.location, (), reason)] if why else []
+            kept = [step for step, why in zip(steps, words, strict=True) if not why]
+            steps[:] = self._rebuilt(start, kept)
+        return None
 
     def _explaining(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
         """Drop the effects of blocks that stay unexplained: there they stand for something else."""
