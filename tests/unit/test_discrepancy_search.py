@@ -265,7 +265,7 @@ def test_a_richer_form_takes_its_place_once_the_other_effects_are_named() -> Non
 def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """On thinned records nothing speaks against a; fitted to all samples its number is one error from none."""
+    """On thinned records nothing speaks against a; on all samples its number is one error from none."""
     left = {(): (1e5, 1e5), ("a",): (10.0, 1e5), ("b",): (1e5, 10.0), ("a", "b"): (10.0, 10.0)}
     table = Table(left)
     weak = Standing((EffectNumber("a.0", 0.1, True, 0.1, False),), np.array([[0.01]]))
