@@ -57,6 +57,8 @@ def test_without_the_measurements_the_study_says_why_it_has_no_result(
 @pytest.mark.skipif(
     "NLSDESIGN_SHARED" not in os.environ, reason="NLSDESIGN_SHARED does not name the folder of measurements"
 )
+# Known, not mended: rates are taken over 1.5 rad of the typical motion, which is long for a drive that turns
+# about sharply (4.15 %, 3.66 % with 31 samples). Strict, so that the mark has to go when the span is mended.
 @pytest.mark.xfail(strict=True, reason="rates over a span of the motion blur the reversals of this drive")
 def test_the_balance_of_forces_of_the_positioning_drive_reaches_its_goal(tmp_path: Path) -> None:
     assert run_study("emps", tmp_path, fast=True)["better_force_error_percent"] <= 3.7

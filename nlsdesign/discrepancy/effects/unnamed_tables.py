@@ -184,7 +184,7 @@ def _place(assembly: Assembly, model: FlatModel, block: Block) -> _Place | None:
     try:
         domain = assembly.element(path).domain
     except (KeyError, AttributeError, ValueError):
-        return None
+        return None  # what is measured is no element's effort, so there is no place for a table
     if effort != domain.effort:
         return None
     return _Place(inside[0] if inside else path, domain, False)

@@ -282,7 +282,7 @@ class _Plan:
             floors = self._floors(record)
             answers = [r.responses(record, floors) for r in self._rivals]
         except ConvergenceError:
-            return None
+            return None  # what a hypothesis cannot predict tells nothing; other commands are tried
         separations = []
         for i, j in itertools.combinations(range(len(self._rivals)), 2):
             ways = (

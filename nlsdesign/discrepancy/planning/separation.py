@@ -253,7 +253,7 @@ class _Total:
             try:
                 (answers,) = rival.at(record, floors, [values])
             except ConvergenceError:
-                return cls(math.inf, gradient, matrix)
+                return cls(math.inf, gradient, matrix)  # numbers without a response are never taken
             for name, response in answers.items():
                 total += float(response.residual @ response.residual) / noise[name]
                 gradient = gradient + response.slope.T @ response.residual / noise[name]

@@ -237,7 +237,7 @@ class _Search:
             try:
                 later = self.trials.comparison.with_effect(present, candidate)
             except ConvergenceError:
-                return []
+                return []  # who asks keeps its steps, or names nothing
             if later is None:
                 return []
             rival = rival_of(later, self.trials.excesses_of(later))

@@ -35,7 +35,7 @@ def with_what_has_no_name(comparison: Comparison, hypothesis: Hypothesis, criter
         try:
             tried = comparison.with_effect(present, candidate)
         except ConvergenceError:
-            continue
+            continue  # the block stays open, and the verdict says so as its remainder
         if tried is None:
             continue
         after = excesses(tried, comparison.bench, criteria)
