@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -38,6 +38,7 @@ from .reporting.verdict import NamedEffect, Verdict
 from .screening.causality import lagging_forces
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
+from .screening.wrong_numbers import sentence_of, with_numbers_let_go, wrong_numbers
 from .selection.comparison import Comparison
 from .selection.criteria import Criteria, is_complete
 from .selection.excess import excesses
@@ -138,15 +139,40 @@ def _decided(
     if findings or (lagging.findings and not lagging.testable):
         findings += lagging.findings
         return Outcome(base), _Decision("data_suspect", tuple(str(f) for f in findings))
-    outcome = search(case.comparison, base, catalogue, case.criteria, progress)
+    outcome = _searched(case, base, catalogue, progress)
     if lagging.findings and not any(step.chosen.newest.explains_lag for step in outcome.steps):
         return outcome, _Decision("data_suspect", tuple(str(f) for f in lagging.findings))
     return outcome, _decision(case, base, outcome)
 
 
+def _searched(
+    case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+) -> Outcome:
+    """Search for effects; where something is left, with numbers let go that the records contradict."""
+    outcome = search(case.comparison, base, catalogue, case.criteria, progress)
+    if outcome.complete:
+        return outcome
+    progress("letting go declared numbers at the end of their ranges")
+    free = with_numbers_let_go(case.comparison, outcome.last, case.criteria)
+    if free is None:
+        return outcome
+    if is_complete(case.excesses(free)):
+        return replace(outcome, last=free, complete=True)
+    start = case.comparison.polished(base, released=free.released)
+    again = search(case.comparison, start, catalogue, case.criteria, progress)
+    # Effects beside a wrong number are named only where nothing is left to be explained by something else.
+    return again if again.complete and wrong_numbers(again.last) else outcome
+
+
 def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     """Return what is missing, unless other numbers of the rig explain the records better."""
     verdict: Literal["none", "named", "unknown", "undecidable"]
+    wrong = sentence_of(outcome.last)
+    if wrong and outcome.steps:
+        return _Decision("named", (wrong,))
+    if wrong:
+        other = other_numbers(case.comparison, base, base, case.criteria)
+        return _Decision("data_suspect", (other.words if other.decides else wrong,))
     if not any(e.open for e in case.excesses(base).values()):
         verdict = "none"
     else:
@@ -162,7 +188,7 @@ def _verdict(
 ) -> Verdict:
     verdict = decision.verdict
     base = base.as_written()
-    better = outcome.last if verdict == "named" else base
+    better = outcome.last if verdict == "named" or outcome.last.released else base
     steps = outcome.steps if verdict == "named" else ()
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria)

@@ -148,7 +148,8 @@ class Freed:
     def __init__(self, fit: Fit, left: float) -> None:
         self.bench, self._fit, self._left = BENCH, fit, left
 
-    def freely(self, hypothesis: Hypothesis) -> Hypothesis:
+    def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
+        assert released
         free = with_mean_squares(a=self._left, d=self._left)
         return replace(free, values=self._fit.values, fits={("spring",): self._fit})
 

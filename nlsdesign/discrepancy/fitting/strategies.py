@@ -230,7 +230,7 @@ class Continuation(Strategy):
             best = best_fit(evidence, starts, limits)
         except ConvergenceError:
             return []
-        if not _explains_enough(problem, best.misfit):
+        if not explains_enough(problem, best.misfit):
             raise ConvergenceError(
                 "fit", f"its simpler form explains less than {100.0 * LEAST_EXPLAINED:.0f} % of what is left"
             )
@@ -432,7 +432,7 @@ def _promise(evidence: Sequence[Evidence], start: Sequence[Parameter]) -> float:
         return float("inf")
 
 
-def _explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:
+def explains_enough(problem: FitProblem, misfit: Mapping[Key, float]) -> bool:
     """Tell whether a fit takes enough off the excess over the noise of any block.
 
     Parameters

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...components.assembly.named_parts import Assembly
+from ...errors import ConvergenceError
 from ...identification.equation_error.evidence import Bench
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
@@ -23,9 +24,8 @@ from ..selection.criteria import Criteria
 from ..selection.excess import excesses
 from ..selection.hypothesis import Hypothesis
 from ..selection.measures import DECLARED
+from .wrong_numbers import AT_END, positive_numbers
 
-_AT_END = 3.4
-"""Prior standard deviations at which a refit is stopped: twice the declared range is 3.46."""
 _FAR = 4.0
 """Declared ranges from the declared value beyond which a number is none of this rig; a refit stops at two."""
 _SHARE = 0.98
@@ -73,10 +73,13 @@ def other_numbers(
     """
     before, after = _left(base, comparison.bench, criteria), _left(better, comparison.bench, criteria)
     scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
-    stuck = [n for n, z in scores.items() if abs(z) >= _AT_END]
+    stuck = [n for n, z in scores.items() if abs(z) >= AT_END]
     if len(stuck) < 2 or not before:
         return OtherNumbers("", False)
-    free = comparison.freely(base)
+    try:
+        free = comparison.polished(base, released=positive_numbers(base))
+    except ConvergenceError:
+        return OtherNumbers("", False)
     left, far = _left(free, comparison.bench, criteria), _far_numbers(free, base)
     share = 1.0 - left / before
     if far and numbers_explain(share, left=left, after=after, before=before, named=better is not base):

@@ -15,8 +15,7 @@ from ...errors import ConvergenceError, unknown_name
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_response import free_in
 from ...identification.equation_error.evidence import Bench, Evidence, Floor
-from ...identification.estimation.least_squares import Fit, fit
-from ...identification.estimation.parameters import declared_parameter, free_parameter
+from ...identification.estimation.least_squares import Fit
 from ...identification.records.measurement import Record
 from ...model import Variable, flatten
 from ...processes import parallel_map
@@ -31,8 +30,6 @@ Array = NDArray[np.float64]
 
 _LONGEST_ROW = 12
 """Points of a row of numbers beyond which it is the table of a shape, of which no point is refitted alone."""
-_FREE_REACH = 30.0
-"""Factor to the bounds of a number of which nothing is taken as known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +73,7 @@ class Comparison:
     def __init__(self, bench: Bench, sizes: Mapping[str, float]) -> None:
         self.bench, self.sizes = bench, sizes
         self._fit = HypothesisFit(bench, sizes)
+        self._polished: WeakKeyDictionary[Hypothesis, Hypothesis] = WeakKeyDictionary()
         self._judged: WeakKeyDictionary[Hypothesis, tuple[Judged, ...]] = WeakKeyDictionary()
 
     def base(self, assembly: Assembly) -> Hypothesis:
@@ -129,43 +127,28 @@ class Comparison:
             return None
         return self._refitted(before, groups, candidate.unknowns)
 
-    def polished(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Refit a coarse hypothesis to all samples, from where it stands.
+    def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
+        """Refit a hypothesis to all samples, from where it stands.
 
         Parameters
         ----------
         hypothesis
-            Fitted coarsely.
-        """
-        return self._refitted(replace(hypothesis, coarse=False), self._groups(hypothesis))
+            Fitted, coarsely or not; without anything released the answer is remembered as long as it is.
+        released
+            Positive declared numbers of which nothing is taken as known from now on.
 
-    def freely(self, hypothesis: Hypothesis) -> Hypothesis:
-        """Return a hypothesis with its declared numbers fitted as if nothing were known of them.
-
-        Parameters
-        ----------
-        hypothesis
-            Fitted, without effects. A fit that does not converge leaves its numbers as they are.
+        Raises
+        ------
+        ConvergenceError
+            If there is no response near where it stands.
         """
-        fits, values = dict(hypothesis.fits), dict(hypothesis.values)
-        records = self.bench.records.of("fit")
-        for group in self._groups(hypothesis):
-            variables = {v.name: v for each in group for v in each.block.model.parameters}
-            parameters = [
-                free_parameter(variables[n], reach=_FREE_REACH)
-                if variables[n].start > 0.0
-                else declared_parameter(variables[n])
-                for n in dict.fromkeys(n for each in group for n in each.free)
-            ]
-            start = {p.name: p.start for p in parameters}
-            driven = [self.bench.driven(each.block, each.free, start) for each in group]
-            try:
-                best = fit([e for d in driven for e in self.bench.evidence(d, records, start)], parameters)
-            except ConvergenceError:
-                continue
-            fits[tuple(each.block.name for each in group)] = best
-            values |= best.values
-        return self.on_all_samples(replace(hypothesis, fits=fits, values=values))
+        if not released and hypothesis in self._polished:
+            return self._polished[hypothesis]
+        free = replace(hypothesis, released=hypothesis.released | frozenset(released), coarse=False)
+        result = self._refitted(free, self._groups(free))
+        if not released:
+            self._polished[hypothesis] = result
+        return result
 
     def on_all_samples(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a coarsely fitted hypothesis, its numbers as they are, with what all samples say of it.
@@ -272,7 +255,10 @@ def _edited(hypothesis: Hypothesis, candidate: Candidate) -> Hypothesis:
             values[name] *= now[name].number / then[name].number
     added = (*_with_unknowns(hypothesis.added, old), candidate)
     fits = {blocks: _renamed(fit, renamed) for blocks, fit in hypothesis.fits.items()}
-    return replace(hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits)
+    released = frozenset(map(renamed, hypothesis.released))
+    return replace(
+        hypothesis, assembly=candidate.assembly, added=added, values=values, fits=fits, released=released
+    )
 
 
 def _renamed(fit: Fit, renamed: Callable[[str], str]) -> Fit:

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
-from .measures import DECLARED, Excesses, Gain, Standing, explained, gain, total_excess
+from .measures import DECLARED, Excess, Excesses, Gain, Standing, explained, gain, total_excess
 
 
 def _criterion(default: float, meaning: str) -> Any:
@@ -73,6 +73,9 @@ class Criteria:
     )
     most_effects: int = _criterion(
         3, "effects that are looked for: a fourth would rest on what three inexact forms leave over"
+    )
+    inexact: float = _criterion(
+        0.05, "share of the excess of a block that the inexact form of a named effect may leave in it"
     )
     closed_share: float = _criterion(
         0.75, "share of the excess of a block that all effects in it together must explain for a name"
@@ -190,6 +193,19 @@ def unexplained(criteria: Criteria, first: Excesses, last: Excesses) -> list[str
     if len(shares) > 1:
         shares.pop(DECLARED, None)
     return [n for n, share in shares.items() if last[n].open and share < criteria.closed_share]
+
+
+def is_far_from_closed(criteria: Criteria, first: Excess, now: Excess) -> bool:
+    """Tell whether a block has more left than an inexact form of a named effect leaves.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    first, now
+        What the refitted declared model leaves, and what the present hypothesis leaves.
+    """
+    return now.excess > criteria.inexact * first.excess
 
 
 def is_complete(last: Excesses) -> bool:
@@ -390,8 +406,13 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     best = min(able, key=left)
 
     def is_near(rival: Rival[T]) -> bool:
-        """Tell whether a rival predicts about as well as the best: within noise, or in proportion."""
-        within = not is_more_than_noise(criteria, gain(rival.excesses, best.excesses))
+        """Tell whether a rival predicts about as well as the best: within noise, or in proportion.
+
+        What it gains in another block does not make up for what it leaves in this one.
+        """
+        here, there = ({block: each.excesses[block]} for each in (rival, best))
+        gains = gain(here, there), gain(rival.excesses, best.excesses)
+        within = not any(is_more_than_noise(criteria, each) for each in gains)
         nested = rival.effect in best.simpler
         return within or left(rival) <= (criteria.richer if nested else criteria.equal) * left(best)
 

@@ -86,7 +86,9 @@ def by_records(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
     ]
 
 
-def tallies_of(evidence: Sequence[Evidence], best: Fit, folds: Folds | None) -> dict[Key, Tally]:
+def tallies_of(
+    evidence: Sequence[Evidence], best: Fit, folds: Folds | None, *, exact: bool = True
+) -> dict[Key, Tally]:
     """Return what a fit leaves over on each record, and what it would leave over on a record it has not seen.
 
     Parameters
@@ -97,13 +99,16 @@ def tallies_of(evidence: Sequence[Evidence], best: Fit, folds: Folds | None) -> 
         The fitted numbers.
     folds
         What is left out in turn; with ``None`` everything is predicted with the numbers as they are.
+    exact
+        Whether a fold is predicted by the block itself; otherwise by its linearisation at the optimum, which
+        is enough for what explains too little to be named.
     """
     rows = StackedRows(evidence, best.parameters)
     x = np.array([p.inward(best.values[p.name]) for p in best.parameters])
     pieces = _pieces(rows, evidence, x, folds)
     predicted = [piece.residual for piece in pieces]
     if folds is not None and len(x):
-        predicted = _predicted(rows, pieces, x)
+        predicted = _predicted(rows, pieces, x, exact=exact)
     return {
         (p.evidence.driven.block.name, p.evidence.record.name): Tally(
             float(p.residual @ p.residual),
@@ -120,7 +125,7 @@ def _pieces(rows: StackedRows, evidence: Sequence[Evidence], x: Array, folds: Fo
     return [_Piece(each, *rows.of(each, x), fold) for each, fold in zip(evidence, numbers, strict=True)]
 
 
-def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array) -> list[Array]:
+def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: bool) -> list[Array]:
     """Return the residual of every piece, each fold predicted with the numbers that the other folds give."""
     predicted = [piece.residual.copy() for piece in pieces]
     folds = sorted({int(k) for piece in pieces for k in np.unique(piece.fold) if k >= 0})
@@ -135,12 +140,20 @@ def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array) -> list[Ar
         for place, piece in enumerate(pieces):
             mask = piece.fold == fold
             if mask.any():
-                try:
-                    predicted[place][mask] = rows.of(piece.evidence, moved)[0][mask]
-                except ConvergenceError:
-                    # No response there: what the linearised problem says is all that is known.
-                    predicted[place][mask] = (piece.residual + piece.slope @ (moved - x))[mask]
+                predicted[place][mask] = _at(rows, piece, (x, moved), exact=exact)[mask]
     return predicted
+
+
+def _at(rows: StackedRows, piece: _Piece, numbers: tuple[Array, Array], *, exact: bool) -> Array:
+    """Return the residual of a piece at other numbers than those of the optimum."""
+    x, moved = numbers
+    if exact:
+        try:
+            return rows.of(piece.evidence, moved)[0]
+        except ConvergenceError:
+            pass  # no response there: what the linearised problem says is all that is known
+    linear: Array = piece.residual + piece.slope @ (moved - x)
+    return linear
 
 
 def _without(information: Array, pull: Array, gradient: Array, place: tuple[Array, Array, Array]) -> Array:

@@ -35,6 +35,8 @@ class Hypothesis:
         prediction stays wrong for a while, however right the effect.
     unpredictable
         Blocks and records that such a body makes unpredictable; they count as the others do.
+    released
+        Declared numbers of which nothing is taken as known, because the records contradict their spread.
     """
 
     assembly: Assembly
@@ -45,6 +47,7 @@ class Hypothesis:
     coarse: bool = False
     has_free_flight: bool = False
     unpredictable: frozenset[Key] = frozenset()
+    released: frozenset[str] = frozenset()
 
     @property
     def newest(self) -> Candidate:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from ...errors import ConvergenceError
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench
 from ...identification.estimation.least_squares import Fit
-from ...identification.estimation.parameters import Parameter, declared_parameter
+from ...identification.estimation.parameters import Parameter, declared_parameter, free_parameter
 from ...model import Variable
 from ..effects.candidate import Unknown
-from ..fitting.strategies import FitProblem, Plain, Start, method_for, refusal
+from ..fitting.strategies import FitProblem, Plain, Start, explains_enough, method_for, refusal
 from ..fitting.unpredictable import Key, Tally
 from .cross_validation import Folds, by_pieces, tallies_of
 from .hypothesis import Hypothesis
+
+_FREE_REACH = 30.0
+"""Factor to the bounds of a number of which nothing is taken as known."""
 
 
 class FreeBlock(NamedTuple):
@@ -92,7 +95,7 @@ class HypothesisFit:
         method, strategy = method_for(problem), hypothesis.newest.strategy if new else Plain()
         try:
             best = method.fit(problem, strategy)
-            tallies = _tallies(problem, best)
+            tallies = _tallies(problem, best, exact=not new or explains_enough(problem, best.misfit))
             aside = method.set_aside(problem, best, tallies)
         except ConvergenceError as error:
             return error
@@ -151,7 +154,14 @@ class HypothesisFit:
         result = []
         for combination in combinations:
             begin = {**hypothesis.values, **dict(zip((u.name for u in new), combination, strict=True))}
-            result.append(tuple(self._parameter(variables[n], known.get(n), begin.get(n)) for n in free))
+            result.append(
+                tuple(
+                    _released(variables[n], begin.get(n))
+                    if n in hypothesis.released
+                    else self._parameter(variables[n], known.get(n), begin.get(n))
+                    for n in free
+                )
+            )
         return tuple(result)
 
     def _scale(self, unknown: Unknown) -> float:
@@ -177,6 +187,13 @@ class HypothesisFit:
         )
 
 
-def _tallies(problem: FitProblem, best: Fit, folds: Folds = by_pieces) -> dict[Key, Tally]:
+def _released(variable: Variable, start: float | None) -> Parameter:
+    free = free_parameter(variable, reach=_FREE_REACH)
+    return free if start is None else replace(free, start=start)
+
+
+def _tallies(
+    problem: FitProblem, best: Fit, folds: Folds = by_pieces, *, exact: bool = True
+) -> dict[Key, Tally]:
     # Behind a free flight a slope holds at its point only, so no step without a fold can be taken.
-    return tallies_of(problem.evidence, best, None if problem.has_free_flight else folds)
+    return tallies_of(problem.evidence, best, None if problem.has_free_flight else folds, exact=exact)

@@ -12,7 +12,15 @@ from dataclasses import dataclass, replace
 from ...errors import ConvergenceError
 from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
-from .criteria import Criteria, is_complete, is_superfluous, lacking, objections_of_numbers, unexplained
+from .criteria import (
+    Criteria,
+    is_complete,
+    is_far_from_closed,
+    is_superfluous,
+    lacking,
+    objections_of_numbers,
+    unexplained,
+)
 from .hypothesis import Hypothesis
 from .measures import explained, total_excess
 from .standing import standing_of
@@ -130,21 +138,30 @@ class _Search:
             step = None
             for block in open_blocks:
                 # Effects elsewhere wait for their turn: most blocks have an effect of their own.
-                fresh = self.trials.tried_on(present, block, tried)
+                far = self._is_far_from_closed(start, present, block)
+                fresh = self.trials.tried_on(present, block, tried, far=far)
                 tried += fresh
                 step = self.trials.step(present, fresh, block)
                 if step is not None:
                     break
             self.tried = self.tried or self.trials.account(present, tried)
             further = [step] if step else []
-            if not steps and not further:
-                # Beside an effect that was named, most of what is left over is the inexactness of its form.
+            room = self._most_effects(present) - len(steps)
+            if room > 1 and not further and self._is_far_from_closed(start, present, open_blocks[0]):
                 further = self._pair(tried, present, open_blocks[0])
             if not further:
                 break
             steps += further
             present = steps[-1].chosen
         return steps
+
+    def _is_far_from_closed(self, start: Hypothesis, present: Hypothesis, block: str) -> bool:
+        """Tell whether what is left is worth a long search.
+
+        Beside an effect that was named, what little is left over is the inexactness of its form.
+        """
+        first, now = (self.trials.excesses_of(each)[block] for each in (start, present))
+        return not present.added or is_far_from_closed(self.trials.criteria, first, now)
 
     def _most_effects(self, present: Hypothesis) -> int:
         most = int(self.trials.criteria.most_effects)
@@ -199,7 +216,7 @@ class _Search:
 
     def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""
-        best = sorted(tried, key=lambda h: total_excess(self.trials.excesses_of(h)))[:PAIRED]
+        best = self._best_of_each(tried)[:PAIRED]
         tasks = [
             (one, again)
             for one, other in itertools.combinations(best, 2)
@@ -213,6 +230,13 @@ class _Search:
             return []
         alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)
         return [self.trials.made(before, rival_of(alone, self.trials.excesses_of(alone)), block), step]
+
+    def _best_of_each(self, tried: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return the best form and place of each effect, the best effect first."""
+        best: dict[str, Hypothesis] = {}
+        for each in sorted(tried, key=lambda h: total_excess(self.trials.excesses_of(h))):
+            best.setdefault(each.newest.effect, each)
+        return list(best.values())
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
         """Return the same effect at the same kind of place of another assembly."""

@@ -10,7 +10,15 @@ from ...errors import ConvergenceError
 from ...processes import parallel_map
 from ..effects.candidate import Candidate, EffectFunction
 from .comparison import Comparison
-from .criteria import Criteria, Rival, choose, is_undecided, objections, predicts_records
+from .criteria import (
+    Criteria,
+    Rival,
+    choose,
+    is_undecided,
+    objections,
+    objections_of_numbers,
+    predicts_records,
+)
 from .excess import excesses
 from .hypothesis import Hypothesis
 from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, total_excess
@@ -20,9 +28,6 @@ from .standing import standing_of
 PAIRED = 4
 """Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice. Six pairs
 take about as long as the catalogue did."""
-_NEARLY_CLOSED = 5.0
-"""Mean square above the noise floor below which, beside other effects, nothing is tried that takes long: that
-is mostly what inexact forms leave over."""
 _UNKNOWN_GAIN = Gain(math.nan, math.nan, math.nan)
 
 
@@ -35,9 +40,9 @@ class Step:
     chosen
         Hypothesis with the effect in it.
     block
-        In which something was lacking.
+        Of whose excess it explains most.
     share
-        Share of the excess that was left in a block before, of the block of which it explains most.
+        That share of what was left there before.
     distance
         How many times as much the best other name leaves, natural logarithm.
     gain, gains
@@ -168,10 +173,13 @@ class Trials:
         """
         return [c for effect in self.catalogue for c in effect(present.assembly)]
 
-    def tried_on(self, present: Hypothesis, block: str, done: Sequence[Hypothesis]) -> list[Hypothesis]:
+    def tried_on(
+        self, present: Hypothesis, block: str, done: Sequence[Hypothesis], *, far: bool
+    ) -> list[Hypothesis]:
         """Return fits of the candidates that act on a block and were not tried before.
 
-        What takes long is tried only where nothing else explains the block down to its noise.
+        What takes long is tried only where nothing else explains the block down to its noise, and where more
+        is left than the inexact form of an effect leaves.
 
         Parameters
         ----------
@@ -181,20 +189,24 @@ class Trials:
             Where something is lacking.
         done
             What was tried before.
+        far
+            Whether the block has more left than the inexact form of an effect leaves.
         """
         known = {(h.newest.effect, h.newest.location) for h in done}
         tasks = [(present, c) for c in self.candidates(present) if (c.effect, c.location) not in known]
         wanted = () if block == DECLARED else (block,)
         quick = self.fits([task for task in tasks if not task[1].strategy.takes_long], wanted)
         long = [task for task in tasks if task[1].strategy.takes_long]
-        if reason := self._why_not_long(present, quick, block):
+        if reason := self._why_not_long(present, quick, block, far=far):
             self.skipped += [Skipped(c.effect, c.location, present.names, reason) for _, c in long]
             return quick
         return quick + self.fits(long, wanted)
 
-    def _why_not_long(self, present: Hypothesis, quick: Sequence[Hypothesis], block: str) -> str:
+    def _why_not_long(
+        self, present: Hypothesis, quick: Sequence[Hypothesis], block: str, *, far: bool
+    ) -> str:
         """Return why what takes long is not tried; empty if it is."""
-        if present.added and self.excesses_of(present)[block].mean_square < _NEARLY_CLOSED:
+        if not far:
             return f"takes long, and {' and '.join(present.names)} leave little in the block"
         step = self.step(present, quick, block)
         if step is not None and not self.excesses_of(step.chosen)[block].open:
@@ -252,10 +264,20 @@ class Trials:
             best = sorted(fresh, key=lambda h: self.excesses_of(h)[block].chi2)[:PAIRED]
             before, left = self.on_all(present), {h: self.on_all(h) for h in best}
         while step := self.chosen(before, left, block):
-            if self._predicts_records(present, step.chosen):
+            if self._predicts_records(present, step.chosen) and self._stands_on_all(step.chosen):
                 return step
             del left[step.chosen]
         return None
+
+    def _stands_on_all(self, chosen: Hypothesis) -> bool:
+        """Tell whether the numbers of the newest effect stand when they are fitted to all samples."""
+        newest = chosen.newest
+        fits = self.comparison.polished(chosen).fits.values()
+        why = objections_of_numbers(self.criteria, standing_of(newest.unknowns, fits))
+        if why:
+            reason = f"on all samples {'; '.join(why)}"
+            self.skipped.append(Skipped(newest.effect, newest.location, chosen.names[:-1], reason))
+        return not why
 
     def _predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether an effect predicts whole records that its numbers were not fitted to."""
@@ -298,11 +320,12 @@ class Trials:
         rival
             With it.
         block
-            Where something is lacking.
+            Where something is lacking; where it explains most stands in the step.
         """
-        share = max(explained(before, rival.excesses).values(), default=0.0)
+        shares = explained(before, rival.excesses) or {block: 0.0}
+        most = max(shares, key=lambda name: (shares[name], name == block))
         gained, gains = gain(before, rival.excesses), gains_by_record(before, rival.excesses)
-        return Step(rival.hypothesis, block, share, gain=gained, gains=gains)
+        return Step(rival.hypothesis, most, shares[most], gain=gained, gains=gains)
 
     def account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
         """Return how far each effect goes alone and what speaks against it, the best first.
