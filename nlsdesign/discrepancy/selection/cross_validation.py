@@ -3,8 +3,9 @@
 Each record is cut into pieces in time, and the pieces are dealt out to folds, so that each fold holds pieces
 of every record. Each fold in turn is left out; the numbers that the others would give follow from the optimum
 by one Gauss–Newton step without that fold, inside the bounds (approximate leave-one-out, Beirami et al. 2017,
-with pieces of records in place of samples, as Burman et al. 1994 ask for where samples are dependent). The
-fold is then predicted with those numbers, exactly.
+with pieces of records in place of samples, as Burman et al. 1994 ask for where samples are dependent). Where
+that step does not bring the others what its slopes promise, they are fitted by a descent. The fold is then
+predicted with those numbers, exactly.
 
 By pieces hypotheses are compared. Leaving whole records out asks more: of six motions of six kinds five may
 not identify what the sixth shows, so it would choose the models that leave that out. But an effect that does
@@ -61,12 +62,16 @@ Folds: TypeAlias = Callable[[Sequence[Evidence]], list[NDArray[np.int64]]]
 def by_pieces(evidence: Sequence[Evidence]) -> list[NDArray[np.int64]]:
     """Return folds that hold pieces of every record.
 
+    The first piece is in another fold from record to record: what shows at one phase of a motion that is
+    repeated, such as the way back, is left out of some records and known from the others.
+
     Parameters
     ----------
     evidence
         Of all blocks that share numbers.
     """
-    names, folds = sorted({e.record.name for e in evidence}), []
+    # In the order of the records, which follows from what they hold, not from their names.
+    names, folds = list(dict.fromkeys(e.record.name for e in evidence)), []
     for each in evidence:
         cuts = [len(part) for part in np.array_split(np.arange(len(each.floor.sigma)), SEGMENTS)]
         fold = np.repeat((np.arange(SEGMENTS) + names.index(each.record.name)) % _FOLDS, cuts)
