@@ -64,7 +64,7 @@ from .transmission.cam_error import CamWithProfileError
 from .transmission.cam_shapes import AnchoredCam, OneSidedCam
 from .transmission.capstan import CapstanFriction, Guide, WrapProduct
 from .transmission.stretchy_cable import StretchyCable
-from .transmission.unilateral_cable import InextensibleCable, PullOnly, pull_only
+from .transmission.unilateral_cable import Buckling, InextensibleCable, PullOnly, pull_only
 
 __all__ = [
     "MATERIAL",
@@ -78,6 +78,7 @@ __all__ = [
     "Backlash",
     "Body",
     "BoucWen",
+    "Buckling",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",

@@ -79,6 +79,12 @@ ROWS: tuple[Row, ...] = (
         _RUBBER + "a_cable_only_pulls",
     ),
     Row(
+        c.Buckling,
+        "a rod, and a band that only pulls",
+        ("smooth law", "k·e, and max(k·e, 0) within w·ln 2"),
+        _RUBBER + "a_piece_that_buckles_pushes_as_a_rod_does_but_for_a_share",
+    ),
+    Row(
         c.Tie,
         "action = reaction",
         ("two driven shafts", "difference of motions by hand"),

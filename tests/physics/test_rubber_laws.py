@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from nlsdesign.components import (
     ROTATION,
     TRANSLATION,
+    Buckling,
     CoulombFriction,
     Dashpot,
     Driven,
@@ -289,6 +290,16 @@ def test_a_cable_only_pulls(extension: float, rate: float) -> None:
     found = flatten(made, outputs=["rope.force"]).evaluate([], [extension, rate])["rope.force"]
     sharp = max(1000.0 * extension + 30.0 * rate, 0.0)
     assert sharp <= found <= sharp + 0.1 * math.log(2.0) * (1 + 1e-12)
+
+
+@given(st.floats(-0.05, 0.05), st.floats(0.0, 1.0))
+def test_a_piece_that_buckles_pushes_as_a_rod_does_but_for_a_share(extension: float, share: float) -> None:
+    inside = (("band", Spring(stiffness=1000.0)),)
+    band = Buckling(members=inside, share=share, width=1e-3)
+    made = assembly("a", grip=Driven(domain=TRANSLATION), band=tie(band, "grip"))
+    found = flatten(made, outputs=["band.force"]).evaluate([], [extension, 0.0])["band.force"]
+    rod = 1000.0 * extension
+    assert found == pytest.approx(rod if rod > 0.0 else (1.0 - share) * rod, abs=1e-3 * math.log(2.0))
 
 
 def test_motor_against_newton() -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from nlsdesign.discrepancy.selection.cross_validation import SEGMENTS, by_pieces, by_records, tallies_of
 from nlsdesign.identification import Fit, Parameter
@@ -20,6 +21,8 @@ SLOPES = {name: RANDOM.standard_normal((ROWS, 2)) for name in ("one", "two", "ch
 DATA = {name: s @ [1.5, -0.7] + 3.0 * RANDOM.standard_normal(ROWS) for name, s in SLOPES.items()}
 ROLES = {"one": "fit", "two": "fit", "chosen": "selection"}
 PRIOR = 0.4
+DEALT = {"one": 0, "two": 1}
+"""Fold of the first piece of each record that is fitted."""
 
 
 def evidence(name: str) -> Evidence:
@@ -28,9 +31,15 @@ def evidence(name: str) -> Evidence:
     def residual(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         return DATA[name] - SLOPES[name] @ [values["a"], values["b"]], -SLOPES[name]
 
+    return evidence_of(name, ROLES[name], residual)
+
+
+def evidence_of(
+    name: str, role: str, residual: Callable[[Mapping[str, float]], tuple[np.ndarray, np.ndarray]]
+) -> Evidence:
+    """A record of any block."""
     driven = SimpleNamespace(block=SimpleNamespace(name="spring"), free=("a", "b"), stiff=False)
-    record = SimpleNamespace(name=name, role=ROLES[name])
-    floor = SimpleNamespace(sigma=np.ones(ROWS))
+    record, floor = SimpleNamespace(name=name, role=role), SimpleNamespace(sigma=np.ones(ROWS))
     return cast(Evidence, SimpleNamespace(driven=driven, record=record, floor=floor, residual=residual))
 
 
@@ -58,14 +67,14 @@ def test_each_fold_is_predicted_with_the_numbers_that_the_other_folds_give() -> 
     by_hand = {name: [0.0] * SEGMENTS for name in ("one", "two")}
     piece = np.arange(ROWS) // (ROWS // SEGMENTS)
     for fold in range(3):
-        others = piece % 3 != fold
+        others = {name: (piece + DEALT[name]) % 3 != fold for name in by_hand}
         numbers = solved(
-            np.vstack([SLOPES["one"][others], SLOPES["two"][others]]),
-            np.concatenate([DATA["one"][others], DATA["two"][others]]),
+            np.vstack([SLOPES[name][kept] for name, kept in others.items()]),
+            np.concatenate([DATA[name][kept] for name, kept in others.items()]),
         )
         for name, sums in by_hand.items():
             left = DATA[name] - SLOPES[name] @ numbers
-            for k in range(fold, SEGMENTS, 3):
+            for k in range((fold - DEALT[name]) % 3, SEGMENTS, 3):
                 sums[k] = float(np.sum(left[piece == k] ** 2))
     for name, sums in by_hand.items():
         assert tallies["spring", name].segments == pytest.approx(sums)
@@ -87,7 +96,7 @@ def test_numbers_stay_inside_their_bounds_when_pieces_are_left_out() -> None:
     assert held.values["b"] == -1.2, "or the test would show nothing"
     # The bound holds the second number for every fold, so only the first moves.
     piece = np.arange(ROWS) // (ROWS // SEGMENTS)
-    others = np.concatenate([piece % 3 != 0] * 2)
+    others = np.concatenate([(piece + shift) % 3 != 0 for shift in DEALT.values()])
     rows = np.vstack([SLOPES["one"], SLOPES["two"]])[others]
     data = np.concatenate([DATA["one"], DATA["two"]])[others] + 1.2 * rows[:, 1]
     first = (rows[:, 0] @ data + 1.0 / PRIOR**2) / (rows[:, 0] @ rows[:, 0] + 1.0 / PRIOR**2)
@@ -123,3 +132,49 @@ def test_a_whole_record_is_predicted_with_the_numbers_of_the_other_records(
 
 def test_of_two_records_none_is_left_out_as_a_whole() -> None:
     assert tallies_of(EVERY, fitted(), by_records) == tallies_of(EVERY, fitted(), by_pieces)
+
+
+def test_what_shows_at_one_phase_of_every_record_is_left_out_of_some_records_only() -> None:
+    """Motions of one kind turn about in one piece: were that the same fold in each, nothing would know it."""
+    many = [evidence_of(name, "fit", lambda values: (np.zeros(ROWS), np.zeros((ROWS, 2)))) for name in "abc"]
+    folds = np.array([fold[:: ROWS // SEGMENTS] for fold in by_pieces(many)])
+    assert all(set(at_one_phase) == {0, 1, 2} for at_one_phase in folds.T)
+    again = by_pieces([*many, many[1]])
+    assert np.array_equal(again[1], again[3]), "in every block alike"
+    renamed = by_pieces([evidence_of(each, "fit", evidence("one").residual) for each in "cba"])
+    assert np.array_equal(renamed, by_pieces(many)), "whatever the records are called"
+
+
+def test_where_a_step_leaves_what_its_slopes_hold_the_numbers_come_from_a_descent() -> None:
+    """Only the left-out piece knows the second number, and along that one the slopes hold nowhere else."""
+    time = np.linspace(0.0, 1.0, ROWS)
+    truth = 1.0 - np.exp(-time / 3.0)
+    wrong = truth + np.where(time > 0.8, 0.3 * (time - 0.8), 0.0)
+
+    def residual(values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        level, slowness = np.exp(values["a"]), np.exp(values["b"])
+        rest = np.exp(-time / slowness)
+        slopes = np.column_stack([-level * (1.0 - rest), level * rest * time / slowness])
+        return 1e3 * (wrong - level * (1.0 - rest)), 1e3 * slopes
+
+    records = [evidence_of("one", "fit", residual)]
+    parameters = tuple(Parameter(n, "1", 0.0, 0.0, math.inf, -6.0, 12.0, "linear") for n in ("a", "b"))
+
+    def left(numbers: np.ndarray) -> np.ndarray:
+        return residual({"a": float(numbers[0]), "b": float(numbers[1])})[0]
+
+    def refitted(kept: np.ndarray, start: np.ndarray) -> np.ndarray:
+        bounds = ([-6.0, -6.0], [12.0, 12.0])
+        return np.asarray(least_squares(lambda x: left(x)[kept], start, bounds=bounds, x_scale="jac").x)
+
+    best = refitted(np.ones(ROWS, dtype=bool), np.array([0.0, 1.0]))
+    fit = Fit(parameters, {"a": float(best[0]), "b": float(best[1])}, np.eye(2), 1.0, {}, True)
+    found = np.array(tallies_of(records, fit, by_pieces)["spring", "one"].segments)
+    (fold,), piece = by_pieces(records), np.arange(ROWS) // (ROWS // SEGMENTS)
+    exact = np.zeros(SEGMENTS)
+    for k in range(3):
+        squares = left(refitted(fold != k, best)) ** 2
+        for each in range(SEGMENTS):
+            if (fold[piece == each] == k).all():
+                exact[each] = float(np.sum(squares[piece == each]))
+    assert found.sum() == pytest.approx(exact.sum(), rel=0.1)

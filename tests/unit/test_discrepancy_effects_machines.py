@@ -9,6 +9,7 @@ import pytest
 from nlsdesign.components import (
     TRANSLATION,
     Assembly,
+    Buckling,
     ConstantLoad,
     CoulombFriction,
     Dashpot,
@@ -19,7 +20,6 @@ from nlsdesign.components import (
     LinearDrive,
     LinearElastic,
     NeoHooke,
-    PullOnly,
     specimen,
     tie,
 )
@@ -96,7 +96,7 @@ def test_relaxation_at_large_stretch_is_offered_with_one_and_with_two_times() ->
 def test_a_strip_that_buckles_is_read_outside() -> None:
     (found,) = cable_slack(strip(NeoHooke(shear_modulus=3e4)))
     element = found.assembly.element("strip")
-    assert isinstance(element, PullOnly)
+    assert isinstance(element, Buckling)
     model = flatten(found.assembly)
     pushed = model.evaluate([], [-0.02, 0.0])
     pulled = model.evaluate([], [0.02, 0.0])
@@ -105,6 +105,18 @@ def test_a_strip_that_buckles_is_read_outside() -> None:
         flatten(strip(NeoHooke(shear_modulus=3e4))).evaluate([], [0.02, 0.0])["load_cell.reading"], abs=1e-6
     )
     assert cable_slack(found.assembly) == []
+
+
+def test_a_strip_that_buckles_is_one_that_does_not_where_its_deciding_number_has_no_effect() -> None:
+    """How sharp a corner is cannot tell whether it is there: at width zero a strip buckles most of all."""
+    (found,) = cable_slack(strip(NeoHooke(shear_modulus=3e4)))
+    (deciding,) = [u for u in found.unknowns if u.null is not None]
+    without = flatten(found.assembly.with_values({deciding.name: deciding.null}))
+    bare = flatten(strip(NeoHooke(shear_modulus=3e4)))
+    for extension in (-0.02, -1e-6, 0.0, 0.02):
+        assert without.evaluate([], [extension, 0.0])["load_cell.reading"] == pytest.approx(
+            bare.evaluate([], [extension, 0.0])["load_cell.reading"], abs=1e-9
+        )
 
 
 def test_two_branches_of_one_law_keep_their_numbers_when_they_move() -> None:

@@ -262,6 +262,73 @@ def test_a_richer_form_takes_its_place_once_the_other_effects_are_named() -> Non
     assert names(outcome(Table(left), *effects)) == ["b", "plain"], "not half of what is left"
 
 
+def forms(name: str, **numbers: int) -> EffectFunction:
+    """One effect in several forms, by the name that the table knows each by, with so many numbers."""
+
+    def of(assembly: Assembly) -> Sequence[Candidate]:
+        return [
+            Candidate(
+                name, "motor", assembly,
+                tuple(Unknown(f"{form}.{form}_{k}", (1.0,), 0.1, 10.0) for k in range(count)), form, "source",
+            )
+            for form, count in numbers.items()
+        ]  # fmt: skip
+
+    return of
+
+
+class TableOfForms(Table):
+    """A table that knows forms of one effect apart, by their signatures."""
+
+    def hypothesis(self, added: tuple[Candidate, ...]) -> Hypothesis:
+        known = super().hypothesis(tuple(replace(c, effect=c.signature) for c in added))
+        return replace(known, added=added)
+
+
+def test_a_richer_form_of_a_named_effect_comes_before_one_more_name() -> None:
+    """Beside b two branches leave nothing, and one branch with c beside it leaves as little."""
+    left = {
+        (): (1e5, 9e4), ("one",): (2e4, 9e4), ("two",): (1.9e4, 9e4), ("sign",): (1e5, 10.0),
+        ("sign", "one"): (2e4, 10.0), ("sign", "two"): (10.0, 10.0),
+    }  # fmt: skip
+    effects = forms("branch", one=2, two=4), effect("b")
+    found = outcome(TableOfForms(left), *effects)
+    assert [(c.effect, len(c.unknowns)) for c in found.last.added] == [("branch", 4), ("b", 1)]
+    left["sign", "two"] = (1.5e4, 10.0)
+    found = outcome(TableOfForms(left), *effects)
+    assert [len(c.unknowns) for c in found.last.added] == [2, 1], "not half of what is left"
+
+
+def test_a_richer_form_whose_numbers_do_not_stand_does_not_take_its_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    left = {
+        (): (1e5, 9e4), ("one",): (2e4, 9e4), ("two",): (1.9e4, 9e4), ("sign",): (1e5, 10.0),
+        ("sign", "one"): (2e4, 10.0), ("sign", "two"): (10.0, 10.0),
+    }  # fmt: skip
+    weak = Standing((EffectNumber("two.two_0", 0.1, True, 0.1, False),), np.array([[0.01]]))
+
+    def standing(unknowns: Sequence[Unknown], fits: Any) -> Standing:
+        return weak if len(unknowns) == 4 else Standing()
+
+    monkeypatch.setattr("nlsdesign.discrepancy.selection.search.standing_of", standing)
+    found = outcome(TableOfForms(left), forms("branch", one=2, two=4), effect("b"))
+    assert [len(c.unknowns) for c in found.last.added] == [2, 1]
+
+
+def test_steps_made_anew_keep_the_form_of_an_effect() -> None:
+    """Two forms have as many numbers; without a, which c makes superfluous, b keeps the form it had."""
+    left = {
+        (): (1e5,), ("a",): (3e4,), ("first",): (9e4,), ("second",): (8e4,), ("c",): (9.5e4,),
+        ("a", "first"): (2.9e4,), ("a", "second"): (1e4,), ("a", "c"): (2.9e4,),
+        ("a", "second", "c"): (1e3,), ("a", "first", "c"): (9e3,), ("second", "c"): (1e3,),
+        ("first", "c"): (9e3,),
+    }  # fmt: skip
+    named_a, named_c = forms("a", a=1), forms("c", c=1)
+    found = outcome(TableOfForms(left), named_a, forms("b", first=2, second=2), named_c)
+    assert [c.signature for c in found.last.added] == ["second", "c"]
+
+
 def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

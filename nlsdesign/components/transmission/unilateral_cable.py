@@ -1,4 +1,4 @@
-"""Cables that only pull: the force cut off smoothly, or true contact that frees what is pulled."""
+"""Cables that only pull, and pieces that buckle: the force cut off smoothly, or true contact."""
 
 from __future__ import annotations
 
@@ -38,6 +38,37 @@ class PullOnly(Combination):
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the smooth positive part of the sum of forces."""
         return positive_part(self.inside(scope, motion, rate), scope.parameter("width"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Buckling(Combination):
+    """A piece that gives way where it should push: F = F⁺ − (1 − s)·F⁻, rounded over ``width``, C∞.
+
+    F⁺ is what the piece would pull, F⁻ what it would push. The share s of a push that it does not carry is 0
+    for a rod and 1 for a thin band, whose load of buckling is nothing beside its pull; beyond 1 it snaps
+    through. The memory of the piece is that of a rod, as in :class:`PullOnly`.
+    Source: Signorini 1933 (unilateral contact); Dugas et al. 2001 (softplus, this rounding).
+
+    Examples
+    --------
+    >>> from nlsdesign.components import Spring
+    >>> Buckling(share=0.9, members=(("band", Spring(stiffness=2500.0)),)).title()
+    'Buckling(share = 0.9, width = 0.0001 N)'
+    """
+
+    takes: ClassVar[tuple[Domain, ...]] = (TRANSLATION,)
+    placing: ClassVar[str | None] = PullOnly.placing
+    phenomena: ClassVar[frozenset[str]] = frozenset({"unilateral contact"})
+
+    share: Quantity = parameter("1", "share of a push that is not carried", minimum=-2.0, maximum=3.0)
+    width: Quantity = parameter(
+        "N", "force over which the corner is rounded", minimum=1e-6, maximum=1e3, default=1e-4
+    )
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return the sum of forces without that share of a push."""
+        force, share = self.inside(scope, motion, rate), scope.parameter("share")
+        return (1 - share) * force + share * positive_part(force, scope.parameter("width"))
 
 
 @dataclass(frozen=True, kw_only=True)

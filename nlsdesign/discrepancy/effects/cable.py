@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 from ...components import (
     Assembly,
+    Buckling,
     CamWithProfileError,
     CapstanFriction,
     Element,
     InextensibleCable,
-    PullOnly,
     Slack,
     Specimen,
     StretchyCable,
@@ -78,9 +78,14 @@ def _tied_specimens(assembly: Assembly) -> list[str]:
 
 def _buckling(assembly: Assembly, name: str) -> Iterator[Edit]:
     # A sensor of the force between the bodies goes on reading that, not what the piece would push.
-    pulled = PullOnly(members=(("piece", assembly.element(name)),), width=number(1e-3, "N"))
-    width = Unknown(f"{name}.width", (0.01,), 1e-4, 0.2, f"{name}.force")
-    yield Edit(assembly.with_part(name, pulled), (width,))
+    piece = (("piece", assembly.element(name)),)
+    buckling = Buckling(members=piece, share=number(1.0, "1"), width=number(1e-3, "N"))
+    # How sharp the corner is says nothing of whether it is there: that is the share.
+    unknowns = (
+        Unknown(f"{name}.share", (1.0,), -1.0, 2.5),
+        Unknown(f"{name}.width", (0.01,), 1e-4, 0.2, f"{name}.force", null=None),
+    )
+    yield Edit(assembly.with_part(name, buckling), unknowns)
 
 
 def _behind_cams(assembly: Assembly) -> list[str]:

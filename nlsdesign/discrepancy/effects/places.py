@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 from ...components import (
     Assembly,
+    Buckling,
     CapstanFriction,
     Driven,
     Element,
@@ -303,7 +304,7 @@ def stretched(assembly: Assembly) -> list[str]:
     assembly
         As declared.
     """
-    around = PullOnly | InextensibleCable | Slack | CapstanFriction
+    around = PullOnly | Buckling | InextensibleCable | Slack | CapstanFriction
     paths = []
     for path, element in laws(assembly):
         if isinstance(element, Through):

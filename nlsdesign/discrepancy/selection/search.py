@@ -89,7 +89,7 @@ class _Search:
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.trials.comparison.coarsely(base)
-        steps = self._enriched(start, self._backward(start, self._forward(start)))
+        steps = self._backward(start, self._forward(start))
         steps = self._explaining(start, steps)
         last = self._fitted_to_all(start, steps)
         skipped = tuple(dict.fromkeys(self.trials.skipped))
@@ -103,10 +103,7 @@ class _Search:
         while steps:
             self.trials.progress("fitting what was named to all samples")
             last = self.trials.comparison.polished(steps[-1].chosen)
-            words = [
-                objections_of_numbers(self.trials.criteria, standing_of(each.unknowns, last.fits.values()))
-                for each in last.added
-            ]
+            words = self._objections_of_numbers(last)
             if not any(words):
                 return last
             for step, why in zip(steps, words, strict=True):
@@ -151,7 +148,8 @@ class _Search:
                 further = self._pair(tried, present, open_blocks[0])
             if not further:
                 break
-            steps += further
+            # A richer form of what is named comes before one more name.
+            steps = self._enriched(start, steps + further)
             present = steps[-1].chosen
         return steps
 
@@ -178,31 +176,43 @@ class _Search:
                 self.trials.excesses_of(fewer[-1].chosen),
                 self.trials.excesses_of(steps[-1].chosen),
             ):
-                steps = fewer
+                steps = self._enriched(start, fewer)
             else:
                 place += 1
         return steps
 
     def _enriched(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
-        """Put the richer form of an effect in its place where it leaves much less.
+        """Put a richer form of an effect in its place where it leaves much less.
 
-        Beside effects that were not named yet the simpler form may have done.
+        A form of the same effect with more numbers is one too. Beside effects that were not named yet the
+        simpler form may have done.
         """
         if len(steps) < 2 or is_complete(self.trials.excesses_of(steps[-1].chosen)):
             return steps
         for place, step in enumerate(steps):
             before = steps[place - 1].chosen if place else start
             for candidate in self.trials.candidates(before):
-                if step.effect in candidate.simpler and candidate.location == step.chosen.newest.location:
+                if _is_richer(candidate, steps[place].chosen.newest):
                     self.trials.progress(f"trying {candidate.effect} in place of {step.effect}")
                     richer = self._rebuilt(start, steps, {place: candidate})
-                    if richer and not is_superfluous(
-                        self.trials.criteria,
-                        self.trials.excesses_of(steps[-1].chosen),
-                        self.trials.excesses_of(richer[-1].chosen),
+                    if (
+                        richer
+                        and not any(self._objections_of_numbers(richer[-1].chosen))
+                        and not is_superfluous(
+                            self.trials.criteria,
+                            self.trials.excesses_of(steps[-1].chosen),
+                            self.trials.excesses_of(richer[-1].chosen),
+                        )
                     ):
                         steps = richer
         return steps
+
+    def _objections_of_numbers(self, last: Hypothesis) -> list[list[str]]:
+        """Return what the numbers of each effect have against it, all effects together."""
+        return [
+            objections_of_numbers(self.trials.criteria, standing_of(each.unknowns, last.fits.values()))
+            for each in last.added
+        ]
 
     def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
         """Return the blocks in which all samples ask for a further effect."""
@@ -239,12 +249,11 @@ class _Search:
         return list(best.values())
 
     def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
-        """Return the same effect at the same kind of place of another assembly."""
-        size = len(wanted.unknowns)
+        """Return the same form of an effect at the same kind of place of another assembly."""
         same = [
             c
             for c in self.trials.candidates(hypothesis)
-            if c.effect == wanted.effect and len(c.unknowns) == size
+            if c.effect == wanted.effect and _kinds(c) == _kinds(wanted)
         ]
         ends = [c for c in same if c.location.split(".")[-1] == wanted.location.split(".")[-1]]
         return next(iter(ends or same), None)
@@ -269,3 +278,14 @@ class _Search:
             rebuilt.append(replace(made, distance=step.distance, equals=step.equals))
             present = later
         return rebuilt
+
+
+def _kinds(candidate: Candidate) -> list[str]:
+    """Return what the numbers of a candidate are, wherever it stands: forms of one effect differ in that."""
+    return [unknown.name.rpartition(".")[2] for unknown in candidate.unknowns]
+
+
+def _is_richer(candidate: Candidate, named: Candidate) -> bool:
+    """Tell whether a candidate is a richer form of what is named, at its place."""
+    more = candidate.effect == named.effect and len(candidate.unknowns) > len(named.unknowns)
+    return (more or named.effect in candidate.simpler) and candidate.location == named.location

@@ -223,6 +223,16 @@ class StackedRows:
         """
         return np.asarray(self.prior_information @ (x - self._centre), dtype=np.float64)
 
+    def prior_rows(self, x: Array) -> tuple[Array, Array]:
+        """Return residuals of the priors, shape (parameters,), and slopes, shape (parameters, parameters).
+
+        Parameters
+        ----------
+        x
+            In the fitted scale.
+        """
+        return self._prior @ (x - self._centre), self._prior
+
     def __call__(self, x: Array) -> tuple[Array, Array]:
         """Return residuals and slopes of priors and evidence, one below the other.
 
@@ -256,7 +266,7 @@ class StackedRows:
         return residual, wide
 
     def _evaluated(self, x: Array) -> tuple[Array, Array]:
-        rows, slopes = [self._prior @ (x - self._centre)], [self._prior]
+        rows, slopes = ([each] for each in self.prior_rows(x))
         for each in self._evidence:
             residual, wide = self.of(each, x)
             if each.driven.stiff and self._known is not None:
