@@ -246,7 +246,7 @@ class Rival(Generic[T]):
     effect
         Identifier of the effect it adds.
     numbers
-        How many numbers that brings.
+        How many numbers it and what it is added to have brought.
     excesses
         What it leaves.
     standing
@@ -425,4 +425,17 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
             alike[rival.effect] = rival
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
+    unknown = [rival for rival in rivals if is_undecided(criteria, before, rival)]
+    if any(_leaves_far_less(criteria, rival, taken, block) for rival in unknown):
+        return None
     return Choice(taken, tuple(alike.values()))
+
+
+def _leaves_far_less(criteria: Criteria, rival: Rival[T], taken: Rival[T], block: str) -> bool:
+    """Tell whether an effect whose numbers are not known explains far more than one that may be named.
+
+    Then that one only imitates it: what it leaves shows that it is another.
+    """
+    here, there = ({block: each.excesses[block]} for each in (taken, rival))
+    less = criteria.richer * left_by(rival, block) < left_by(taken, block)
+    return less and is_more_than_noise(criteria, gain(here, there))

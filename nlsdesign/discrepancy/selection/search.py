@@ -5,7 +5,6 @@ What is tried, and in which order; :mod:`.trials` fits it, :mod:`.criteria` deci
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,10 +23,13 @@ from .criteria import (
 from .hypothesis import Hypothesis
 from .measures import explained, total_excess
 from .standing import standing_of
-from .trials import PAIRED, Skipped, Step, Trials, Tried, rival_of
+from .trials import Skipped, Step, Trials, Tried, rival_of
 
 _MOST_EFFECTS_IN_FREE_FLIGHT = 2
 """Effects that are looked for where a body flies freely: a third takes minutes, and rests on less."""
+_LEADERS, _PARTNERS = 2, 6
+"""Where no effect may be named alone, each of so many of the best is tried together with others among so many
+of the best; these pairs take about as long as the catalogue did."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +138,9 @@ class _Search:
             for block in open_blocks:
                 # Effects elsewhere wait for their turn: most blocks have an effect of their own.
                 far = self._is_far_from_closed(start, present, block)
-                fresh = self.trials.tried_on(present, block, tried, far=far)
-                tried += fresh
-                step = self.trials.step(present, fresh, block)
+                tried += self.trials.tried_on(present, block, tried, far=far)
+                # What acts on several blocks was fitted when the first of them was looked at.
+                step = self.trials.step(present, tried, block)
                 if step is not None:
                     break
             self.tried = self.tried or self.trials.account(present, tried)
@@ -226,10 +228,11 @@ class _Search:
 
     def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""
-        best = self._best_of_each(tried)[:PAIRED]
+        best = self._best_of_each(tried)[:_PARTNERS]
         tasks = [
             (one, again)
-            for one, other in itertools.combinations(best, 2)
+            for place, one in enumerate(best[:_LEADERS])
+            for other in best[place + 1 :]
             if (again := self._again(one, other.newest)) is not None
         ]
         before = self.trials.excesses_of(present)

@@ -25,9 +25,8 @@ from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record
 from .probability import distance_to_next
 from .standing import standing_of
 
-PAIRED = 4
-"""Where no effect helps alone, so many of the best are tried in pairs; so many are looked at twice. Six pairs
-take about as long as the catalogue did."""
+_LOOKED_AT_TWICE = 4
+"""So many of the best are judged on all samples where the coarse look sees nothing open."""
 _UNKNOWN_GAIN = Gain(math.nan, math.nan, math.nan)
 
 
@@ -261,7 +260,7 @@ class Trials:
         """
         before, left = self.excesses_of(present), {h: self.excesses_of(h) for h in fresh}
         if not before[block].open:
-            best = sorted(fresh, key=lambda h: self.excesses_of(h)[block].chi2)[:PAIRED]
+            best = sorted(fresh, key=lambda h: self.excesses_of(h)[block].chi2)[:_LOOKED_AT_TWICE]
             before, left = self.on_all(present), {h: self.on_all(h) for h in best}
         while step := self.chosen(before, left, block):
             if self._predicts_records(present, step.chosen) and self._stands_on_all(step.chosen):
@@ -370,7 +369,7 @@ def rival_of(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
     return Rival(
         hypothesis,
         newest.effect,
-        len(newest.unknowns),
+        len(hypothesis.unknowns),
         after,
         standing_of(newest.unknowns, hypothesis.fits.values()),
         newest.simpler,
