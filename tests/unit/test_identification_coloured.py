@@ -116,6 +116,12 @@ def test_below_a_corner_that_is_plainly_seen_nothing_is_added(time: float) -> No
     assert np.median(ratios) == pytest.approx(1.0, abs=0.25)
 
 
+def test_a_process_whose_corner_lies_below_what_is_seen_is_continued() -> None:
+    """A process of 0.1 s has its corner at 1.6 Hz; rests of 1.3 s show 1.9 Hz and more."""
+    ratios = [estimated_over_true([NoisePart(0.8, 0.1)], DURATION, 0, seed) for seed in range(8)]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.2)
+
+
 def test_white_noise_stays_white_however_long_the_record() -> None:
     for seed in range(5):
         draw = np.random.default_rng(seed)

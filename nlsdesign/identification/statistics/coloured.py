@@ -36,7 +36,8 @@ _STEEPEST = 1.0
 """Power of the frequency with which noise is taken to rise beyond what is seen, at most: 1/f is the steepest
 law that goes on for long; what rises faster, as behind the corner of a first-order process, bends."""
 _STEEPER = 3.0
-"""Times longer than what the lowest frequency shows, tried for one process: behind its corner it is 1/f²."""
+"""Times longer than what the lowest frequency shows, tried for one process: where such a one is the best, no
+corner is in view, and how far down it goes as 1/f² is open."""
 _POWERS = np.linspace(0.1, _STEEPEST, 10)
 _PLAINLY_ONE = 4.0
 """Deviance by which one first-order process must describe the bands better than a power of the frequency, for
@@ -180,10 +181,10 @@ def _has_one_time(frequency: Array, density: Array, count: Array, step: float) -
     """
     longest = 1.0 / (2.0 * math.pi * frequency.min())
     times = np.geomspace(step, max(2.0 * step, _STEEPER * longest), 6 * _TIMES_PER_DECADE)
-    corners = [_density(float(t), frequency, step) for t in times]
-    powers = [(frequency / frequency[0]) ** -power for power in _POWERS]
-    one, power = (min(_deviance(c, density, count) for c in some) for some in (corners, powers))
-    return one < power - _PLAINLY_ONE
+    corners = [_deviance(_density(float(t), frequency, step), density, count) for t in times]
+    best = int(np.argmin(corners))
+    powers = [_deviance((frequency / frequency[0]) ** -power, density, count) for power in _POWERS]
+    return bool(times[best] <= longest and corners[best] < min(powers) - _PLAINLY_ONE)
 
 
 def _deviance(coloured: Array, density: Array, count: Array) -> float:
