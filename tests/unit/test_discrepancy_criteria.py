@@ -103,6 +103,14 @@ def test_a_mean_square_is_open_beyond_what_filters_and_noise_leave() -> None:
     assert not is_beyond_noise(RULE, 5.0, 0.0), "what is equivalent to no sample says nothing"
 
 
+def test_a_floor_that_is_known_from_few_squares_opens_a_block_later() -> None:
+    """The ratio of two mean squares scatters by what both do, 1 + 5·√(2/50 + 2/200) = 2.12."""
+    assert is_beyond_noise(RULE, 2.1, 50.0)
+    assert not is_beyond_noise(RULE, 2.1, 50.0, 200.0)
+    assert is_beyond_noise(RULE, 2.2, 50.0, 200.0)
+    assert is_beyond_noise(RULE, 2.1, 50.0, math.inf)
+
+
 def test_numbers_are_beyond_their_prior_if_they_all_pass_the_edge_of_their_range() -> None:
     edge = 3.0  # (√3)²: the edge of a uniform range in its standard deviations
     assert not is_beyond_prior(RULE, 4 * edge, 4)

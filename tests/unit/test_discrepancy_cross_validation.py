@@ -39,7 +39,8 @@ def evidence_of(
 ) -> Evidence:
     """A record of any block."""
     driven = SimpleNamespace(block=SimpleNamespace(name="spring"), free=("a", "b"), stiff=False)
-    record, floor = SimpleNamespace(name=name, role=role), SimpleNamespace(sigma=np.ones(ROWS))
+    record = SimpleNamespace(name=name, role=role)
+    floor = SimpleNamespace(sigma=np.ones(ROWS), independent=math.inf)
     return cast(Evidence, SimpleNamespace(driven=driven, record=record, floor=floor, residual=residual))
 
 
@@ -88,6 +89,14 @@ def test_a_record_for_selection_is_predicted_with_the_numbers_of_all_fitted_reco
     assert tally.predicted == pytest.approx(float(left @ left))
     without = tallies_of(EVERY[:2], best, by_pieces)["spring", "one"]
     assert without.segments == tallies_of(EVERY, best, by_pieces)["spring", "one"].segments
+
+
+def test_slow_noise_leaves_no_more_independent_residuals_than_it_allows() -> None:
+    (white,) = tallies_of(EVERY[:1], fitted(), by_pieces).values()
+    assert white.effective_size > 3.0
+    slow = cast(Evidence, SimpleNamespace(**{**vars(EVERY[0]), "floor": SimpleNamespace(
+        sigma=np.ones(ROWS), independent=3.0)}))  # fmt: skip
+    assert tallies_of([slow], fitted(), by_pieces)["spring", "one"].effective_size == 3.0
 
 
 def test_numbers_stay_inside_their_bounds_when_pieces_are_left_out() -> None:

@@ -72,6 +72,9 @@ class BenchByHand:
     def typical_floor(self, block: str) -> float:
         return {"spring": 0.1, "wheel": 0.5}[block]
 
+    def known_from(self, block: str) -> float:
+        return math.inf
+
 
 BENCH = cast(Bench, BenchByHand())
 RULE = Criteria()
@@ -138,6 +141,40 @@ def test_the_declared_numbers_are_open_beyond_the_edge_of_their_ranges() -> None
         found = excesses(hypothesis, BENCH, RULE)[DECLARED]
         assert found.open is is_open
         assert found.fit == pytest.approx(math.sqrt(3.0) * math.log(factor) / RANGE)
+
+
+def test_numbers_that_coloured_noise_moves_are_not_beyond_their_ranges_unless_a_block_is_open() -> None:
+    """Known to two standard deviations of the prior, where white noise would let it be one half."""
+    sigma = RANGE / math.sqrt(3.0)
+    fit = fitted(2.0 * sigma, spring_stiffness=1.25, wheel_inertia=1.25)
+    fit = replace(fit, white=(0.5 * sigma) ** 2 * np.eye(2))
+    assert fit.expected_prior_squares() == pytest.approx(2 * (1.0 + 4.0 - 2.0 * 0.25))
+    for mean_square, is_open in ((1.0, False), (9.0, True)):
+        hypothesis = replace(with_mean_squares(a=mean_square), fits={("spring",): fit})
+        assert excesses(hypothesis, BENCH, RULE)[DECLARED].open is is_open
+
+
+def test_coloured_noise_moves_fitted_numbers_as_far_as_is_expected() -> None:
+    """Against 4000 linear fits of numbers drawn from their priors, residuals counted as independent."""
+    draw = np.random.default_rng(7)
+    slope = draw.standard_normal((60, 2)).cumsum(axis=0) / 6.0
+    sigma = RANGE / math.sqrt(3.0)
+    for time in (0.0, 8.0):
+        apart = np.abs(np.subtract.outer(np.arange(60), np.arange(60)))
+        noise = np.exp(-apart / time) if time else np.eye(60)
+        slopes, prior = slope / (3.0 * sigma), np.eye(2) / sigma**2
+        white = np.linalg.inv(slopes.T @ slopes + prior)
+        scatter = white @ (slopes.T @ noise @ slopes + prior) @ white
+        gain, root = white @ slopes.T, np.linalg.cholesky(noise)
+        moved = [gain @ (slopes @ (sigma * draw.standard_normal(2)) + root @ draw.standard_normal(60))
+                 for _ in range(4000)]  # fmt: skip
+        fit = replace(fitted(spring_stiffness=1.0, wheel_inertia=1.0), covariance=scatter, white=white)
+        squares = float(np.mean(np.sum(np.square(moved), axis=1))) / sigma**2
+        if time:
+            assert squares > 2.0
+            assert fit.expected_prior_squares() == pytest.approx(squares, rel=0.1)
+        else:
+            assert squares < fit.expected_prior_squares() == pytest.approx(2.0)
 
 
 # --- another rig ----------------------------------------------------------------------------------

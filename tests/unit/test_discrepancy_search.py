@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, cast
@@ -51,6 +52,9 @@ class Bench:
 
     def typical_floor(self, block: str) -> float:
         return 1.0
+
+    def known_from(self, block: str) -> float:
+        return math.inf
 
 
 class Table:

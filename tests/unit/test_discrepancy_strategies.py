@@ -289,7 +289,7 @@ class BenchOfOne:
 
     def evidence(self, driven: str, records: Any, values: Any, *, coarse: bool) -> list[Evidence]:
         one = evidence("a", "fit", 1.0, size=self.size)
-        one.driven.free, floor = (), SimpleNamespace(sigma=np.ones(2))
+        one.driven.free, floor = (), SimpleNamespace(sigma=np.ones(2), independent=np.inf)
         residual = lambda values: (np.array([3.0, 4.0]), np.zeros((2, 0)))  # noqa: E731
         return [
             cast(

@@ -7,18 +7,29 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from nlsdesign.identification.statistics.coloured import NoisePart, Stretch, colour_of, variance_behind
+from nlsdesign.identification.statistics.coloured import (
+    NoisePart,
+    Stretch,
+    colour_of,
+    independent_number,
+    variance_behind,
+)
 from nlsdesign.identification.statistics.filters import filter_weights
 
 STEP = 0.002
 WEIGHTS = filter_weights(0.004, 0, STEP)
 
 
+DURATION = 12.0
+FLICKER = [NoisePart(0.16, time) for time in (0.004, 0.0225, 0.126, 0.71, 4.0)]
+"""About 1/f from 0.04 to 40 Hz."""
+
+
 def remembering(count: int, time: float, variance: float, draw: np.random.Generator) -> NDArray[np.float64]:
     """A first-order process, begun long before."""
     memory = np.exp(-STEP / time)
-    white = np.sqrt(variance * (1.0 - memory**2)) * draw.standard_normal(count + 2000)
-    result: NDArray[np.float64] = lfilter([1.0], [1.0, -memory], white)[2000:]
+    white = np.sqrt(variance * (1.0 - memory**2)) * draw.standard_normal(count + 10_000)
+    result: NDArray[np.float64] = lfilter([1.0], [1.0, -memory], white)[10_000:]
     return result
 
 
@@ -72,3 +83,60 @@ def test_what_drifts_is_no_noise() -> None:
 def test_too_few_samples_tell_nothing() -> None:
     assert colour_of([]) is None
     assert colour_of([Stretch(np.random.default_rng(5).standard_normal(20), STEP, 0)]) is None
+
+
+def estimated_over_true(parts: list[NoisePart], duration: float, lag: int, seed: int) -> float:
+    """Variance behind the filter of noise seen in six stretches of 1.3 s, or four pairs of periods of 2 s."""
+    draw = np.random.default_rng(seed)
+    rows = []
+    for _ in range(4 if lag else 6):
+        count = (1000 if lag else 650) + lag
+        row = sum((remembering(count, p.time, p.variance, draw) for p in parts), np.zeros(count))
+        row = row + 0.6 * draw.standard_normal(count)
+        rows.append(Stretch((row[lag:] - row[:-lag]) / np.sqrt(2.0) if lag else row, STEP, lag))
+    colour = colour_of(rows, duration)
+    assert colour is not None
+    white = float(WEIGHTS @ WEIGHTS)
+    return (colour.white * white + variance_behind(colour.parts, WEIGHTS, STEP)) / (
+        0.36 * white + variance_behind(parts, WEIGHTS, STEP)
+    )
+
+
+@pytest.mark.parametrize("lag", [0, 1000])
+def test_noise_that_rises_to_the_lowest_frequency_seen_is_taken_to_rise_on(lag: int) -> None:
+    to_the_end = np.median([estimated_over_true(FLICKER, DURATION, lag, seed) for seed in range(12)])
+    cut = np.median([estimated_over_true(FLICKER, 0.0, lag, seed) for seed in range(12)])
+    assert to_the_end == pytest.approx(1.0, abs=0.2)
+    assert cut < 0.7
+
+
+@pytest.mark.parametrize("time", [0.005, 0.02, 0.05])
+def test_below_a_corner_that_is_plainly_seen_nothing_is_added(time: float) -> None:
+    ratios = [estimated_over_true([NoisePart(0.8, time)], DURATION, 0, seed) for seed in range(8)]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_process_whose_corner_lies_below_what_is_seen_is_continued() -> None:
+    """A process of 0.1 s has its corner at 1.6 Hz; rests of 1.3 s show 1.9 Hz and more."""
+    ratios = [estimated_over_true([NoisePart(0.8, 0.1)], DURATION, 0, seed) for seed in range(8)]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.2)
+
+
+def test_white_noise_stays_white_however_long_the_record() -> None:
+    for seed in range(5):
+        draw = np.random.default_rng(seed)
+        rows = [Stretch(0.6 * draw.standard_normal(650), STEP, 0) for _ in range(6)]
+        assert colour_of(rows, DURATION) == colour_of(rows, 0.0)
+
+
+@pytest.mark.parametrize("time", [0.02, 0.3, 2.0])
+def test_the_mean_square_of_slow_noise_scatters_as_so_many_independent_samples_would(time: float) -> None:
+    count, spacing = 1500, 4 * STEP
+    squares = []
+    for seed in range(300):
+        draw = np.random.default_rng(seed)
+        slow = remembering(4 * count, time, 0.5, draw)[::4]
+        squares.append(np.mean((slow + np.sqrt(0.5) * draw.standard_normal(count)) ** 2))
+    own = independent_number([NoisePart(0.5, time)], count, spacing)
+    assert own == pytest.approx(2.0 / np.var(squares), rel=0.3)
+    assert independent_number([], count, spacing) == count

@@ -44,7 +44,9 @@ class Criteria:
         "standard deviations of a mean square of noise, in effective samples, from which a block is open",
     )
     prior_per_number: float = _criterion(
-        3.0, "mean squared departure of refitted numbers in standard deviations of their spread, at most"
+        3.0,
+        "squared departure of refitted numbers in standard deviations of their spread, at most, for each "
+        "that noise alone gives: one a number, more where noise is coloured",
     )
     least_share: float = _criterion(
         0.5, "share of the excess that is left in an open block which an effect must explain"
@@ -89,8 +91,12 @@ class Criteria:
         ]
 
 
-def is_beyond_noise(criteria: Criteria, mean_square: float, effective_size: float) -> bool:
+def is_beyond_noise(
+    criteria: Criteria, mean_square: float, effective_size: float, known_from: float = math.inf
+) -> bool:
     """Tell whether a mean square in units of the noise floor is more than noise.
+
+    The floor is a mean square itself; the ratio of two scatters by what both do.
 
     Parameters
     ----------
@@ -100,12 +106,14 @@ def is_beyond_noise(criteria: Criteria, mean_square: float, effective_size: floa
         Of the residuals of a block.
     effective_size
         How many independent residuals these are equivalent to.
+    known_from
+        How many independent squares of noise the floor is known from.
     """
-    scatter = criteria.significant * math.sqrt(2.0 / max(effective_size, 1.0))
+    scatter = criteria.significant * math.sqrt(2.0 / max(effective_size, 1.0) + 2.0 / max(known_from, 1.0))
     return mean_square > 1.0 + max(criteria.least_excess, scatter)
 
 
-def is_beyond_prior(criteria: Criteria, squares: float, count: int) -> bool:
+def is_beyond_prior(criteria: Criteria, squares: float, expected: float) -> bool:
     """Tell whether refitted numbers lie outside their declared ranges, taken together.
 
     Parameters
@@ -114,10 +122,10 @@ def is_beyond_prior(criteria: Criteria, squares: float, count: int) -> bool:
         Of the rule.
     squares
         Sum of squared departures in standard deviations of the prior.
-    count
-        How many numbers.
+    expected
+        What noise alone gives: one for each number, more where the noise is coloured.
     """
-    return squares > criteria.prior_per_number * count
+    return squares > criteria.prior_per_number * expected
 
 
 def is_more_than_noise(criteria: Criteria, gained: Gain) -> bool:

@@ -124,7 +124,7 @@ def tallies_of(
         (p.evidence.driven.block.name, p.evidence.record.name): Tally(
             float(p.residual @ p.residual),
             len(p.residual),
-            effective_size(p.residual),
+            min(effective_size(p.residual), p.evidence.floor.independent),
             tuple(float(s @ s) for s in np.array_split(beside, SEGMENTS)),
         )
         for p, beside in zip(pieces, predicted, strict=True)

@@ -25,7 +25,10 @@ def excesses(hypothesis: Hypothesis, bench: Bench, criteria: Criteria) -> dict[s
     names = dict.fromkeys(block for block, _ in hypothesis.tallies)
     result = {name: _block_excess(hypothesis, bench, name, criteria) for name in names}
     prior, count = hypothesis.prior, sum(len(f.prior_z_scores()) for f in hypothesis.fits.values())
-    typical, beyond = math.sqrt(prior / max(count, 1)), is_beyond_prior(criteria, prior, count)
+    # What scatters the residuals of an open block is not noise, and excuses no number.
+    closed = not any(each.open for each in result.values())
+    expected = hypothesis.expected_prior if closed else float(count)
+    typical, beyond = math.sqrt(prior / max(count, 1)), is_beyond_prior(criteria, prior, expected)
     result[DECLARED] = Excess(
         DECLARED, "1", 1.0, typical, typical, prior, count, float(max(count, 1)), beyond
     )
@@ -47,6 +50,6 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
         predicted,
         rows,
         effective,
-        is_beyond_noise(criteria, predicted / max(rows, 1), effective),
+        is_beyond_noise(criteria, predicted / max(rows, 1), effective, bench.known_from(block)),
         {record: t.segments or (t.squares,) for record, t in tallies.items()},
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -68,6 +69,11 @@ class Hypothesis:
     def prior(self) -> float:
         """Sum of squared departures from declared numbers, in standard deviations of their spread."""
         return float(sum(z**2 for f in self.fits.values() for z in f.prior_z_scores().values()))
+
+    @property
+    def expected_prior(self) -> float:
+        """What noise alone makes of that sum, if the rig is the declared one."""
+        return math.fsum(f.expected_prior_squares() for f in self.fits.values())
 
     @property
     def fitted(self) -> Assembly:

@@ -15,6 +15,7 @@ from ...quantity import with_unit
 from ...simulation import Trace
 from ..records.canonical_order import in_canonical_order
 from ..records.measurement import Record, RecordSet
+from ..statistics.coloured import NoisePart, independent_number
 from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
 from ..statistics.metrics import rmse
 from .block import Block, Drive
@@ -48,11 +49,17 @@ class Floor:
         Noise floor of each row, in the unit of the block.
     raw_sigma
         Noise floor of each unfiltered sample, shape (n,): only for blocks with a target.
+    independent
+        How many independent rows its own noise makes of them at most.
+    known
+        Effective squares of that noise from which the floor is known; infinite where it is white.
     """
 
     filter: Smoothing
     sigma: Array
     raw_sigma: Array
+    independent: float = math.inf
+    known: float = math.inf
 
     @property
     def places(self) -> NDArray[np.int64]:
@@ -90,7 +97,42 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
         slow = (speed < math.hypot(noisy, _SMEARED * rmse(speed))).astype(float)
         matrix = matrix[np.flatnonzero(matrix @ slow < _SLOW_SHARE)]
     variance, raw = _variances(block, record, noise, filters, inputs)
-    return Floor(matrix, np.sqrt(variance[matrix.places]), np.sqrt(raw))
+    spacing = stride * step
+    memory = _memory(block, step, noise, filters, inputs)
+    whole = [NoisePart(p.variance / float(np.mean(variance)), p.time) for p in memory]
+    lengths = [noise.seen[s] for s in _heard(block) if s in noise.seen]
+    squares = [
+        sum(independent_number(whole, max(1, round(t / spacing)), spacing) for t in s) for s in lengths
+    ]
+    return Floor(
+        matrix,
+        np.sqrt(variance[matrix.places]),
+        np.sqrt(raw),
+        independent_number(whole, len(matrix.places), spacing) if whole else math.inf,
+        min(squares, default=math.inf),
+    )
+
+
+def _heard(block: Block) -> list[str]:
+    """Return the signals whose slow noise a block passes: not those of which it takes rates."""
+    drives = [d.signal for d in block.drives.values() if d.order == 0]
+    return list(dict.fromkeys([*([block.target] if block.target else []), *drives]))
+
+
+def _memory(block: Block, step: float, noise: Noise, filters: Filters, inputs: Array) -> list[NoisePart]:
+    """Return the parts of the noise in a block's residual that remember, root mean square over a record."""
+    if not any(noise.parts.get(signal) for signal in _heard(block)):
+        return []
+    weights = filter_weights(filters.width, 0, step)
+    memory = list(noise.memory(block.target, weights, step)) if block.target else []
+    gains = output_slopes(block, inputs, max(1, round(filters.spacing / step)))
+    for i, variable in enumerate(block.model.inputs):
+        drive = block.drives.get(variable.name)
+        if drive is not None and drive.order == 0:
+            square = float(np.mean(gains[i] ** 2))
+            parts = noise.memory(drive.signal, weights, step)
+            memory += [NoisePart(square * p.variance, p.time) for p in parts]
+    return memory
 
 
 def _rate_noise(drive: Drive, noise: Noise, step: float, span: float) -> float:
@@ -317,6 +359,18 @@ class Bench:
         """
         rows = np.concatenate([f.sigma for (name, _), f in self.floors.items() if name == block])
         return float(np.sqrt(np.mean(rows**2)))
+
+    def known_from(self, block: str) -> float:
+        """Return the effective squares of noise from which the floor of a block is known.
+
+        Parameters
+        ----------
+        block
+            Name of the block.
+        """
+        # One estimate of the noise serves all records, so more of them make it no better.
+        doubt = float(np.mean([1.0 / f.known for (name, _), f in self.floors.items() if name == block]))
+        return 1.0 / doubt if doubt else math.inf
 
     def _thinned(self, block: str, record: Record, *, whole: bool) -> tuple[Record, Floor]:
         """Return every k-th sample unfiltered; with ``whole`` all are simulated and the same are compared."""

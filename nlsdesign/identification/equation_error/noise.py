@@ -42,12 +42,15 @@ class Noise:
         Parts of it that remember, beside the white one; nothing for signals without.
     evidence
         Where that is known from.
+    seen
+        Lengths in s of the stretches in which the parts were seen.
     """
 
     level: Mapping[str, float]
     rounded: Mapping[str, bool]
     parts: Mapping[str, tuple[NoisePart, ...]] = field(default_factory=dict)
     evidence: Mapping[str, Evidence] = field(default_factory=dict)
+    seen: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def deviation(self, signal: str) -> float:
         """Return the standard deviation of the whole noise of a signal.
@@ -73,6 +76,21 @@ class Noise:
         """
         white = self.level[signal] * float(np.linalg.norm(weights))
         return math.sqrt(white**2 + variance_behind(self.parts.get(signal, ()), weights, step))
+
+    def memory(self, signal: str, weights: Array, step: float) -> tuple[NoisePart, ...]:
+        """Return the parts of the noise of a signal that remember, with their variances behind a filter.
+
+        Parameters
+        ----------
+        signal
+            Full name.
+        weights
+            Of the filter.
+        step
+            Time between samples in s.
+        """
+        parts = self.parts.get(signal, ())
+        return tuple(NoisePart(variance_behind([p], weights, step), p.time) for p in parts)
 
 
 def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
@@ -107,6 +125,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
         quanta[column.signal] = quantum
     motions = {name: quanta[name] for name, coarse in rounded.items() if coarse and name not in targets}
     parts: dict[str, tuple[NoisePart, ...]] = {}
+    lengths: dict[str, tuple[float, ...]] = {}
     evidence: dict[str, Evidence] = dict.fromkeys(level, "white only")
     quiet = [(r, *_quiet(r, motions)) for r in seen] if motions else []
     for signal in targets:
@@ -114,14 +133,15 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
             continue
         at_rest = [Stretch(r.trace[signal][s], r.step, 0) for r, rest, _ in quiet for s in rest]
         repeated = [_difference(r, signal, *pair) for r, _, repeats in quiet for pair in repeats]
-        colour = colour_of(at_rest + repeated)
+        colour = colour_of(at_rest + repeated, max(r.step * len(r.trace) for r in seen))
         if colour is None:
             continue
         evidence[signal] = "rest" if _length(at_rest) >= _length(repeated) else "repetition"
         if colour.parts:
             least = quanta[signal] / math.sqrt(12.0)
             level[signal], parts[signal] = max(math.sqrt(colour.white), least), colour.parts
-    return Noise(level, rounded, parts, evidence)
+            lengths[signal] = tuple(s.step * len(s.samples) for s in at_rest + repeated)
+    return Noise(level, rounded, parts, evidence, lengths)
 
 
 def _length(stretches: Sequence[Stretch]) -> float:

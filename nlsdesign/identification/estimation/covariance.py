@@ -68,7 +68,7 @@ def robust_covariance(rows: Sequence[Piece], prior: Array) -> Array:
     """
     information = sum((r.slope.T @ r.slope for r in rows), start=prior.T @ prior)
     # In the axes and units in which the information is one.
-    root = _half(_inverse(information))
+    root = _half(inverse_information(information))
     scatter = root @ (prior.T @ prior) @ root
     for slope, residual in _segments(rows):
         scaled = slope @ root
@@ -96,7 +96,7 @@ def independent_covariance(rows: Sequence[Piece], prior: Array) -> Array:
         freedom = max(count - int(np.linalg.matrix_rank(slopes)), 1)
         size = max(squares / freedom, 1e-12)
         information = information + slopes / (size * _colour([r.residual for r in own]))
-    return _inverse(information)
+    return inverse_information(information)
 
 
 def _colour(residuals: Sequence[Array]) -> float:
@@ -133,7 +133,14 @@ def _segments(rows: Sequence[Piece]) -> list[tuple[Array, Array]]:
     return [(np.vstack(s), np.concatenate(r)) for s, r in parts.values()]
 
 
-def _inverse(information: Array) -> Array:
+def inverse_information(information: Array) -> Array:
+    """Return the covariance that information gives, if residuals are white noise of unit size.
+
+    Parameters
+    ----------
+    information
+        Shape (parameters, parameters).
+    """
     # What the records leave open altogether gets a large variance, not an infinite one.
     strength, axes = np.linalg.eigh(information)
     result: Array = np.asarray((axes / np.maximum(strength, _LEAST_INFORMATION)) @ axes.T, dtype=np.float64)

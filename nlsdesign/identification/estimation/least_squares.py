@@ -13,7 +13,7 @@ from ...errors import ConvergenceError
 from ..equation_error.evidence import Evidence
 from ..statistics.losses import bounded_total, huber_rows
 from ..statistics.residuals import autocorrelation
-from .covariance import Piece, robust_covariance
+from .covariance import Piece, inverse_information, robust_covariance
 from .levenberg_marquardt import Minimum, minimise
 from .parameters import Parameter as Parameter
 from .parameters import box
@@ -54,6 +54,9 @@ class Fit:
         Half the sum of squares of the residuals alone, per block and record.
     converged
         Whether the fit ended by itself.
+    white
+        What the covariance would be if the residuals were white noise of unit size, the information inverted;
+        ``None`` where that is not told.
     """
 
     parameters: tuple[Parameter, ...]
@@ -62,6 +65,7 @@ class Fit:
     cost: float
     misfit: Mapping[tuple[str, str], float]
     converged: bool
+    white: Array | None = None
 
     def standard_error(self, name: str) -> float:
         """Return the standard error of a parameter in SI.
@@ -87,6 +91,23 @@ class Fit:
             for p in self.parameters
             if math.isfinite(p.sigma)
         }
+
+    def expected_prior_squares(self) -> float:
+        """Return the sum of squared departures in standard deviations of the prior that noise alone leaves.
+
+        With P the information of the priors and H that of all, numbers drawn from the priors are fitted with
+        the variance P⁻¹ − 2H⁻¹ + V about the declared values, V being the covariance. Where noise is white, V
+        is H⁻¹ and the sum no more than the count of the numbers. Coloured residuals count as independent in
+        the fit and pull further than the priors allow for.
+        """
+        variances = np.diag(self.covariance)
+        white = np.diag(self.white) if self.white is not None else variances
+        beyond = [
+            max(0.0, variance - 2.0 * own) / p.sigma**2
+            for p, variance, own in zip(self.parameters, variances, white, strict=True)
+            if math.isfinite(p.sigma)
+        ]
+        return len(beyond) + math.fsum(beyond)
 
     def unidentified(self) -> list[str]:
         """Return in words what the records cannot tell: combinations of parameters that they leave open."""
@@ -157,7 +178,9 @@ def fit(
         parts.append(Piece(block, record.name, time, own, slope[place:behind]))
         place = behind
     covariance = robust_covariance(parts, slope[: len(parameters)])
-    return Fit(tuple(parameters), rows.values(ended.x), covariance, ended.cost, misfit, ended.converged)
+    white = inverse_information(slope.T @ slope)
+    values = rows.values(ended.x)
+    return Fit(tuple(parameters), values, covariance, ended.cost, misfit, ended.converged, white)
 
 
 def predicted_cost(evidence: Sequence[Evidence], parameters: Sequence[Parameter]) -> float:
