@@ -117,7 +117,7 @@ def _heat(assembly: Assembly, name: str) -> Iterator[Edit]:
         )
         edited, path = _put(assembly, name, "heat", part)
         unknowns = (
-            Unknown(f"{path}.halving", (1.5,), 0.05, 1e3, signal, null=math.inf),
+            Unknown(f"{path}.halving", (0.2, 1.5), 0.02, 1e3, signal, null=math.inf),
             Unknown(f"{path}.cooling_time", (0.7,), 0.01, 100.0, LONGEST, null=None),
         )
         yield Edit(edited, unknowns)
