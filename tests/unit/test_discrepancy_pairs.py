@@ -15,9 +15,9 @@ from nlsdesign.discrepancy.selection.search import _Search
 from nlsdesign.discrepancy.selection.trials import Step, Trials
 
 
-@pytest.mark.parametrize(("alone", "paired"), [(0, 1), (1, 0)])
-def test_pairs_are_tried_where_no_effect_was_named_and_there_alone(
-    monkeypatch: pytest.MonkeyPatch, alone: int, paired: int
+@pytest.mark.parametrize(("alone", "far", "paired"), [(0, True, 1), (1, True, 1), (1, False, 0)])
+def test_pairs_are_tried_where_no_effect_was_named_or_much_is_left_beside_it(
+    monkeypatch: pytest.MonkeyPatch, alone: int, far: bool, paired: int
 ) -> None:
     start = Hypothesis(assembly("blank", load=Fixed()))
     named, pairs = iter([Step(start, "motor", 0.9)] * alone), list[Any]()
@@ -27,8 +27,10 @@ def test_pairs_are_tried_where_no_effect_was_named_and_there_alone(
         return []
 
     monkeypatch.setattr(_Search, "_lacking", lambda *given: ["motor"])
-    monkeypatch.setattr(Trials, "tried_on", lambda *given: [])
-    monkeypatch.setattr(Trials, "account", lambda *given: ())
+    monkeypatch.setattr(Trials, "tried_on", lambda *given, **flags: [])
+    monkeypatch.setattr(f"{_Search.__module__}.account", lambda *given: ())
+    monkeypatch.setattr(_Search, "_is_far_from_closed", lambda *given: far)
+    monkeypatch.setattr(_Search, "_enriched", lambda self, start, steps: steps)
     monkeypatch.setattr(Trials, "step", lambda *given: next(named, None))
     monkeypatch.setattr(_Search, "_pair", pair)
     steps = _Search(Trials(cast(Comparison, None), (), Criteria(), lambda text: None))._forward(start)

@@ -265,12 +265,12 @@ def test_a_simpler_form_must_explain_enough_of_one_block_at_least(left: float, e
     """Half of 2100 is 1050, half of the noise 50: 30 % of what lies between are 300."""
     before = {("spring", "a"): Tally(2100.0, 100, 50.0), ("motor", "a"): Tally(9e5, 100, 50.0)}
     two = replace(problem(), blocks=("motor", "spring"), before=before)
-    assert strategies._explains_enough(two, {("spring", "a"): left, ("motor", "a"): 4.4e5}) == enough
+    assert strategies.explains_enough(two, {("spring", "a"): left, ("motor", "a"): 4.4e5}) == enough
 
 
 def test_a_block_that_lacks_nothing_does_not_ask_for_the_whole_effect() -> None:
     noise = replace(problem(), before={("spring", "a"): Tally(90.0, 100, 50.0)})
-    assert not strategies._explains_enough(noise, {("spring", "a"): 10.0})
+    assert not strategies.explains_enough(noise, {("spring", "a"): 10.0})
 
 
 # --- one group of a hypothesis --------------------------------------------------------------------

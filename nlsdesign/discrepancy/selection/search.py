@@ -23,7 +23,7 @@ from .criteria import (
 from .hypothesis import Hypothesis
 from .measures import explained, total_excess
 from .standing import standing_of
-from .trials import Skipped, Step, Trials, Tried, rival_of
+from .trials import Skipped, Step, Trials, Tried, account, rival_of
 
 _MOST_EFFECTS_IN_FREE_FLIGHT = 2
 """Effects that are looked for where a body flies freely: a third takes minutes, and rests on less."""
@@ -143,7 +143,7 @@ class _Search:
                 step = self.trials.step(present, tried, block)
                 if step is not None:
                     break
-            self.tried = self.tried or self.trials.account(present, tried)
+            self.tried = self.tried or account(self.trials, present, tried)
             further = [step] if step else []
             room = self._most_effects(present) - len(steps)
             if room > 1 and not further and self._is_far_from_closed(start, present, open_blocks[0]):
@@ -236,9 +236,8 @@ class _Search:
             if (again := self._again(one, other.newest)) is not None
         ]
         before = self.trials.excesses_of(present)
-        step = self.trials.chosen(
-            before, {h: self.trials.excesses_of(h) for h in self.trials.fits(tasks)}, block
-        )
+        fitted = {h: self.trials.excesses_of(h) for h in self.trials.fits(tasks)}
+        step = self.trials.sound(present, before, fitted, block)
         if step is None:
             return []
         alone = next(h for h in best if h.newest.effect == step.chosen.added[-2].effect)

@@ -262,8 +262,25 @@ class Trials:
         if not before[block].open:
             best = sorted(fresh, key=lambda h: self.excesses_of(h)[block].chi2)[:_LOOKED_AT_TWICE]
             before, left = self.on_all(present), {h: self.on_all(h) for h in best}
-        while step := self.chosen(before, left, block):
-            if self._predicts_records(present, step.chosen) and self._stands_on_all(step.chosen):
+        return self.sound(present, before, left, block)
+
+    def sound(
+        self, present: Hypothesis, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str
+    ) -> Step | None:
+        """Return the best of some hypotheses that also predicts whole records and stands on all samples.
+
+        Parameters
+        ----------
+        present
+            Hypothesis that all add to.
+        before, tried
+            What it leaves, and what each of them leaves.
+        block
+            Where something is lacking.
+        """
+        left = dict(tried)
+        while step := self._chosen(before, left, block):
+            if self.predicts_records(present, step.chosen) and self._stands_on_all(step.chosen):
                 return step
             del left[step.chosen]
         return None
@@ -278,8 +295,14 @@ class Trials:
             self.skipped.append(Skipped(newest.effect, newest.location, chosen.names[:-1], reason))
         return not why
 
-    def _predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
-        """Tell whether an effect predicts whole records that its numbers were not fitted to."""
+    def predicts_records(self, present: Hypothesis, chosen: Hypothesis) -> bool:
+        """Tell whether an effect predicts whole records that its numbers were not fitted to.
+
+        Parameters
+        ----------
+        present, chosen
+            Without it and with it.
+        """
         for each in (present, chosen):
             if each not in self.on_other_records:
                 again = self.comparison.without_whole_records(each)
@@ -287,18 +310,8 @@ class Trials:
         before, after = self.on_other_records[present], self.on_other_records[chosen]
         return predicts_records(self.criteria, before, after)
 
-    def chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
-        """Return the best of some hypotheses, by what each leaves.
-
-        Parameters
-        ----------
-        before
-            What the hypothesis leaves that all add to.
-        tried
-            What each of them leaves.
-        block
-            Where something is lacking.
-        """
+    def _chosen(self, before: Excesses, tried: Mapping[Hypothesis, Excesses], block: str) -> Step | None:
+        """Return the best of some hypotheses, by what each leaves."""
         rivals = [rival_of(h, after) for h, after in tried.items()]
         choice = choose(self.criteria, before, rivals, block)
         if choice is None:
@@ -326,33 +339,30 @@ class Trials:
         gained, gains = gain(before, rival.excesses), gains_by_record(before, rival.excesses)
         return Step(rival.hypothesis, most, shares[most], gain=gained, gains=gains)
 
-    def account(self, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
-        """Return how far each effect goes alone and what speaks against it, the best first.
 
-        Parameters
-        ----------
-        present
-            Hypothesis that they add to.
-        tried
-            Each with one more effect.
-        """
-        whole = max(total_excess(self.excesses_of(present)), 1.0)
-        every = [
-            Tried(
-                h,
-                1.0 - total_excess(self.excesses_of(h)) / whole,
-                self._objections(present, h),
-                is_undecided(self.criteria, self.excesses_of(present), rival_of(h, self.excesses_of(h))),
-            )
-            for h in tried
-        ]
-        return tuple(sorted(every, key=lambda each: -each.share))
+def account(trials: Trials, present: Hypothesis, tried: Sequence[Hypothesis]) -> tuple[Tried, ...]:
+    """Return how far each effect goes alone and what speaks against it, the best first.
 
-    def _objections(self, present: Hypothesis, tried: Hypothesis) -> tuple[str, ...]:
-        words = objections(self.criteria, self.excesses_of(present), rival_of(tried, self.excesses_of(tried)))
-        if tried in self.on_other_records and not self._predicts_records(present, tried):
+    Parameters
+    ----------
+    trials
+        That fitted them.
+    present
+        Hypothesis that they add to.
+    tried
+        Each with one more effect.
+    """
+    before = trials.excesses_of(present)
+    whole, every = max(total_excess(before), 1.0), []
+    for each in tried:
+        after = trials.excesses_of(each)
+        rival = rival_of(each, after)
+        words = objections(trials.criteria, before, rival)
+        if each in trials.on_other_records and not trials.predicts_records(present, each):
             words = (*words, "it does not predict records that are left out as a whole")
-        return words
+        share = 1.0 - total_excess(after) / whole
+        every.append(Tried(each, share, words, is_undecided(trials.criteria, before, rival)))
+    return tuple(sorted(every, key=lambda each: -each.share))
 
 
 def rival_of(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
