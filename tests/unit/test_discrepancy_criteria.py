@@ -17,6 +17,7 @@ from nlsdesign.discrepancy.selection.criteria import (
     is_beyond_noise,
     is_beyond_prior,
     is_complete,
+    is_far_from_closed,
     is_superfluous,
     is_undecided,
     lacking,
@@ -333,3 +334,26 @@ def test_of_several_forms_of_one_effect_the_best_is_told() -> None:
         choice = choose(RULE, FIRST, order, "spring")
         assert choice is not None
         assert choice.taken.hypothesis == "1000.0"
+
+
+def test_what_gains_in_another_block_is_not_near_the_best_in_this_one() -> None:
+    """Both may be named; the simpler one leaves 15 times as much here, and closes the other block."""
+    elsewhere = rival("elsewhere", 1, 1.5e4, 100.0)
+    assert not objections(RULE, FIRST, elsewhere)
+    assert taken(rival("here", 3, 1e3), elsewhere) == ("here",)
+
+
+def test_what_only_imitates_a_better_effect_whose_numbers_are_not_known_is_not_named() -> None:
+    unknown = replace(rival("better", 2, 100.0), standing=standing(0.3))
+    assert objections(RULE, FIRST, unknown)
+    assert taken(rival("imitates", 1, 1e4), unknown) is None
+    assert taken(rival("as good", 1, 190.0), unknown) == ("as good",), "not twice as much"
+    assert taken(rival("as good", 1, 110.0), unknown) == ("as good",)
+    bad = replace(rival("bad", 2, 100.0, 4e4), standing=standing(0.3))
+    assert taken(rival("alone", 1, 1e4), replace(bad, excesses=with_left(100.0, 4e6))) == ("alone",)
+
+
+def test_what_an_inexact_form_leaves_is_near_to_closed() -> None:
+    first = excess(1e5)
+    assert is_far_from_closed(RULE, first, excess(1.02 * RULE.inexact * 1e5))
+    assert not is_far_from_closed(RULE, first, excess(0.98 * RULE.inexact * 1e5))

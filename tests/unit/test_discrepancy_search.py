@@ -22,6 +22,8 @@ from nlsdesign.discrepancy.selection.measures import EffectNumber, Standing
 from nlsdesign.discrepancy.selection.search import Outcome, search
 from nlsdesign.discrepancy.selection.trials import Skipped
 from nlsdesign.errors import ConvergenceError
+from nlsdesign.identification.estimation.least_squares import Fit
+from nlsdesign.identification.estimation.parameters import Parameter
 
 BLANK = assembly("blank", load=Fixed())
 ROWS = 1000
@@ -350,3 +352,39 @@ def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
     assert [s.reason for s in found.skipped] == [
         "on all samples its numbers are 1.0 standard errors from no effect"
     ]
+
+
+def test_an_effect_belongs_to_the_block_of_which_it_explains_most() -> None:
+    """The spring stays unexplained, so its effect is dropped; what explains the motor is not."""
+    left = {
+        (): (1e5, 1e6), ("a",): (1e5, 4e5), ("both",): (10.0, 9e5), ("a", "both"): (10.0, 4e5),
+    }  # fmt: skip
+    found = outcome(Table(left), effect("a"), effect("both"))
+    assert names(found) == ["both"]
+    assert found.steps[0].block == "motor"
+
+
+def test_two_effects_are_found_beside_a_named_one_where_much_is_left() -> None:
+    left = {
+        (): (1e5,), ("a",): (3e4,), ("b",): (9e4,), ("c",): (9e4,), ("a", "b"): (2e4,), ("a", "c"): (2.5e4,),
+        ("b", "c"): (8e4,), ("a", "b", "c"): (10.0,),
+    }  # fmt: skip
+    found = outcome(Table(left), effect("a"), effect("b"), effect("c"))
+    assert sorted(names(found)) == ["a", "b", "c"]
+    little = {each: (tuple(0.1 * x for x in value) if "a" in each else value) for each, value in left.items()}
+    assert names(outcome(Table(little), effect("a"), effect("b"), effect("c"))) == ["a"]
+
+
+def test_an_effect_whose_numbers_fail_on_all_samples_makes_room_for_the_next() -> None:
+    """The best stands at its bound there; the next best is chosen, and the reason for the first is kept."""
+    parameter = Parameter("a.0", "N", 0.1, 0.1, math.inf, 0.1, 10.0, "log")
+    at_bound = Fit((parameter,), {"a.0": 0.1}, np.full((1, 1), 1e-4), 1.0, {}, converged=True)
+
+    class Failing(Table):
+        def polished(self, hypothesis: Hypothesis) -> Hypothesis:
+            done = super().polished(hypothesis)
+            return replace(done, fits={("motor",): at_bound}) if "a" in hypothesis.names else done
+
+    found = outcome(Failing({(): (1e5,), ("a",): (10.0,), ("b",): (2e3,)}), effect("a"), effect("b"))
+    assert names(found) == ["b"]
+    assert "a at motor: on all samples a.0 is at a bound of the search" in map(str, found.skipped)
