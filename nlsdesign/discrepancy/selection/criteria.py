@@ -434,7 +434,7 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
     unknown = [rival for rival in rivals if is_undecided(criteria, before, rival)]
-    if False:
+    if any(_leaves_far_less(criteria, rival, taken, block) for rival in unknown):
         return None
     return Choice(taken, tuple(alike.values()))
 
