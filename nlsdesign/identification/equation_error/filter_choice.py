@@ -9,7 +9,8 @@ A rate is taken over a span before any filter, as its sign or a drag asks for. A
 noise, which falls with its power of −3/2, and adds blur, which grows with the next derivatives of the motion.
 So the span is counted in radians of a pace that is estimated from the records: that of the highest derivative
 that a block takes, the root mean square of the next derivative over its own, both behind the narrowest filter
-that makes the noise of the next one small. A motion that reverses sharply has a quick acceleration although
+that makes the noise of the next one small, and never so quick that the filter of a balance lets more than a
+very small share of noise through. A motion that reverses sharply has a quick acceleration although
 its rate hardly changes most of the time, and fine counts show that while coarse ones do not.
 
 Source: Fuller 1987 (attenuation by errors in variables); Savitzky and Golay 1964 (quartics); Ruppert et al.
@@ -48,6 +49,8 @@ _LEFT = 0.5
 """Share of the power of the motion that a filter leaves at least."""
 _COARSEST = 6.0
 """Samples per period of the typical motion below which derivatives are not known."""
+_QUIET = 0.005
+"""Share of noise in the acceleration, root mean squares, up to which a filter is narrowed to blur less."""
 _CLEAR = 3.0
 """Samples in the width of a filter that leaves a hundredth of what has six samples a period: derivatives of
 what is quicker are not true."""
@@ -134,10 +137,23 @@ def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> d
         for signal, highest in _deciding(block).items()
         for order in range(1, highest + 1)
     )
-    return {
-        (signal, order): pace_of([(r.trace[signal], r.step) for r in records], noise.deviation(signal), order)
-        for signal, order in wanted
-    }
+    result = {}
+    for signal, order in wanted:
+        runs, level = [(r.trace[signal], r.step) for r in records], noise.deviation(signal)
+        result[signal, order] = pace_of(runs, level, order)
+        if order > 1:
+            result[signal, order] = min(result[signal, order], BALANCE / _quiet_width(runs, level, order))
+    return result
+
+
+def _quiet_width(signals: Sequence[tuple[Array, float]], noise: float, order: int) -> float:
+    """Return the narrowest width behind which the noise of a derivative is a very small share of it."""
+    width = 0.0
+    for width in _widths(_CLEAR * max(step for _, step in signals), signals):
+        power, share = _power(signals, width, (order, 0.0), noise)
+        if share <= _QUIET**2 * power:
+            break
+    return width
 
 
 def _deciding(block: Block) -> dict[str, int]:
@@ -179,8 +195,7 @@ def chosen_filters(
     if moving and 2.0 * math.pi < _COARSEST * usual_pace * max(r.step for r in records):
         raise _too_coarse(block, list(seen), usual_pace, records)
     # Where noise hides the highest derivative, or samples are too few for it, the pace of the rate is kept.
-    quickest = max(pace_by_order[key] for key in seen.items())
-    pace = max(usual_pace, min(quickest, BALANCE / (_CLEAR * max(r.step for r in records))))
+    pace = max(usual_pace, *(pace_by_order[key] for key in seen.items()))
     # A motion that hardly changes its rate, such as a slow ramp, has no pace of its own: its record sets one.
     usual = float(np.median([r.step * len(r.trace) for r in records]))
     widest = usual / _WIDTHS
