@@ -27,6 +27,7 @@ from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Column, RecordSet
 from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.identification.equation_error.filter_choice import rate_span
 from nlsdesign.identification.records.measurement import Record
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
@@ -188,6 +189,7 @@ def test_rates_follow_sharp_reversals_as_closely_as_the_counts_of_an_encoder_all
         short_of = gaussian_filter1d(predict(truth, records, "b")["stage.unbalanced"], 8.0)[200:-200]
         unbalanced.append(float(np.sqrt(np.mean(short_of**2))))
         assert np.max(np.abs(list(scores(refit(declared(), records)).values()))) < 3.0
+        assert rate_span(records.records, "stage.angle") == pytest.approx(spans[-1], rel=0.2)
     # A reversal takes 0.1 s; coarse counts need a longer time for the same noise of a rate.
     assert spans[0] < 0.06
     assert spans == sorted(spans)

@@ -115,7 +115,9 @@ def rate_span(records: Sequence[Record], signal: str) -> float:
     """
     resolutions = [r.resolution_of(signal) for r in records]
     noise = float(np.median([max(g.noise, g.quantum / math.sqrt(12.0)) for g in resolutions]))
-    pace = pace_of([(r.trace[signal], r.step) for r in records], noise)
+    runs = [(r.trace[signal], r.step) for r in records]
+    # Whoever takes a rate alone, as where a simulation begins, wants that of a sharp reversal too.
+    pace = max(_bounded_pace(runs, noise, order) for order in (1, 2))
     return SPAN / pace if pace else 0.0
 
 
@@ -137,13 +139,18 @@ def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> d
         for signal, highest in _deciding(block).items()
         for order in range(1, highest + 1)
     )
-    result = {}
-    for signal, order in wanted:
-        runs, level = [(r.trace[signal], r.step) for r in records], noise.deviation(signal)
-        result[signal, order] = pace_of(runs, level, order)
-        if order > 1:
-            result[signal, order] = min(result[signal, order], BALANCE / _quiet_width(runs, level, order))
-    return result
+    return {
+        (signal, order): _bounded_pace(
+            [(r.trace[signal], r.step) for r in records], noise.deviation(signal), order
+        )
+        for signal, order in wanted
+    }
+
+
+def _bounded_pace(signals: Sequence[tuple[Array, float]], noise: float, order: int) -> float:
+    """Return the pace of a derivative; that of an acceleration no quicker than its noise allows."""
+    pace = pace_of(signals, noise, order)
+    return min(pace, BALANCE / _quiet_width(signals, noise, order)) if order > 1 and pace else pace
 
 
 def _quiet_width(signals: Sequence[tuple[Array, float]], noise: float, order: int) -> float:
