@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from nlsdesign.components import (
     ROTATION,
@@ -21,11 +22,12 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import Assembly
-from nlsdesign.discrepancy import Refit, refit
+from nlsdesign.discrepancy import Refit, predict, refit
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Column, RecordSet
 from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.identification.equation_error.filter_choice import rate_span
 from nlsdesign.identification.records.measurement import Record
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
@@ -162,3 +164,35 @@ def test_ten_samples_a_period_are_enough_for_an_inertia() -> None:
     found = refit(declared(), RecordSet((*runs, replace(runs[0], name="h", role="held_out")), COLUMNS))
     numbers = {n.name: n.fitted for n in found.numbers}
     assert numbers["stage.inertia"] == pytest.approx(0.05, rel=0.05)
+
+
+def reversed_sharply(quantum: float) -> RecordSet:
+    """A body that turns at a nearly even speed and reverses each second within a tenth of a second."""
+    count, half = np.arange(160_000), 0.05
+    time, turn, since = FINE * count, (count + 5000) // 10_000, FINE * ((count + 5000) % 10_000 - 5000)
+    edge = np.sin(0.5 * np.pi * np.clip(since / half, -1.0, 1.0))
+    speed = edge * (1.0 - 2.0 * (turn % 2)) + 0.3 * np.sin(1.9 * time)
+    inertia, damping, friction = TRUE.values()
+    torque = inertia * np.gradient(speed, FINE) + damping * speed + friction * np.sign(speed)
+    history, counts = (time, np.cumsum(speed) * FINE, torque), round(2.0 * np.pi / quantum)
+    runs = [record(history, name, 1000.0, counts, k) for k, name in enumerate("ab")]
+    return RecordSet((runs[0], replace(runs[1], role="held_out")), COLUMNS)
+
+
+def test_rates_follow_sharp_reversals_as_closely_as_the_counts_of_an_encoder_allow() -> None:
+    numbers = declared().quantities()
+    truth = declared().with_values({name: numbers[name].with_value(v, "") for name, v in TRUE.items()})
+    spans, unbalanced = [], []
+    for quantum in (1e-6, 1e-3, 2e-2):
+        records = reversed_sharply(quantum)
+        spans.append(Bench(records, blocks_of(flatten(truth), records.signals)).filters["stage"].span)
+        short_of = gaussian_filter1d(predict(truth, records, "b")["stage.unbalanced"], 8.0)[200:-200]
+        unbalanced.append(float(np.sqrt(np.mean(short_of**2))))
+        assert np.max(np.abs(list(scores(refit(declared(), records)).values()))) < 3.0
+        assert rate_span(records.records, "stage.angle") == pytest.approx(spans[-1], rel=0.2)
+    # A reversal takes 0.1 s; coarse counts need a longer time for the same noise of a rate.
+    assert spans[0] < 0.06
+    assert spans == sorted(spans)
+    assert spans[2] > 2.0 * spans[0]
+    # The noise of the torque behind the same filter is 0.0019 N*m.
+    assert unbalanced[0] < 0.0025

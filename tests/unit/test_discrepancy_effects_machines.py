@@ -19,18 +19,20 @@ from nlsdesign.components import (
     ForceSensor,
     LinearDrive,
     LinearElastic,
+    LoadFriction,
     NeoHooke,
     specimen,
     tie,
 )
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.deck import read_deck
+from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.discrepancy.effects import (
     ALL,
     cable_slack,
     constant_force,
     coulomb_friction,
+    load_dependent_friction,
     second_relaxation,
 )
 from nlsdesign.discrepancy.selection.comparison import moved_numbers
@@ -126,3 +128,18 @@ def test_two_branches_of_one_law_keep_their_numbers_when_they_move() -> None:
     moved = moved_numbers(two.assembly, buckling.assembly)
     for unknown in two.unknowns:
         assert moved[unknown.name] == unknown.name.replace("strip.", "strip.piece.")
+
+
+@pytest.mark.parametrize("name", ["xl330_pendulum", "dfki_pendulum"])
+def test_a_weight_loads_what_carries_it_as_a_spring_does(name: str) -> None:
+    servo = declare(load_deck(name))
+    (candidate,) = load_dependent_friction(servo)
+    assert candidate.location == "weight"
+    assert isinstance(candidate.assembly.element("weight"), LoadFriction)
+    # What has it is not offered it again.
+    assert not load_dependent_friction(candidate.assembly)
+
+
+def test_friction_of_a_load_that_never_changes_is_no_other_than_coulombs() -> None:
+    load = tie(ConstantLoad(load=3.0), "carriage")
+    assert not load_dependent_friction(drive().with_part("offset", load))

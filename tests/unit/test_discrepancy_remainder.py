@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.deck import load_deck
+from nlsdesign.discrepancy.effects.unnamed_tables import unnamed_part
 from nlsdesign.discrepancy.reporting.advice import advice, experiment
 from nlsdesign.discrepancy.reporting.sparse_formula import sparse_formula
+from nlsdesign.identification.equation_error.evidence import Bench
+from nlsdesign.identification.estimation.least_squares import Fit
 
 Array = NDArray[np.float64]
 
@@ -95,3 +103,11 @@ def test_each_alias_gets_a_sentence_with_an_experiment_or_a_place() -> None:
     assert len(said) == 2
     assert str(experiment("permanent_set", "cable_slack")) in said[0]
     assert said[1] == "cable_slack or brand_new: they differ in 'a'."
+
+
+def test_a_command_that_is_not_explained_has_no_place_for_a_table() -> None:
+    servo = declare(load_deck("xl330_pendulum"))
+    fit = SimpleNamespace(values={}, parameters=())
+    signals = ("encoder.reading", "servo.goal", "servo.wanted_voltage")
+    bench = SimpleNamespace(records=SimpleNamespace(signals=signals))
+    assert unnamed_part(servo, cast(Fit, fit), cast(Bench, bench), "servo.wanted_voltage") is None

@@ -183,6 +183,8 @@ def test_what_leaves_most_of_its_block_unexplained_stands_for_something_else() -
     found = outcome(Table({(): (1e5,), ("a",): (4e4,)}), effect("a"))
     assert names(found) == []
     assert not found.complete
+    ((said,),) = (each.objections for each in found.tried)
+    assert "explains 60 % of the excess, less than 75 %" in said
     beside = {(): (1e5, 9e4), ("a",): (4e4, 9e4), ("b",): (1e5, 10.0), ("a", "b"): (4e4, 10.0)}
     assert outcome(Table(beside), effect("a")).steps == ()
     found = outcome(Table(beside), effect("a"), effect("b"))

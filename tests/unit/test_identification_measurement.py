@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import ROTATION, Assembly, Encoder, Inertia, Spring, TorqueSensor, tie
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
+from nlsdesign.deck import load_deck
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import RecordSet, load_record, load_records
 from nlsdesign.model import FlatModel, flatten
@@ -251,6 +253,23 @@ def test_a_machine_at_rest_and_a_limited_command_are_remarked_alone(tmp_path: Pa
     said = [str(r) for r in records.remarks]
     assert any("b.csv: column 'theta_deg'" in each and "is constant at 0" in each for each in said), said
     assert any("c.csv: column 'torque_Nm'" in each and "a limit of the drive" in each for each in said), said
+
+
+def test_what_a_controller_commands_may_rest_at_its_limit(tmp_path: Path) -> None:
+    servo = flatten(declare(load_deck("xl330_pendulum")))
+    time = np.arange(0.0, 6.0, 5e-3)
+    volts = 9.0 * np.sin(4.0 * time) + 0.05 * np.random.default_rng(1).standard_normal(len(time))
+    rows = np.column_stack([time, np.sin(4.0 * time - 1.0), np.clip(volts, -7.4, 7.4)])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,angle_rad,volts_V", comments="")
+    (tmp_path / "records.toml").write_text(
+        '[time]\ncolumn = "t_s"\nunit = "s"\n'
+        '[columns.angle_rad]\nsignal = "encoder.reading"\nunit = "rad"\n'
+        '[columns.volts_V]\nsignal = "servo.wanted_voltage"\nunit = "V"\n',
+        encoding="utf8",
+    )
+    records = load_records(tmp_path, servo)
+    assert records.findings == ()
+    assert any("a limit of the drive" in str(remark) for remark in records.remarks)
 
 
 def test_uneven_steps_are_interpolated_and_said(folder: Path, model: FlatModel) -> None:

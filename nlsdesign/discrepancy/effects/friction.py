@@ -28,8 +28,8 @@ from .places import (
     driven_ties,
     driving_end,
     laws,
+    loaded_ties,
     moving_bodies,
-    restoring_ties,
     turning_bodies,
 )
 from .sizes import efforts_on
@@ -231,11 +231,11 @@ stribeck_friction = Effect(
 )
 load_dependent_friction = Effect(
     "load_dependent_friction",
-    "Friction in proportion to the effort that a spring puts on what drives it.",
+    "Friction in proportion to the effort that a spring or a weight puts on what drives it.",
     30,
     (
         Form(
-            restoring_ties,
+            loaded_ties,
             _loaded,
             "an effort against the motion in proportion to the load",
             "Coulomb 1785; Niemann and Winter 2003 (efficiency of gears)",

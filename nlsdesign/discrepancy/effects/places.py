@@ -180,6 +180,24 @@ def restoring_ties(assembly: Assembly) -> list[str]:
     return [n for n, p in assembly.parts if isinstance(p, Tie) and p.element.restores]
 
 
+def loaded_ties(assembly: Assembly) -> list[str]:
+    """Return the names of the ties whose load depends on where the body is: what pulls back, and weights.
+
+    Friction in proportion to a load that never changes is Coulomb friction.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    """
+    pulling = restoring_ties(assembly)
+    return [
+        n
+        for n, p in assembly.parts
+        if isinstance(p, Tie) and (n in pulling or "gravity" in p.element.phenomena)
+    ]
+
+
 def lumped_springs(assembly: Assembly) -> list[str]:
     """Return the paths of elastic laws of force or torque that are no piece of a material.
 

@@ -22,6 +22,7 @@ from scipy.optimize import lsq_linear
 
 from ...components import Assembly, Element, Parallel, UnnamedFriction, UnnamedSpring
 from ...components.core.domain import Domain
+from ...errors import ArrangementError
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.evidence import Bench, Evidence
 from ...identification.equation_error.filter_choice import rate_span
@@ -183,7 +184,7 @@ def _place(assembly: Assembly, model: FlatModel, block: Block) -> _Place | None:
     inside = [p for p in stretched(assembly) if p == path or p.startswith(f"{path}.")]
     try:
         domain = assembly.element(path).domain
-    except (KeyError, AttributeError, ValueError):
+    except (ArrangementError, KeyError, AttributeError, ValueError):
         return None  # what is measured is no element's effort, so there is no place for a table
     if effort != domain.effort:
         return None

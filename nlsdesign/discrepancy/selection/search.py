@@ -120,11 +120,22 @@ class _Search:
         """Drop the effects of blocks that stay unexplained: there they stand for something else."""
         if not steps:
             return []
-        left = unexplained(
-            self.trials.criteria, self.trials.excesses_of(start), self.trials.excesses_of(steps[-1].chosen)
-        )
+        first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
+        left = unexplained(self.trials.criteria, first, last)
         kept = [step for step in steps if step.block not in left]
-        return steps if len(kept) == len(steps) else self._rebuilt(start, kept)
+        if len(kept) == len(steps):
+            return steps
+        shares, least = explained(first, last), self.trials.criteria.closed_share
+        why = {
+            (step.chosen.newest.effect, step.chosen.newest.location): (
+                f"all that was found leaves more of '{step.block}' than a name may: it explains "
+                f"{100.0 * shares[step.block]:.0f} % of the excess, less than {100.0 * least:.0f} %"
+            )
+            for step in steps
+            if step.block in left
+        }
+        self.tried = tuple(_with_objection(each, why) for each in self.tried)
+        return self._rebuilt(start, kept)
 
     def _forward(self, start: Hypothesis) -> list[Step]:
         """Return the effects that may be named, one after the other."""
@@ -291,3 +302,9 @@ def _is_richer(candidate: Candidate, named: Candidate) -> bool:
     """Tell whether a candidate is a richer form of what is named, at its place."""
     more = candidate.effect == named.effect and len(candidate.unknowns) > len(named.unknowns)
     return (more or named.effect in candidate.simpler) and candidate.location == named.location
+
+
+def _with_objection(tried: Tried, why: Mapping[tuple[str, str], str]) -> Tried:
+    """Return what was tried with the reason why its effect was dropped again, if it was."""
+    reason = why.get((tried.candidate.effect, tried.candidate.location))
+    return replace(tried, objections=(reason,)) if reason and not tried.objections else tried

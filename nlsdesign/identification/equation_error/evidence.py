@@ -26,10 +26,10 @@ from .noise import estimate_noise as estimate_noise
 
 Array = NDArray[np.float64]
 
-_NOISY, _SMEARED = 5.0, 0.04
+_NOISY, _SMEARED = 5.0, 0.027
 """A moving block says nothing where its speed is below so many times the noise of the speed, and so much of
-its root mean square over the record: where friction bends the motion at a reversal, a rate over a span of
-1.5 radians misses by a twentieth of span and jump of the acceleration."""
+the span of the rate times the acceleration: where friction bends the motion at a reversal, a rate misses by
+a twentieth of span and jump of the acceleration, and a usual jump is half the root mean square of it."""
 _SLOW_SHARE = 1e-2
 """Of the filter of a row that may reach into a reversal."""
 _LEAST_ROWS = 20
@@ -91,10 +91,13 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
     matrix = matrix[~matrix.touched_by(masked)]
     inputs = measured_inputs(block, record, span)
     if block.moving is not None:
-        speed = np.abs(inputs[[v.name for v in block.model.inputs].index(block.moving)])
-        noisy = _NOISY * _rate_noise(block.drives[block.moving], noise, record.step, span)
+        drive = block.drives[block.moving]
+        rate = inputs[[v.name for v in block.model.inputs].index(block.moving)]
+        noisy = _NOISY * _rate_noise(drive, noise, step, span)
+        # A rate that is measured itself is not taken over a span.
+        blurred = _SMEARED * span * rmse(np.gradient(rate, step)) if drive.order else 0.0
         # The filter smears what happens at a reversal; so its whole reach must be in motion.
-        slow = (speed < math.hypot(noisy, _SMEARED * rmse(speed))).astype(float)
+        slow = (np.abs(rate) < math.hypot(noisy, blurred)).astype(float)
         matrix = matrix[np.flatnonzero(matrix @ slow < _SLOW_SHARE)]
     variance, raw = _variances(block, record, noise, filters, inputs)
     spacing = stride * step

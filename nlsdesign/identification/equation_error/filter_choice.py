@@ -4,7 +4,17 @@ All terms of a balance pass one filter, so what it takes from the motion biases 
 acceleration a + n in a balance J·a = T makes the inertia too small by the share var(n)/var(a), which no
 number of samples removes, while the standard error falls with their root. So the filter is widened until
 that bias is below a fifth of the standard error, but not beyond half the power of the motion.
-Source: Fuller 1987 (attenuation by errors in variables).
+
+A rate is taken over a span before any filter, as its sign or a drag asks for. A longer span takes from the
+noise, which falls with its power of −3/2, and adds blur, which grows with the next derivatives of the motion.
+So the span is counted in radians of a pace that is estimated from the records: that of the highest derivative
+that a block takes, the root mean square of the next derivative over its own, both behind the narrowest filter
+that makes the noise of the next one small, and never so quick that the filter of a balance lets more than a
+very small share of noise through. A motion that reverses sharply has a quick acceleration although
+its rate hardly changes most of the time, and fine counts show that while coarse ones do not.
+
+Source: Fuller 1987 (attenuation by errors in variables); Savitzky and Golay 1964 (quartics); Ruppert et al.
+1995 (widths from estimated derivatives).
 """
 
 from __future__ import annotations
@@ -28,17 +38,22 @@ Array = NDArray[np.float64]
 READING, BALANCE = 0.1, 0.2
 """Least widths, as radians of the typical motion. A balance holds a second derivative."""
 SPAN = 1.5
-"""Span of a rate in radians of the typical motion, of which it keeps all but a thousandth."""
+"""Span of a rate in radians of the pace of the block, of which it keeps all but a thousandth."""
 SPACING = 1.25
 """Widths from one row to the next, of the filter of a balance: there is no more information."""
 _TYPICAL = 0.01
-"""Share of noise in the power of the acceleration below which the pace of a motion can be told."""
+"""Share of noise in the power of the next derivative below which a pace can be told."""
 _BIAS = 0.2
 """Standard errors of which a bias is let pass: it takes a share of 0.6 % from a 95 % interval."""
 _LEFT = 0.5
 """Share of the power of the motion that a filter leaves at least."""
 _COARSEST = 6.0
 """Samples per period of the typical motion below which derivatives are not known."""
+_QUIET = 0.005
+"""Share of noise in the acceleration, root mean squares, up to which a filter is narrowed to blur less."""
+_CLEAR = 3.0
+"""Samples in the width of a filter that leaves a hundredth of what has six samples a period: derivatives of
+what is quicker are not true."""
 _STEP = 2.0**0.25
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
@@ -66,10 +81,10 @@ class Filters(NamedTuple):
     spacing: float
 
 
-def pace_of(signals: Sequence[tuple[Array, float]], noise: float) -> float:
-    """Return the typical angular frequency of a motion in rad/s: acceleration over rate, root mean squares.
+def pace_of(signals: Sequence[tuple[Array, float]], noise: float, order: int = 1) -> float:
+    """Return the typical angular frequency of a derivative in rad/s: the next over it, root mean squares.
 
-    Both behind the narrowest filter that makes the noise of the acceleration small; zero where none does.
+    Both behind the narrowest filter that makes the noise of the next small; zero where none does.
 
     Parameters
     ----------
@@ -77,12 +92,14 @@ def pace_of(signals: Sequence[tuple[Array, float]], noise: float) -> float:
         Of each record, shape (n,), with the time between samples in s.
     noise
         Standard deviation of its white noise.
+    order
+        1 for the pace of the rate, 2 for that of the acceleration.
     """
     for width in _widths(0.5 * min(step for _, step in signals), signals):
-        power, share = _power(signals, width, (2, 0.0), noise)
-        rate, _ = _power(signals, width, (1, 0.0), noise)
-        if power > 0.0 and rate > 0.0 and share <= _TYPICAL * (power + share):
-            return math.sqrt(power / rate)
+        power, share = _power(signals, width, (order + 1, 0.0), noise)
+        below, _ = _power(signals, width, (order, 0.0), noise)
+        if power > 0.0 and below > 0.0 and share <= _TYPICAL * (power + share):
+            return math.sqrt(power / below)
     return 0.0
 
 
@@ -98,12 +115,14 @@ def rate_span(records: Sequence[Record], signal: str) -> float:
     """
     resolutions = [r.resolution_of(signal) for r in records]
     noise = float(np.median([max(g.noise, g.quantum / math.sqrt(12.0)) for g in resolutions]))
-    pace = pace_of([(r.trace[signal], r.step) for r in records], noise)
+    runs = [(r.trace[signal], r.step) for r in records]
+    # Whoever takes a rate alone, as where a simulation begins, wants that of a sharp reversal too.
+    pace = max(_bounded_pace(runs, noise, order) for order in (1, 2))
     return SPAN / pace if pace else 0.0
 
 
-def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> dict[str, float]:
-    """Return the pace in rad/s of every signal that decides on a filter.
+def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> dict[tuple[str, int], float]:
+    """Return the pace in rad/s of every signal and order that decide on a filter.
 
     Parameters
     ----------
@@ -114,18 +133,47 @@ def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> d
     noise
         Of the measured signals.
     """
-    signals = dict.fromkeys(signal for block in blocks for signal in _deciding(block))
-    return {s: pace_of([(r.trace[s], r.step) for r in records], noise.deviation(s)) for s in signals}
+    wanted = dict.fromkeys(
+        (signal, order)
+        for block in blocks
+        for signal, highest in _deciding(block).items()
+        for order in range(1, highest + 1)
+    )
+    return {
+        (signal, order): _bounded_pace(
+            [(r.trace[signal], r.step) for r in records], noise.deviation(signal), order
+        )
+        for signal, order in wanted
+    }
 
 
-def _deciding(block: Block) -> list[str]:
-    """Return the motions whose rates drive a block; all that drives it where there are none."""
+def _bounded_pace(signals: Sequence[tuple[Array, float]], noise: float, order: int) -> float:
+    """Return the pace of a derivative; that of an acceleration no quicker than its noise allows."""
+    pace = pace_of(signals, noise, order)
+    return min(pace, BALANCE / _quiet_width(signals, noise, order)) if order > 1 and pace else pace
+
+
+def _quiet_width(signals: Sequence[tuple[Array, float]], noise: float, order: int) -> float:
+    """Return the narrowest width behind which the noise of a derivative is a very small share of it."""
+    width = 0.0
+    for width in _widths(_CLEAR * max(step for _, step in signals), signals):
+        power, share = _power(signals, width, (order, 0.0), noise)
+        if share <= _QUIET**2 * power:
+            break
+    return width
+
+
+def _deciding(block: Block) -> dict[str, int]:
+    """Return the motions whose rates drive a block, each with its highest order; all drives if none has."""
     drives = block.drives.values()
-    return [d.signal for d in drives if d.order > 0] or [d.signal for d in drives]
+    highest: dict[str, int] = {}
+    for drive in [d for d in drives if d.order > 0] or drives:
+        highest[drive.signal] = max(1, drive.order, highest.get(drive.signal, 0))
+    return highest
 
 
 def chosen_filters(
-    block: Block, records: Sequence[Record], noise: Noise, pace_by_signal: Mapping[str, float]
+    block: Block, records: Sequence[Record], noise: Noise, pace_by_order: Mapping[tuple[str, int], float]
 ) -> Filters:
     """Return the filters of a block for all records of a set and all hypotheses.
 
@@ -137,13 +185,8 @@ def chosen_filters(
         Those that fits may see.
     noise
         Of the measured signals.
-    pace_by_signal
+    pace_by_order
         From :func:`paces`.
-
-    Raises
-    ------
-    MeasurementError
-        If the motion is sampled too coarsely for its derivatives.
 
     Raises
     ------
@@ -151,13 +194,15 @@ def chosen_filters(
         If the motion is sampled too coarsely for derivatives.
     """
     moving = any(d.order > 0 for d in block.drives.values())
-    seen = dict.fromkeys(_deciding(block))
-    pace = max((pace_by_signal[signal] for signal in seen), default=0.0)
+    seen = _deciding(block)
+    usual_pace = max((pace_by_order[signal, 1] for signal in seen), default=0.0)
     shortest = min(r.step for r in records)
-    if pace == 0.0:
+    if usual_pace == 0.0:
         return Filters(0.0, 0.0, shortest)
-    if moving and 2.0 * math.pi < _COARSEST * pace * max(r.step for r in records):
-        raise _too_coarse(block, list(seen), pace, records)
+    if moving and 2.0 * math.pi < _COARSEST * usual_pace * max(r.step for r in records):
+        raise _too_coarse(block, list(seen), usual_pace, records)
+    # Where noise hides the highest derivative, or samples are too few for it, the pace of the rate is kept.
+    pace = max(usual_pace, *(pace_by_order[key] for key in seen.items()))
     # A motion that hardly changes its rate, such as a slow ramp, has no pace of its own: its record sets one.
     usual = float(np.median([r.step * len(r.trace) for r in records]))
     widest = usual / _WIDTHS

@@ -71,14 +71,14 @@ class Align:
 
 @dataclass(frozen=True)
 class Inputs:
-    """Which signals are inputs of the model.
+    """Which signals command the machine: they may rest at a limit, and jump.
 
     Parameters
     ----------
     commanded
-        Full names of inputs.
+        Full names of inputs, and of what a controller in the model commands its drive with.
     shown
-        Full names of readings of an input, for instance of a current.
+        Full names of readings of one of them, for instance of a current.
     """
 
     commanded: frozenset[str] = frozenset()
@@ -86,14 +86,14 @@ class Inputs:
 
     @staticmethod
     def of(model: FlatModel) -> Inputs:
-        """Return the inputs of a model.
+        """Return what commands a model.
 
         Parameters
         ----------
         model
             Whose signals are measured.
         """
-        commanded = frozenset(v.name for v in model.inputs)
+        commanded = frozenset(v.name for v in model.inputs) | {c for b in model.bodies for c in b.commands}
         return Inputs(commanded, frozenset(r.signal for r in model.readings if r.measured in commanded))
 
 

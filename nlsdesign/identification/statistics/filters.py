@@ -71,7 +71,7 @@ def difference(order: int, span: float = 0.0) -> Array:
     Parameters
     ----------
     order
-        0, 1 or 2.
+        0 to 3.
     span
         In samples; only rates are smoothed.
     """
