@@ -24,6 +24,9 @@ from .effect import Edit, Effect, Form, Places
 from .friction import number
 from .sizes import LONGEST, QUICKEST
 
+_FALLS_AT = (0.2, 1.5)
+"""Where a drive may lose effort, in largest commands: short motions command several times what others do."""
+
 
 def _drives(assembly: Assembly) -> list[str]:
     """Return the bodies that are driven by a command.
@@ -91,7 +94,7 @@ def _falling(
         if commanded:
             kind, signal = commanded
             edited, path = _put(assembly, name, wanted, make(kind))
-            yield Edit(edited, (Unknown(f"{path}.{field}", starts, 0.05, 1e3, signal, null=math.inf),))
+            yield Edit(edited, (Unknown(f"{path}.{field}", starts, 0.02, 1e3, signal, null=math.inf),))
 
     return edits
 
@@ -105,7 +108,7 @@ def _iron(kind: Domain) -> DrivePart:
 def _saturation(assembly: Assembly, name: str) -> Iterator[Edit]:
     commanded = _commanded(assembly, name)
     field = "saturation_current" if commanded and commanded[0] == CURRENT else "saturation"
-    yield from _falling("saturation", field, _iron, (1.5,))(assembly, name)
+    yield from _falling("saturation", field, _iron, _FALLS_AT)(assembly, name)
 
 
 def _heat(assembly: Assembly, name: str) -> Iterator[Edit]:
@@ -117,7 +120,7 @@ def _heat(assembly: Assembly, name: str) -> Iterator[Edit]:
         )
         edited, path = _put(assembly, name, "heat", part)
         unknowns = (
-            Unknown(f"{path}.halving", (0.2, 1.5), 0.02, 1e3, signal, null=math.inf),
+            Unknown(f"{path}.halving", _FALLS_AT, 0.02, 1e3, signal, null=math.inf),
             Unknown(f"{path}.cooling_time", (0.7,), 0.01, 100.0, LONGEST, null=None),
         )
         yield Edit(edited, unknowns)
@@ -169,7 +172,7 @@ command_compression = Effect(
                 "compression",
                 "halving",
                 lambda kind: CommandCompression(halving=number(100.0, kind.effort_unit), domain=kind),
-                (4.0,),
+                (0.5, 4.0),
             ),
             "effort that falls short in proportion to the square of the command, with its sign",
             "Hanselman 2003 (Froelich's curve of magnetisation in its first form)",

@@ -79,6 +79,9 @@ class Criteria:
     inexact: float = _criterion(
         0.05, "share of the excess of a block that the inexact form of a named effect may leave in it"
     )
+    stands_out: float = _criterion(
+        1.5, "where a block stays open, every other name must leave at least so many times as much"
+    )
     closed_share: float = _criterion(
         0.75, "share of the excess of a block that all effects in it together must explain for a name"
     )
@@ -201,6 +204,19 @@ def unexplained(criteria: Criteria, first: Excesses, last: Excesses) -> list[str
     if len(shares) > 1:
         shares.pop(DECLARED, None)
     return [n for n, share in shares.items() if last[n].open and share < criteria.closed_share]
+
+
+def stands_out(criteria: Criteria, distance: float) -> bool:
+    """Tell whether an effect explains so much more than any other that it is one, although much is left.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    distance
+        How many times as much the best other name leaves, natural logarithm.
+    """
+    return distance >= math.log(criteria.stands_out)
 
 
 def is_far_from_closed(criteria: Criteria, first: Excess, now: Excess) -> bool:

@@ -64,7 +64,9 @@ def distance_to_next(criteria: Criteria, choice: Choice[T], rivals: Sequence[Riv
         Where something was lacking.
     """
     names = {choice.taken.effect, *(each.effect for each in choice.equals), *choice.taken.simpler}
-    others = [left_by(rival, block) for rival in rivals if rival.effect not in names]
+    # A form that contains it is no other name for what is there.
+    forms = {rival.effect for rival in rivals if choice.taken.effect in rival.simpler}
+    others = [left_by(rival, block) for rival in rivals if rival.effect not in names | forms]
     margin = criteria.noise_margin
     own = left_by(choice.taken, block)
     return math.log((min(others) + margin) / (own + margin)) if others else 0.0

@@ -18,6 +18,7 @@ from .criteria import (
     is_superfluous,
     lacking,
     objections_of_numbers,
+    stands_out,
     unexplained,
 )
 from .hypothesis import Hypothesis
@@ -117,12 +118,15 @@ class _Search:
         return None
 
     def _explaining(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
-        """Drop the effects of blocks that stay unexplained: there they stand for something else."""
+        """Drop the effects of blocks that stay unexplained: there they stand for something else.
+
+        Unless they stand out from all other names: then there is something else beside them.
+        """
         if not steps:
             return []
         first, last = (self.trials.excesses_of(each) for each in (start, steps[-1].chosen))
         left = unexplained(self.trials.criteria, first, last)
-        kept = [step for step in steps if step.block not in left]
+        kept = [s for s in steps if s.block not in left or stands_out(self.trials.criteria, s.distance)]
         if len(kept) == len(steps):
             return steps
         shares, least = explained(first, last), self.trials.criteria.closed_share
@@ -132,7 +136,7 @@ class _Search:
                 f"{100.0 * shares[step.block]:.0f} % of the excess, less than {100.0 * least:.0f} %"
             )
             for step in steps
-            if step.block in left
+            if step not in kept
         }
         self.tried = tuple(_with_objection(each, why) for each in self.tried)
         return self._rebuilt(start, kept)
