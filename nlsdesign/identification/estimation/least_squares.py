@@ -229,7 +229,10 @@ class StackedRows:
         x
             In the fitted scale.
         """
-        return {p.name: p.outward(v) for p, v in zip(self.parameters, x, strict=True)}
+        # At a bound the last digit of a product may lie beyond it, and a part refuses such a value.
+        return {
+            p.name: min(max(p.outward(v), p.lower), p.upper) for p, v in zip(self.parameters, x, strict=True)
+        }
 
     @property
     def prior_information(self) -> Array:
