@@ -148,10 +148,25 @@ def _decided(
 def _searched(
     case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
 ) -> Outcome:
-    """Search for effects; where something is left, with numbers let go that the records contradict."""
+    """Search for effects, and for declared numbers that the records contradict."""
+    free = with_numbers_let_go(case.comparison, base, case.criteria)
+    closing = free if free and is_complete(case.excesses(free)) else None
+    if closing and len(wrong_numbers(closing)) == 1:
+        return Outcome(closing, complete=True)  # no effect has fewer numbers
     outcome = search(case.comparison, base, catalogue, case.criteria, progress)
-    if outcome.complete:
-        return outcome
+    if closing and len(wrong_numbers(closing)) < len(outcome.last.unknowns):
+        return replace(outcome, last=closing, steps=(), complete=True)
+    return outcome if outcome.complete else _beside_wrong_numbers(case, base, catalogue, progress, outcome)
+
+
+def _beside_wrong_numbers(
+    case: _Case,
+    base: Hypothesis,
+    catalogue: Sequence[EffectFunction],
+    progress: Callable[[str], None],
+    outcome: Outcome,
+) -> Outcome:
+    """Let go numbers where effects leave something, and search anew if that explains much of it."""
     progress("letting go declared numbers at the end of their ranges")
     free = with_numbers_let_go(case.comparison, outcome.last, case.criteria)
     if free is None:
@@ -170,6 +185,8 @@ def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     wrong = sentence_of(outcome.last)
     if wrong and outcome.steps:
         return _Decision("named", (wrong,))
+    if wrong and 2 * len(wrong_numbers(outcome.last)) < len(base.values):
+        return _Decision("data_suspect", (wrong,))
     if wrong:
         other = other_numbers(case.comparison, base, base, case.criteria)
         return _Decision("data_suspect", (other.words if other.decides else wrong,))

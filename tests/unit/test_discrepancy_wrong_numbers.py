@@ -1,0 +1,55 @@
+"""A number that was declared wrongly is said to be that, alone and beside an effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from nlsdesign.discrepancy import ALL, Verdict, diagnose
+from nlsdesign.identification import load_records
+from nlsdesign.model import flatten
+from tests.diagnosed import declared_rig
+from tests.rig import ACTUATORS, make_records, write_declaration, write_records
+
+MOTIONS = ("sine_15deg_5.0Hz", "sine_25deg_2.0Hz", "sine_45deg_0.5Hz")
+TWO = tuple(each for each in ALL if each.__name__ in ("coulomb_friction", "second_relaxation"))
+MODULUS = "spring.cable.rubber.relaxing.spring.modulus"
+
+
+def diagnosed(folder: Path, factor: float, hidden: dict[str, float]) -> Verdict:
+    """Records of the arm, whose declared modulus of relaxation is wrong by a factor."""
+    arm = ACTUATORS["arm"]
+    mistaken = replace(arm, rubber=replace(arm.rubber, k=factor * arm.rubber.k))
+    write_declaration(folder, mistaken)
+    write_records(folder / "records", make_records(arm, hidden, 5, only=MOTIONS))
+    rig = declared_rig(folder / "rig.toml", folder / "cam.csv")
+    return diagnose(rig, load_records(folder / "records", flatten(rig)), catalogue=TWO)
+
+
+@pytest.mark.parametrize("factor", [0.65, 1.5])
+def test_a_single_wrong_number_is_named_with_its_value(tmp_path: Path, factor: float) -> None:
+    found = diagnosed(tmp_path, factor, {})
+    assert found.verdict == "data_suspect"
+    assert found.effects == ()
+    (sentence,) = [each for each in found.where if "a declared number is probably wrong" in each]
+    assert MODULUS in sentence
+    assert "declared spreads away" in sentence
+    values = {v.name: v.start for v in flatten(found.actuator).parameters}
+    true = ACTUATORS["arm"].rubber.k
+    # The rig is built within 6 % of what its makers declare.
+    assert values[MODULUS] == pytest.approx(true, rel=0.1)
+
+
+def test_a_number_inside_its_declared_range_is_not_called_wrong(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, 1.03, {})
+    assert found.verdict == "none"
+    assert found.where == ()
+
+
+def test_an_effect_beside_a_wrong_number_is_named_and_the_number_said(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, 1.5, {"coulomb_friction": 1.0})
+    assert found.verdict == "named"
+    assert [e.name for e in found.effects] == ["coulomb_friction"]
+    assert any(MODULUS in each for each in found.where)
