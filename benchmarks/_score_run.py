@@ -130,6 +130,7 @@ def content(verdict: Verdict) -> dict[str, Any]:
         "remainder": None if remainder is None else str(getattr(remainder, "block", "somewhere")),
         "named": [effect.name for effect in verdict.effects],
         "probabilities": [getattr(effect, "probability", None) for effect in verdict.effects],
+        "next_leaves": [effect.evidence.next_leaves for effect in verdict.effects if effect.evidence],
         "aliases": [list(effect.aliases) for effect in verdict.effects],
         "closed": verdict.closed,
         "ratio": verdict.held_out_ratio,

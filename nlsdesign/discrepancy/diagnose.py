@@ -362,6 +362,7 @@ def _evidence(step: Step, standing: Standing) -> EffectEvidence:
         standing.exclusion if deciding else math.nan,
         worst,
         0.5 * step.gains[worst] if worst else math.nan,
+        next_leaves=math.exp(step.distance),
     )
 
 

@@ -11,6 +11,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.discrepancy.selection.revision import Revision
 from nlsdesign.discrepancy.selection.search import _Search
 from nlsdesign.discrepancy.selection.trials import Step, Trials
 
@@ -30,7 +31,7 @@ def test_pairs_are_tried_where_no_effect_was_named_or_much_is_left_beside_it(
     monkeypatch.setattr(Trials, "tried_on", lambda *given, **flags: [])
     monkeypatch.setattr(f"{_Search.__module__}.account", lambda *given: ())
     monkeypatch.setattr(_Search, "_is_far_from_closed", lambda *given: far)
-    monkeypatch.setattr(_Search, "_enriched", lambda self, start, steps: steps)
+    monkeypatch.setattr(Revision, "enriched", lambda self, steps: steps)
     monkeypatch.setattr(Trials, "step", lambda *given: next(named, None))
     monkeypatch.setattr(_Search, "_pair", pair)
     steps = _Search(Trials(cast(Comparison, None), (), Criteria(), lambda text: None))._forward(start)

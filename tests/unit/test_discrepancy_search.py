@@ -390,3 +390,15 @@ def test_an_effect_whose_numbers_fail_on_all_samples_makes_room_for_the_next() -
     found = outcome(Failing({(): (1e5,), ("a",): (10.0,), ("b",): (2e3,)}), effect("a"), effect("b"))
     assert names(found) == ["b"]
     assert "a at motor: on all samples a.0 is at a bound of the search" in map(str, found.skipped)
+
+
+def test_a_simpler_form_takes_its_place_once_the_other_effects_are_named() -> None:
+    """Alone the richer form stands for a part of b as well; beside b the simpler one leaves as little."""
+    left = {
+        (): (1e5,), ("plain",): (3e4,), ("rich",): (1e4,), ("b",): (9e4,), ("b", "plain"): (11.0,),
+        ("b", "rich"): (10.0,),
+    }  # fmt: skip
+    effects = effect("plain"), effect("rich", 3, simpler=("plain",)), effect("b")
+    assert names(outcome(Table(left), *effects)) == ["plain", "b"]
+    left["b", "plain"] = (9e3,)
+    assert names(outcome(Table(left), *effects)) == ["rich", "b"], "much more is left"

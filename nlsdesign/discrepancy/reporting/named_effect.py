@@ -31,6 +31,8 @@ class EffectEvidence:
     over_simpler
         The simpler forms of the effect: identifier, predictive log density that is lost with that form in its
         place, and its standard error.
+    next_leaves
+        How many times as much of the excess the best other name leaves, with the noise margin on both sides.
     """
 
     removal_cost: float
@@ -40,6 +42,7 @@ class EffectEvidence:
     worst_record: str = ""
     worst_change: float = math.nan
     over_simpler: tuple[tuple[str, float, float], ...] = ()
+    next_leaves: float = math.nan
 
     def words(self) -> str:
         """Return the evidence in sentences."""
@@ -53,6 +56,8 @@ class EffectEvidence:
             change = f"{abs(self.worst_change):.3g}"
             text += f" The record that gains least is '{self.worst_record}': "
             text += f"it gains {change}." if self.worst_change >= 0.0 else f"it loses {change}."
+        if math.isfinite(self.next_leaves):
+            text += f" The best other name leaves {self.next_leaves:.3g} times as much."
         return " ".join([text, *(self._over(*each) for each in self.over_simpler)])
 
     def _over(self, simpler: str, cost: float, error: float) -> str:

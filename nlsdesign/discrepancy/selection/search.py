@@ -8,22 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ...errors import ConvergenceError
-from ..effects.candidate import Candidate, EffectFunction
+from ..effects.candidate import EffectFunction
 from .comparison import Comparison
 from .criteria import (
     Criteria,
     is_complete,
     is_far_from_closed,
-    is_superfluous,
     lacking,
-    objections_of_numbers,
     stands_out,
     unexplained,
 )
 from .hypothesis import Hypothesis
 from .measures import explained, total_excess
-from .standing import standing_of
+from .revision import Revision, objections_of_all, same_again
 from .trials import Skipped, Step, Trials, Tried, account, rival_of
 
 _MOST_EFFECTS_IN_FREE_FLIGHT = 2
@@ -92,7 +89,8 @@ class _Search:
 
     def outcome(self, base: Hypothesis) -> Outcome:
         start = self.trials.comparison.coarsely(base)
-        steps = self._backward(start, self._forward(start))
+        revision = Revision(self.trials, start)
+        steps = revision.simplified(revision.backward(self._forward(start)))
         steps = self._explaining(start, steps)
         last = self._fitted_to_all(start, steps)
         skipped = tuple(dict.fromkeys(self.trials.skipped))
@@ -106,7 +104,7 @@ class _Search:
         while steps:
             self.trials.progress("fitting what was named to all samples")
             last = self.trials.comparison.polished(steps[-1].chosen)
-            words = self._objections_of_numbers(last)
+            words = objections_of_all(self.trials.criteria, last)
             if not any(words):
                 return last
             for step, why in zip(steps, words, strict=True):
@@ -114,7 +112,7 @@ class _Search:
                 added = step.chosen.newest
                 self.trials.skipped += [Skipped(added.effect, added.location, (), reason)] if why else []
             kept = [step for step, why in zip(steps, words, strict=True) if not why]
-            steps[:] = self._rebuilt(start, kept)
+            steps[:] = Revision(self.trials, start).rebuilt(kept)
         return None
 
     def _explaining(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
@@ -139,7 +137,7 @@ class _Search:
             if step not in kept
         }
         self.tried = tuple(_with_objection(each, why) for each in self.tried)
-        return self._rebuilt(start, kept)
+        return Revision(self.trials, start).rebuilt(kept)
 
     def _forward(self, start: Hypothesis) -> list[Step]:
         """Return the effects that may be named, one after the other."""
@@ -166,7 +164,7 @@ class _Search:
             if not further:
                 break
             # A richer form of what is named comes before one more name.
-            steps = self._enriched(start, steps + further)
+            steps = Revision(self.trials, start).enriched(steps + further)
             present = steps[-1].chosen
         return steps
 
@@ -181,55 +179,6 @@ class _Search:
     def _most_effects(self, present: Hypothesis) -> int:
         most = int(self.trials.criteria.most_effects)
         return min(most, _MOST_EFFECTS_IN_FREE_FLIGHT) if present.has_free_flight else most
-
-    def _backward(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
-        """Drop the effects that later ones have made superfluous, the first added first."""
-        place = 0
-        while len(steps) > 1 and place < len(steps) - 1:
-            self.trials.progress(f"trying without {steps[place].effect}")
-            fewer = self._rebuilt(start, [s for k, s in enumerate(steps) if k != place])
-            if fewer and is_superfluous(
-                self.trials.criteria,
-                self.trials.excesses_of(fewer[-1].chosen),
-                self.trials.excesses_of(steps[-1].chosen),
-            ):
-                steps = self._enriched(start, fewer)
-            else:
-                place += 1
-        return steps
-
-    def _enriched(self, start: Hypothesis, steps: list[Step]) -> list[Step]:
-        """Put a richer form of an effect in its place where it leaves much less.
-
-        A form of the same effect with more numbers is one too. Beside effects that were not named yet the
-        simpler form may have done.
-        """
-        if len(steps) < 2 or is_complete(self.trials.excesses_of(steps[-1].chosen)):
-            return steps
-        for place, step in enumerate(steps):
-            before = steps[place - 1].chosen if place else start
-            for candidate in self.trials.candidates(before):
-                if _is_richer(candidate, steps[place].chosen.newest):
-                    self.trials.progress(f"trying {candidate.effect} in place of {step.effect}")
-                    richer = self._rebuilt(start, steps, {place: candidate})
-                    if (
-                        richer
-                        and not any(self._objections_of_numbers(richer[-1].chosen))
-                        and not is_superfluous(
-                            self.trials.criteria,
-                            self.trials.excesses_of(steps[-1].chosen),
-                            self.trials.excesses_of(richer[-1].chosen),
-                        )
-                    ):
-                        steps = richer
-        return steps
-
-    def _objections_of_numbers(self, last: Hypothesis) -> list[list[str]]:
-        """Return what the numbers of each effect have against it, all effects together."""
-        return [
-            objections_of_numbers(self.trials.criteria, standing_of(each.unknowns, last.fits.values()))
-            for each in last.added
-        ]
 
     def _lacking(self, start: Hypothesis, present: Hypothesis) -> list[str]:
         """Return the blocks in which all samples ask for a further effect."""
@@ -248,7 +197,7 @@ class _Search:
             (one, again)
             for place, one in enumerate(best[:_LEADERS])
             for other in best[place + 1 :]
-            if (again := self._again(one, other.newest)) is not None
+            if (again := same_again(self.trials, one, other.newest)) is not None
         ]
         before = self.trials.excesses_of(present)
         fitted = {h: self.trials.excesses_of(h) for h in self.trials.fits(tasks)}
@@ -264,48 +213,6 @@ class _Search:
         for each in sorted(tried, key=lambda h: total_excess(self.trials.excesses_of(h))):
             best.setdefault(each.newest.effect, each)
         return list(best.values())
-
-    def _again(self, hypothesis: Hypothesis, wanted: Candidate) -> Candidate | None:
-        """Return the same form of an effect at the same kind of place of another assembly."""
-        same = [
-            c
-            for c in self.trials.candidates(hypothesis)
-            if c.effect == wanted.effect and _kinds(c) == _kinds(wanted)
-        ]
-        ends = [c for c in same if c.location.split(".")[-1] == wanted.location.split(".")[-1]]
-        return next(iter(ends or same), None)
-
-    def _rebuilt(
-        self, start: Hypothesis, steps: Sequence[Step], changed: Mapping[int, Candidate] | None = None
-    ) -> list[Step]:
-        """Return the steps anew, some perhaps changed; nothing if one of them no longer fits."""
-        present, rebuilt = start, list[Step]()
-        for place, step in enumerate(steps):
-            candidate = self._again(present, (changed or {}).get(place, step.chosen.newest))
-            if candidate is None:
-                return []
-            try:
-                later = self.trials.comparison.with_effect(present, candidate)
-            except ConvergenceError:
-                return []  # who asks keeps its steps, or names nothing
-            if later is None:
-                return []
-            rival = rival_of(later, self.trials.excesses_of(later))
-            made = self.trials.made(self.trials.excesses_of(present), rival, step.block)
-            rebuilt.append(replace(made, distance=step.distance, equals=step.equals))
-            present = later
-        return rebuilt
-
-
-def _kinds(candidate: Candidate) -> list[str]:
-    """Return what the numbers of a candidate are, wherever it stands: forms of one effect differ in that."""
-    return [unknown.name.rpartition(".")[2] for unknown in candidate.unknowns]
-
-
-def _is_richer(candidate: Candidate, named: Candidate) -> bool:
-    """Tell whether a candidate is a richer form of what is named, at its place."""
-    more = candidate.effect == named.effect and len(candidate.unknowns) > len(named.unknowns)
-    return (more or named.effect in candidate.simpler) and candidate.location == named.location
 
 
 def _with_objection(tried: Tried, why: Mapping[tuple[str, str], str]) -> Tried:
