@@ -179,15 +179,21 @@ def test_what_explains_most_of_a_block_is_named_and_what_is_left_is_said() -> No
     assert not found.complete
 
 
-def test_what_leaves_most_of_its_block_unexplained_stands_for_something_else() -> None:
-    found = outcome(Table({(): (1e5,), ("a",): (4e4,)}), effect("a"))
-    assert names(found) == []
+def test_what_leaves_most_of_its_block_unexplained_is_named_only_if_it_stands_out() -> None:
+    alone = {(): (1e5,), ("a",): (4e4,), ("c",): (5.6e4,)}
+    found = outcome(Table(alone), effect("a"), effect("c"))
+    assert names(found) == [], "another name leaves 1.4 times as much"
     assert not found.complete
-    ((said,),) = (each.objections for each in found.tried)
+    said = next(each.objections[0] for each in found.tried if each.candidate.effect == "a")
     assert "explains 60 % of the excess, less than 75 %" in said
-    beside = {(): (1e5, 9e4), ("a",): (4e4, 9e4), ("b",): (1e5, 10.0), ("a", "b"): (4e4, 10.0)}
-    assert outcome(Table(beside), effect("a")).steps == ()
-    found = outcome(Table(beside), effect("a"), effect("b"))
+    found = outcome(Table({**alone, ("c",): (7e4,)}), effect("a"), effect("c"))
+    assert names(found) == ["a"], "the next best name leaves three quarters more"
+    assert not found.complete
+    beside = {
+        (): (1e5, 9e4), ("a",): (4e4, 9e4), ("b",): (1e5, 10.0), ("c",): (5.6e4, 9e4),
+        ("a", "b"): (4e4, 10.0), ("b", "c"): (5.6e4, 10.0),
+    }  # fmt: skip
+    found = outcome(Table(beside), effect("a"), effect("b"), effect("c"))
     assert names(found) == ["b"], "the other block is explained and has its name"
     assert not found.complete
 
@@ -319,7 +325,7 @@ def test_a_richer_form_whose_numbers_do_not_stand_does_not_take_its_place(
     def standing(unknowns: Sequence[Unknown], fits: Any) -> Standing:
         return weak if len(unknowns) == 4 else Standing()
 
-    monkeypatch.setattr("nlsdesign.discrepancy.selection.search.standing_of", standing)
+    monkeypatch.setattr("nlsdesign.discrepancy.selection.revision.standing_of", standing)
     found = outcome(TableOfForms(left), forms("branch", one=2, two=4), effect("b"))
     assert [len(c.unknowns) for c in found.last.added] == [2, 1]
 
@@ -348,7 +354,7 @@ def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
     def standing(unknowns: Sequence[Unknown], fits: Any) -> Standing:
         return weak if unknowns[0].name == "a.0" else Standing()
 
-    monkeypatch.setattr("nlsdesign.discrepancy.selection.search.standing_of", standing)
+    monkeypatch.setattr("nlsdesign.discrepancy.selection.revision.standing_of", standing)
     found = outcome(table, effect("a"), effect("b"))
     assert names(found) == ["b"]
     assert [s.reason for s in found.skipped] == [
@@ -359,9 +365,10 @@ def test_an_effect_whose_numbers_fail_on_all_samples_is_dropped_and_said(
 def test_an_effect_belongs_to_the_block_of_which_it_explains_most() -> None:
     """The spring stays unexplained, so its effect is dropped; what explains the motor is not."""
     left = {
-        (): (1e5, 1e6), ("a",): (1e5, 4e5), ("both",): (10.0, 9e5), ("a", "both"): (10.0, 4e5),
+        (): (1e5, 1e6), ("a",): (1e5, 4e5), ("both",): (10.0, 9e5), ("c",): (1e5, 5.6e5),
+        ("a", "both"): (10.0, 4e5), ("both", "c"): (10.0, 5.6e5),
     }  # fmt: skip
-    found = outcome(Table(left), effect("a"), effect("both"))
+    found = outcome(Table(left), effect("a"), effect("both"), effect("c"))
     assert names(found) == ["both"]
     assert found.steps[0].block == "motor"
 
