@@ -39,7 +39,13 @@ from .mechanics.bodies import Body, Driven, Fixed, GearedMotor, Inertia, Mass
 from .mechanics.carriage import LinearDrive
 from .mechanics.controllers import Controller, Integral, PositionLoop, RateFeedback, SpeedLoop
 from .mechanics.drive_chain import DriveDelay, DriveLag, DrivePart, DriveSaturation
-from .mechanics.drive_faults import CommandCompression, CommandSaturation, TorqueConstantDrift, WindingHeat
+from .mechanics.drive_faults import (
+    CommandCompression,
+    CommandSaturation,
+    GradualSaturation,
+    TorqueConstantDrift,
+    WindingHeat,
+)
 from .mechanics.friction import (
     AsymmetricFriction,
     CoulombFriction,
@@ -111,6 +117,7 @@ __all__ = [
     "ForceSensor",
     "Gear",
     "GearedMotor",
+    "GradualSaturation",
     "GravityLoad",
     "Guide",
     "HardeningSpring",

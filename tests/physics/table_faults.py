@@ -27,6 +27,12 @@ ROWS: tuple[Row, ...] = (
         _HERE + "what_falls_with_the_command_follows_its_curve",
     ),
     Row(
+        c.GradualSaturation,
+        "Newton",
+        ("flat model", "integral of the gain 1/(1 + (u/u_s)²)"),
+        _HERE + "what_falls_with_the_command_follows_its_curve",
+    ),
+    Row(
         c.CommandCompression,
         "Newton",
         ("flat model", "resistances in series by hand"),

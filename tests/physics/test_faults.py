@@ -23,6 +23,7 @@ from nlsdesign.components import (
     Eccentricity,
     Element,
     GearedMotor,
+    GradualSaturation,
     Inertia,
     LoadNonlinearity,
     SpotFriction,
@@ -176,6 +177,11 @@ def test_what_falls_with_the_command_follows_its_curve(current: float) -> None:
     iron = flatten(driven(part=CommandSaturation(saturation=4.0)))
     found = iron.evaluate([0.0, 0.0], [current])["motor.drive_torque"]
     assert found == pytest.approx(TORQUE_PER_AMPERE * 4.0 * math.sin(math.atan(current / 4.0)), abs=1e-12)
+    gradual = flatten(driven(part=GradualSaturation(saturation=4.0)))
+    found = gradual.evaluate([0.0, 0.0], [current])["motor.drive_torque"]
+    # The gain falls as 1/(1 + (u/u_s)²); the effort is its integral.
+    sum_of_gains = quad(lambda u: 1.0 / (1.0 + (u / 4.0) ** 2), 0.0, current, epsabs=1e-13)[0]
+    assert found == pytest.approx(TORQUE_PER_AMPERE * sum_of_gains, abs=1e-12)
     # A source whose inner resistance is |u|/u_h of the load: of u that share is left.
     weak = flatten(driven(part=CommandCompression(halving=4.0)))
     found = weak.evaluate([0.0, 0.0], [current])["motor.drive_torque"]

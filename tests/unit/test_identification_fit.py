@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -33,6 +35,7 @@ from nlsdesign.identification.equation_error.block_response import DrivenBlock
 from nlsdesign.identification.equation_error.evidence import Bench
 from nlsdesign.identification.equation_error.stepping import exact_step, rosenbrock_step, stages_of
 from nlsdesign.identification.estimation.least_squares import (
+    Fit,
     Parameter,
     declared_parameter,
     fit,
@@ -306,3 +309,13 @@ def test_least_squares_follows_a_curved_valley_and_steps_around_a_hole() -> None
 
     found = minimise(rows, np.array([-1.2, 1.0]), (np.full(2, -5.0), np.full(2, 5.0)), evaluations=200)
     np.testing.assert_allclose(found.x, 1.0, atol=0.02)
+
+
+def test_a_direction_that_many_numbers_share_evenly_is_told_too() -> None:
+    """Of sixteen numbers each has a share of 0.25, which is less than what is mentioned otherwise."""
+    parameters = tuple(Parameter(f"p{k}", "1", 1.0, 1.0, math.inf, 0.1, 10.0, "log") for k in range(16))
+    even = np.full(16, 0.25)
+    known = Fit(parameters, {p.name: 1.0 for p in parameters}, np.outer(even, even), 1.0, {}, converged=True)
+    (words,) = known.unidentified()
+    assert words.startswith("p")
+    assert words.endswith("known to 100 % only")

@@ -65,6 +65,30 @@ class CommandSaturation(DriveFault):
 
 
 @dataclass(frozen=True, kw_only=True)
+class GradualSaturation(DriveFault):
+    """An effort that saturates gradually: u' = u_s·arctan(u/u_s).
+
+    At u_s the effort is π/4 = 79 % of the ideal one, and it approaches its limit π/2·u_s more slowly than
+    :class:`CommandSaturation`; the gain is that of small commands. C∞. Valid for slow changes. Source:
+    Hanselman 2003 (saturation; the arctangent is a common curve of magnetisation).
+
+    Examples
+    --------
+    >>> GradualSaturation(saturation=9.0, domain=VOLTAGE).title()
+    'GradualSaturation(saturation = 9 V)'
+    """
+
+    saturation: Quantity = parameter(
+        "{effort}", "command u_s at which 79 % of the ideal effort is left", minimum=1e-9, maximum=1e9
+    )
+
+    def act(self, scope: Scope, command: DriveCommand) -> Expression:
+        """Return u_s·arctan(u/u_s)."""
+        limit = scope.parameter("saturation")
+        return limit * ca.atan(command.value / limit)
+
+
+@dataclass(frozen=True, kw_only=True)
 class CommandCompression(DriveFault):
     """A gain that falls with the command from the first: u' = u/(1 + |u|/u_h).
 

@@ -12,6 +12,7 @@ from ...components import (
     DriveDelay,
     DrivePart,
     DriveSaturation,
+    GradualSaturation,
     TorqueConstantDrift,
     WindingHeat,
 )
@@ -111,6 +112,10 @@ def _saturation(assembly: Assembly, name: str) -> Iterator[Edit]:
     yield from _falling("saturation", field, _iron, _FALLS_AT)(assembly, name)
 
 
+def _gradual(kind: Domain) -> DrivePart:
+    return GradualSaturation(saturation=number(100.0, kind.effort_unit), domain=kind)
+
+
 def _heat(assembly: Assembly, name: str) -> Iterator[Edit]:
     commanded = _commanded(assembly, name)
     if commanded:
@@ -154,10 +159,16 @@ torque_constant_saturation = Effect(
     170,
     (
         Form(
-            _without(DriveSaturation, CommandSaturation),
+            _without(DriveSaturation, CommandSaturation, GradualSaturation),
             _saturation,
             "effort that falls short the more, the larger the command, with either sign",
             "Hanselman 2003 (saturation, Froelich's curve of magnetisation)",
+        ),
+        Form(
+            _without(DriveSaturation, CommandSaturation, GradualSaturation),
+            _falling("saturation", "saturation", _gradual, _FALLS_AT),
+            "effort that falls short the more, the larger the command, and gradually",
+            "Hanselman 2003 (saturation, arctangent as curve of magnetisation)",
         ),
     ),
 )

@@ -28,9 +28,9 @@ class Calibration:
         a, b and c of the module's formula.
     """
 
-    offset: float = 0.3
-    distance: float = 0.8
-    complete: float = 1.0
+    offset: float = 1.0
+    distance: float = 1.05
+    complete: float = 1.25
 
     def probability(self, distance: float, *, complete: bool) -> float:
         """Return the probability that a name is right.

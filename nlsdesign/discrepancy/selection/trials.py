@@ -260,8 +260,9 @@ class Trials:
         """
         before, left = self.excesses_of(present), {h: self.excesses_of(h) for h in fresh}
         if not before[block].open:
-            best = sorted(fresh, key=lambda h: self.excesses_of(h)[block].chi2)[:_LOOKED_AT_TWICE]
-            before, left = self.on_all(present), {h: self.on_all(h) for h in best}
+            best = sorted(fresh, key=lambda h: total_excess(left[h]))[:_LOOKED_AT_TWICE]
+            # In the order of the catalogue, which decides among what cannot be told apart.
+            before, left = self.on_all(present), {h: self.on_all(h) for h in fresh if h in best}
         return self.sound(present, before, left, block)
 
     def sound(

@@ -33,6 +33,8 @@ _HUBER = 3.0
 within."""
 _WEAK = 0.3
 """A direction known no better than this (relative) is reported as not identified."""
+_PLAIN_SHARE = 0.3
+"""Share of a direction from which a number is mentioned in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,9 @@ class Fit:
             if deviation < _WEAK:
                 continue
             order = np.argsort(-np.abs(axis))
-            named = [(self.parameters[i].name, axis[i]) for i in order if abs(axis[i]) > 0.3]
+            # Of many numbers that share a direction evenly the largest are told.
+            least = min(_PLAIN_SHARE, 0.9 * abs(axis[order[0]]))
+            named = [(self.parameters[i].name, axis[i]) for i in order if abs(axis[i]) > least]
             first = np.sign(named[0][1])
             words = [f"{n} {'up' if a * first > 0 else 'down'}" for n, a in named]
             known = f"known to {100 * deviation:.0f} % only" if deviation < 3.0 else "not known at all"
