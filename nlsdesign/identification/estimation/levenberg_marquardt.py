@@ -70,27 +70,43 @@ def minimise(
     cost = 0.5 * float(residual @ residual)
     if not x.size:
         return Minimum(x, cost, True)  # nothing is free: what is known is all there is
+    found = _quadratic(residual, slope)
+    if found is None:
+        raise _not_finite()
+    gradient, curvature = found
     for _ in range(evaluations):
-        gradient, curvature = slope.T @ residual, slope.T @ slope
         step = _step(gradient, curvature, damping, (x, low, high))
         gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
         if gain < max(ENOUGH, share * cost, least) * (1.0 if damping <= 1.0 else 1e-2):
             return Minimum(x, cost, True)
         try:
-            new_residual, new_slope = rows(x + step)
+            residual, slope = rows(x + step)
         except ConvergenceError:
             damping *= 10.0
             continue
-        new = 0.5 * float(new_residual @ new_residual)
-        if np.isfinite(new) and new < cost:
+        new = 0.5 * float(residual @ residual)
+        found = _quadratic(residual, slope) if np.isfinite(new) and new < cost else None
+        if found is not None:
             good = (cost - new) / gain
-            x, residual, slope, cost = x + step, new_residual, new_slope, new
+            x, (gradient, curvature), cost = x + step, found, new
             damping = max(damping * (0.1 if good > 0.5 else 1.0 if good > 0.1 else 4.0), _LEAST_DAMPING)
         else:
             damping *= 10.0
             if damping > _MOST_DAMPING:
                 return Minimum(x, cost, True)
     return Minimum(x, cost, False)
+
+
+def _quadratic(residual: Array, slope: Array) -> tuple[Array, Array] | None:
+    """Return gradient and curvature of half the sum of squares; ``None`` where they overflow."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        gradient, curvature = slope.T @ residual, slope.T @ slope
+    finite = np.all(np.isfinite(gradient)) and np.all(np.isfinite(curvature))
+    return (gradient, curvature) if finite else None
+
+
+def _not_finite() -> ConvergenceError:
+    return ConvergenceError("fit", "has slopes that are not finite", next_step="narrow the bounds")
 
 
 def _step(gradient: Array, curvature: Array, damping: float, place: tuple[Array, Array, Array]) -> Array:
@@ -114,4 +130,4 @@ def _root(matrix: Array, largest: float) -> Array:
             )
         except np.linalg.LinAlgError:
             lift *= 100.0
-    raise ConvergenceError("fit", "has slopes that are not finite", next_step="narrow the bounds")
+    raise _not_finite()
