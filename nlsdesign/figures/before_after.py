@@ -108,7 +108,7 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
         for bar, top, height in zip(drawn, tops, heights, strict=True):
             axes.annotate(
                 significant(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
-                fontsize=8, ha="center", textcoords="offset points",
+                fontsize=8, ha="center", va="bottom", textcoords="offset points",
             )  # fmt: skip
     floors = [e.noise_floor for e in ordered]
     axes.hlines(

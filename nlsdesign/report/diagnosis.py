@@ -200,7 +200,7 @@ def _numbers(verdict: Verdict) -> list[Section]:
             f"± {100 * n.spread:.3g} %",
             with_error(n.fitted, n.standard_error),
             typeset_unit(n.unit),
-            f"{n.strain:+.2f}".replace("-", "−"),
+            f"{n.strain:+.2f}".replace("-0.00", "0.00").replace("-", "−"),
         )
         for n in numbers
     )

@@ -227,7 +227,9 @@ def test_why_the_records_are_suspect_stands_in_the_card(tmp_path: Any) -> None:
     reason = "slow.csv: column 'force_N', rows 5 to 9: rests at 3 for 5 samples: cut the record there"
     said = verdict("data_suspect", where=(strained, reason), gaps=(same,), course=course)
     assert said.headline() == "The records are suspect"
-    assert "rests at 3 for 5 samples" in said.words()
+    assert "slow.csv: column 'force_N', rows 5 to 9: rests at 3 for 5 samples" in said.words(), (
+        "as it is named"
+    )
     assert "refitted 2.3" not in said.words()
     assert str(said).lower().count("rests at 3") == 1, "once"
     page = report.write_report(tmp_path / "r.html", *report.verdict_sections(said), title="t").read_text()

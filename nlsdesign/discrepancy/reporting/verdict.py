@@ -307,7 +307,7 @@ class Verdict:
         sentences = [] if self.verdict == "named" else [EXPLANATIONS[self.verdict]]
         if let_go(self):
             sentences = [_LET_GO[1]]
-        sentences += [f"{capitalised(reason.rstrip('.'))}." for reason in suspicions(self)]
+        sentences += [_sentence(reason) for reason in suspicions(self)]
         if self.verdict == "none" and self.unidentified:
             sentences.append(
                 f"They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
@@ -412,6 +412,12 @@ class Verdict:
                 *self.next_steps,
             ]
         )
+
+
+def _sentence(text: str) -> str:
+    """Return a reason as a sentence; the name of a file at its beginning stays as it is."""
+    begins = text.split(maxsplit=1)[0].isalpha()
+    return f"{(capitalised(text) if begins else text).rstrip('.')}."
 
 
 def let_go(verdict: Verdict) -> bool:
