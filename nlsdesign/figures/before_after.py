@@ -220,8 +220,10 @@ def _interrupted(record: HeldOut) -> HeldOut:
     if not len(gaps):
         return record
     time = np.insert(record.time, gaps, 0.5 * (record.time[gaps - 1] + record.time[gaps]))
-    curves = {n: np.insert(getattr(record, n), gaps, np.nan) for n in ("measured", "before", "after")}
-    return replace(record, time=time, **curves)
+    measured, before, after = (
+        np.insert(values, gaps, np.nan) for values in (record.measured, record.before, record.after)
+    )
+    return replace(record, time=time, measured=measured, before=before, after=after)
 
 
 @styled

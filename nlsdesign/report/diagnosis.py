@@ -114,8 +114,8 @@ def _error_figures(verdict: Verdict) -> list[Section]:
         ),
         FigureSection(
             heading, held_out_series(series),
-            caption=f"Above: {course.quantity}, as measured and as the {_model(verdict)} has it. "
-            "Below: the difference.",
+            caption=f"Above: {course.quantity}, as measured and {_model(verdict)}. Below: the "
+            "difference. Where a line is interrupted, samples do not count.",
             means="All curves have passed the filter of the block, so the errors in the legend are those "
             "of this record in the bars and tables.",
         ),
@@ -129,9 +129,9 @@ def _when(verdict: Verdict) -> str:
 
 
 def _model(verdict: Verdict) -> str:
-    return (
-        "model before and after" if verdict.gap().changed else "refitted model, to which nothing was added,"
-    )
+    if verdict.gap().changed:
+        return "as the model has it before and after"
+    return "as the refitted model has it, to which nothing was added"
 
 
 def _candidates(verdict: Verdict) -> list[Section]:

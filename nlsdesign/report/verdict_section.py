@@ -15,7 +15,7 @@ VERDICTS = {
     "named": "effect named",
     "unknown": "an effect without a name",
     "undecidable": "the records cannot tell",
-    "data_suspect": "the data are suspect",
+    "data_suspect": "data or deck are suspect",
 }
 
 _WIDTH = 100.0

@@ -82,3 +82,15 @@ def test_rows_are_the_same_with_and_without_a_clock_of_the_mapping(folder: Path,
     plain = load_records(folder, model).records[0].trace["cell.reading"]
     (folder / "records.toml").write_text('[time]\ncolumn = "t_s"\n', encoding="utf8")
     np.testing.assert_array_equal(load_records(folder, model).records[0].trace["cell.reading"], plain)
+
+
+def test_counts_coarser_than_declared_are_told(folder: Path, model: FlatModel) -> None:
+    """The noise floor rests on the declared count; with a finer one, clean records look as if they lacked."""
+    assert not any("counts" in str(r) for r in load_records(folder, model).remarks)
+    for name in "abc":
+        rows = table()
+        rows[:, 1] = np.round(rows[:, 1])
+        write(folder, name, rows, HEADS)
+    told = [str(r) for r in load_records(folder, model).remarks if "counts" in str(r)]
+    words = "moves in counts of 1 deg, 0.0573 deg are declared: correct the quantum of the sensor"
+    assert told == [f"column 'theta_deg': {words}"]

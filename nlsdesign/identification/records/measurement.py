@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import MeasurementError, nearest, unknown_name
 from ...model import FlatModel
+from ...quantity import parse_unit
 from ...simulation import Trace
 from ..statistics.residuals import noise_of, quantum_of
 from .clocks import Resolution
@@ -27,6 +28,8 @@ from .table_files import RecordTable, read_table, table_files, unread_tables
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_COARSER = 3.0
+"""Declared counts beyond which the smallest step in all records is no matter of chance."""
 Role = Literal["fit", "selection", "held_out"]
 
 
@@ -230,6 +233,7 @@ def load_records(
     remarks = [remark for one in whole for remark in one.remarks]
     remarks += [_left_out(file) for file in tables if file not in runs]
     remarks += [_not_read(file) for file in unread_tables(folder)]
+    remarks += _other_counts(records, chosen.columns)
     held = tuple(hold_out) or chosen.held_out
     if chosen.held_out_after is not None and not hold_out:
         parts = tuple(part for r in records for part in cut_in_time(r, chosen.held_out_after))
@@ -308,6 +312,19 @@ def _left_out(file: Path) -> Finding:
 
 def _not_read(file: Path) -> Finding:
     return Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
+
+
+def _other_counts(records: Sequence[Record], columns: Sequence[Column]) -> list[Finding]:
+    """Tell of sensors whose counts are plainly coarser than declared: the noise floor would be too low."""
+    remarks = []
+    for column in columns:
+        count = min(r.resolution_of(column.signal).quantum for r in records)
+        if count > _COARSER * column.quantum > 0.0:
+            unit = parse_unit(column.unit)
+            seen, declared = (f"{each / unit.factor:.3g} {column.unit}" for each in (count, column.quantum))
+            text = f"moves in counts of {seen}, {declared} are declared: correct the quantum of the sensor"
+            remarks.append(Finding(f"column '{column.name}'", text))
+    return remarks
 
 
 def _by_default(records: Sequence[Record]) -> Finding:
