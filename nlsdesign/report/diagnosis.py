@@ -89,8 +89,8 @@ def _blocks(verdict: Verdict) -> TableSection:
 
 def _findings(verdict: Verdict) -> list[Section]:
     """Return what was noticed besides the errors of the blocks and what the card says already."""
-    said = suspicions(verdict)
-    others = [text for text in verdict.findings if text not in said]
+    reasons = suspicions(verdict)
+    others = [text for text in verdict.findings if text not in reasons]
     return _list("Findings", "finding", others, "What was noticed besides the errors of the blocks.")
 
 

@@ -22,6 +22,7 @@ from .circumstances import DiagnosisRun, settings_of
 from .fitted_numbers import fitted_numbers
 from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
+from .suspicion import CONTRADICTION, LET_GO, as_sentence
 
 Array = NDArray[np.float64]
 
@@ -38,13 +39,6 @@ EXPLANATIONS: Mapping[str, str] = {
     "undecidable": "Several effects explain these records equally well; the proposed record would tell.",
     "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
 }
-_LET_GO = (
-    "Deck and records contradict each other",
-    "With declared numbers let go the model explains the records better, so no effect is named; look at "
-    "these numbers first, and whether the records are of this rig.",
-)
-"""Headline and explanation where other numbers explain the records: then these need not be suspect."""
-_SUSPECT = "deck and records contradict each other, so nothing is named"
 _NOT_NAMED = "too little, or not surely enough, to be named under the criteria of this diagnosis"
 _HELPS = 0.005
 """Share of the excess below which an effect helps by less than half a per cent and is not listed."""
@@ -300,14 +294,14 @@ class Verdict:
         if self.verdict == "named":
             effects = " and ".join(e.headline(self.actuator) for e in self.effects)
             return capitalised(effects)
-        return _LET_GO[0] if let_go(self) else HEADLINES[self.verdict]
+        return LET_GO[0] if let_go(self) else HEADLINES[self.verdict]
 
     def paragraphs(self) -> tuple[str, ...]:
         """Return the verdict in words: what was found, each effect, what is left."""
         sentences = [] if self.verdict == "named" else [EXPLANATIONS[self.verdict]]
         if let_go(self):
-            sentences = [_LET_GO[1]]
-        sentences += [_sentence(reason) for reason in suspicions(self)]
+            sentences = [LET_GO[1]]
+        sentences += [as_sentence(reason) for reason in suspicions(self)]
         if self.verdict == "none" and self.unidentified:
             sentences.append(
                 f"They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
@@ -414,12 +408,6 @@ class Verdict:
         )
 
 
-def _sentence(text: str) -> str:
-    """Return a reason as a sentence; the name of a file at its beginning stays as it is."""
-    begins = text.split(maxsplit=1)[0].isalpha()
-    return f"{(capitalised(text) if begins else text).rstrip('.')}."
-
-
 def let_go(verdict: Verdict) -> bool:
     """Return whether the records contradict declared numbers, and other numbers explain them.
 
@@ -463,7 +451,7 @@ def _why_not(verdict: Verdict, name: str, named: Collection[str]) -> str:
     if nested:
         return f"{title(nested[0])}, its simpler form, predicts as well"
     if verdict.verdict == "data_suspect":
-        return _SUSPECT
+        return CONTRADICTION
     return "what was named accounts for it" if named and verdict.complete else _NOT_NAMED
 
 

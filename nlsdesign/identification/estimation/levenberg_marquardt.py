@@ -17,6 +17,7 @@ Rows = Callable[[Array], tuple[Array, Array]]
 ENOUGH = 0.02
 """A predicted gain of half a sum of squares below this cannot matter to any decision on noisy data."""
 _LONGEST = 1.5
+_ENDLESS = "has slopes that are not finite"
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-9, 1e8
 
 
@@ -63,6 +64,11 @@ def minimise(
         Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
     least
         Ends too when the predicted gain is below this.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no response at the start, or its slopes are not finite.
     """
     low, high = box
     x, damping = start, _FIRST_DAMPING
@@ -70,10 +76,10 @@ def minimise(
     cost = 0.5 * float(residual @ residual)
     if not x.size:
         return Minimum(x, cost, True)  # nothing is free: what is known is all there is
-    found = _quadratic(residual, slope)
-    if found is None:
-        raise _not_finite()
-    gradient, curvature = found
+    derivatives = _quadratic(residual, slope)
+    if derivatives is None:
+        raise ConvergenceError("fit", _ENDLESS, next_step="narrow the bounds")
+    gradient, curvature = derivatives
     for _ in range(evaluations):
         step = _step(gradient, curvature, damping, (x, low, high))
         gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
@@ -85,10 +91,10 @@ def minimise(
             damping *= 10.0
             continue
         new = 0.5 * float(residual @ residual)
-        found = _quadratic(residual, slope) if np.isfinite(new) and new < cost else None
-        if found is not None:
+        derivatives = _quadratic(residual, slope) if np.isfinite(new) and new < cost else None
+        if derivatives is not None:
             good = (cost - new) / gain
-            x, (gradient, curvature), cost = x + step, found, new
+            x, (gradient, curvature), cost = x + step, derivatives, new
             damping = max(damping * (0.1 if good > 0.5 else 1.0 if good > 0.1 else 4.0), _LEAST_DAMPING)
         else:
             damping *= 10.0
@@ -103,10 +109,6 @@ def _quadratic(residual: Array, slope: Array) -> tuple[Array, Array] | None:
         gradient, curvature = slope.T @ residual, slope.T @ slope
     finite = np.all(np.isfinite(gradient)) and np.all(np.isfinite(curvature))
     return (gradient, curvature) if finite else None
-
-
-def _not_finite() -> ConvergenceError:
-    return ConvergenceError("fit", "has slopes that are not finite", next_step="narrow the bounds")
 
 
 def _step(gradient: Array, curvature: Array, damping: float, place: tuple[Array, Array, Array]) -> Array:
@@ -130,4 +132,4 @@ def _root(matrix: Array, largest: float) -> Array:
             )
         except np.linalg.LinAlgError:
             lift *= 100.0
-    raise _not_finite()
+    raise ConvergenceError("fit", _ENDLESS, next_step="narrow the bounds")
