@@ -43,6 +43,27 @@ def draft(target: Path) -> Iterator[Path]:
         Path(name).unlink(missing_ok=True)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, with those above it, where it does not exist.
+
+    Parameters
+    ----------
+    folder
+        Of results.
+
+    Raises
+    ------
+    ExportError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(
+            str(folder), f"cannot be made ({error.strerror or error})", next_step="name another folder"
+        ) from None
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file whole or not at all, with line ends as they stand.
 

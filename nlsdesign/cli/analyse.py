@@ -9,6 +9,7 @@ import click
 
 from ..errors import UnitError
 from ..quantity import typeset_unit
+from ..writing import make_folder
 from .output import (
     deck_option,
     json_option,
@@ -62,7 +63,7 @@ def analyse(
     model = with_outputs(model, list(dict.fromkeys([measured, torque])))
     views = [Observability(measured=(measured,)), Stability(torque=torque)]
     chart = over_angle(model, views, angles=np.linspace(0.0, last, count), angle=measured)
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     chart.write_csv(out / "over_angle.csv")
     names = [v.name for v in chart.columns]
     if as_json:

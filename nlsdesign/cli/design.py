@@ -53,6 +53,7 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
         write_drawings,
     )
     from ..progress import Steps
+    from ..writing import make_folder
 
     keep: list[Limit] = [
         MinimumRadiusOfCurvature(given["minimum_radius"]),
@@ -68,7 +69,7 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
             spring=given["spring"],
             keep=keep,
         )
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     write_deck(designed.actuator, out / "model.toml")
     files = [
         out / "model.toml",

@@ -63,6 +63,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..model import flatten
     from ..progress import Steps
     from ..report import verdict_sections, write_report
+    from ..writing import make_folder
 
     command = shlex.join(["nlsdesign", *sys.argv[1:]])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
@@ -74,7 +75,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
         verdict = find_what_is_missing(actuator, measured, progress=steps.note)
     run = DiagnosisRun(deck_name, str(records), date, command, version(), records_of_run(measured))
     verdict = replace(verdict, run=run)
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     write_verdict(verdict, out)
     if verdict.experiment is not None:
         write_command(verdict.experiment, out / "next_record.csv")

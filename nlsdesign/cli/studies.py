@@ -16,6 +16,7 @@ import click
 from ..errors import NlsError, unknown_name
 from ..locations import bundled, folder
 from ..quantity import with_unit
+from ..writing import make_folder
 from .output import json_option, show_json, show_table
 
 
@@ -187,7 +188,7 @@ def list_studies() -> None:
 def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
     """Run a study; exit status 1 if a number differs from its claim."""
     target = out if out is not None else Path("out") / Path(name).stem
-    target.mkdir(parents=True, exist_ok=True)
+    make_folder(target)
     results, expected = run_study(name, target, fast=fast), claims(Path(name).stem)
     wrong = not_as_claimed(results, expected)
     if as_json:

@@ -24,7 +24,7 @@ from ..identification.equation_error.evidence import Bench
 from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from ..model import flatten
-from ..writing import write_text
+from ..writing import make_folder, write_text
 from .blocks.tearing import blocks_of
 from .effects import ALL, Candidate, EffectFunction
 from .fitting.unpredictable import Key
@@ -403,7 +403,7 @@ def write_refit(refit: Refit, folder: Path) -> list[Path]:
 
 def _write(result: _Written, folder: Path, name: str) -> list[Path]:
     deck, file = folder / "model.toml", folder / name
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     write_deck(result.actuator, deck)
     write_text(file, json.dumps(result.to_dict(str(deck)), indent=2, ensure_ascii=False) + "\n")
     return [file, deck]

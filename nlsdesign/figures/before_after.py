@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,10 @@ BEFORE, AFTER = VERMILLION, BLUE
 """Colours of the declared and of the completed model, the same in every figure."""
 UNCHANGED = "refitted model"
 """What stands in place of ``before`` where nothing was added, so that there is no ``after``."""
+
+
+_GAP = 6.0
+"""Usual steps between samples beyond which a line is interrupted."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +93,23 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
     unit = typeset_unit(unit)
     positions = np.arange(len(ordered), dtype=float)
     changed = any(e.before != e.after for e in ordered)
+    near = 0.1 * max(max(e.before, e.after, e.noise_floor) for e in ordered)
     bars = (("before", -0.2, BEFORE.light, "///"), ("after", 0.2, AFTER.light, ""))
     for which, shift, tone, hatch in bars if changed else bars[:1]:
         heights = [getattr(e, which) for e in ordered]
         label = which if changed else UNCHANGED
         places = positions + (shift if changed else 0.0)
         drawn = axes.bar(places, heights, 0.38, color=tone, hatch=hatch, edgecolor=SURFACE.light, label=label)
-        axes.bar_label(drawn, [significant(h) for h in heights], padding=2, fontsize=8, color=INK.light)
+        # A label between its bar and the noise floor would be struck through by the line.
+        tops = [
+            e.noise_floor if h < e.noise_floor < h + near else h
+            for h, e in zip(heights, ordered, strict=True)
+        ]
+        for bar, top, height in zip(drawn, tops, heights, strict=True):
+            axes.annotate(
+                significant(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
+                fontsize=8, ha="center", va="bottom", textcoords="offset points",
+            )  # fmt: skip
     floors = [e.noise_floor for e in ordered]
     axes.hlines(
         floors, positions - 0.45, positions + 0.45, color=INK.light, linewidth=1.6, label="noise floor"
@@ -161,13 +175,13 @@ def held_out_series(record: HeldOut) -> Figure:
     record
         The record.
     """
-    unit = typeset_unit(record.unit)
+    unit, record = typeset_unit(record.unit), _interrupted(record)
     figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.3, 1])
     upper.plot(
         *thinned(record.time, record.measured), color=INK.light, linewidth=2.6, alpha=0.4, label="measured"
     )
     errors = []
-    changed = not np.array_equal(record.before, record.after)
+    changed = not np.array_equal(record.before, record.after, equal_nan=True)
     for label, values, tone, dash in (
         ("before" if changed else UNCHANGED, record.before, BEFORE.light, DASHES[1]),
         *([("after", record.after, AFTER.light, DASHES[0])] if changed else []),
@@ -197,6 +211,19 @@ def held_out_series(record: HeldOut) -> Figure:
     return described(
         figure, f"{record.title}: {record.quantity} over time. Remaining error: {', '.join(errors)}."
     )
+
+
+def _interrupted(record: HeldOut) -> HeldOut:
+    """Return the record with a gap where samples do not count: a line across would look like measured."""
+    steps = np.diff(record.time)
+    gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1 if len(steps) else np.array([], dtype=int)
+    if not len(gaps):
+        return record
+    time = np.insert(record.time, gaps, 0.5 * (record.time[gaps - 1] + record.time[gaps]))
+    measured, before, after = (
+        np.insert(values, gaps, np.nan) for values in (record.measured, record.before, record.after)
+    )
+    return replace(record, time=time, measured=measured, before=before, after=after)
 
 
 @styled

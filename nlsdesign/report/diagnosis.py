@@ -9,7 +9,7 @@ import numpy as np
 from ..discrepancy.effects.plain_names import kind_in_words, title
 from ..discrepancy.reporting.circumstances import settings_of
 from ..discrepancy.reporting.fitted_numbers import fitted_numbers
-from ..discrepancy.reporting.verdict import RecordGap, Verdict
+from ..discrepancy.reporting.verdict import RecordGap, Verdict, best_forms, let_go, suspicions
 from ..figures import (
     CandidateShare,
     HeldOut,
@@ -58,6 +58,7 @@ def verdict_sections(verdict: Verdict) -> list[Section]:
         "\n\n".join(verdict.paragraphs()),
         headline=verdict.headline(),
         gap=verdict.gap(),
+        after="with declared numbers let go" if let_go(verdict) else "with what was added",
         parts=tuple(parts),
     )
     text = (
@@ -87,10 +88,10 @@ def _blocks(verdict: Verdict) -> TableSection:
 
 
 def _findings(verdict: Verdict) -> list[Section]:
-    """Return what was noticed besides the errors of the blocks."""
-    return _list(
-        "Findings", "finding", verdict.findings, "What was noticed besides the errors of the blocks."
-    )
+    """Return what was noticed besides the errors of the blocks and what the card says already."""
+    reasons = suspicions(verdict)
+    others = [text for text in verdict.findings if text not in reasons]
+    return _list("Findings", "finding", others, "What was noticed besides the errors of the blocks.")
 
 
 def _error_figures(verdict: Verdict) -> list[Section]:
@@ -113,8 +114,8 @@ def _error_figures(verdict: Verdict) -> list[Section]:
         ),
         FigureSection(
             heading, held_out_series(series),
-            caption=f"Above: {course.quantity}, as measured and as the model has it {_when(verdict)}. "
-            "Below: the difference.",
+            caption=f"Above: {course.quantity}, as measured and {_model(verdict)}. Below: the "
+            "difference. Where a line is interrupted, samples do not count.",
             means="All curves have passed the filter of the block, so the errors in the legend are those "
             "of this record in the bars and tables.",
         ),
@@ -127,15 +128,24 @@ def _when(verdict: Verdict) -> str:
     )
 
 
+def _model(verdict: Verdict) -> str:
+    if verdict.gap().changed:
+        return "as the model has it before and after"
+    return "as the refitted model has it, to which nothing was added"
+
+
 def _candidates(verdict: Verdict) -> list[Section]:
     """Return what each effect explains alone, and why it was not named."""
     if not verdict.runners_up:
         return []
     chosen = {effect.name for effect in verdict.effects}
-    shares = [CandidateShare(title(name), share, name in chosen) for name, share, *_ in verdict.runners_up]
+    shares = [
+        CandidateShare(title(name), share, name in chosen)
+        for name, share, *_ in best_forms(verdict.runners_up)
+    ]
     figure = FigureSection(
         "Effects tried first", candidate_shares(shares),
-        caption="Share of the excess over the noise floor that each effect explains alone.",
+        caption="Share of the excess over the noise floor that each effect explains alone, in its best form.",
         means="A large share is not enough to be named: an effect must predict records that it was not "
         "fitted to, and better than its simpler form.",
     )  # fmt: skip
@@ -190,7 +200,7 @@ def _numbers(verdict: Verdict) -> list[Section]:
             f"± {100 * n.spread:.3g} %",
             with_error(n.fitted, n.standard_error),
             typeset_unit(n.unit),
-            f"{n.strain:+.2f}".replace("-", "−"),
+            f"{n.strain:+.2f}".replace("-0.00", "0.00").replace("-", "−"),
         )
         for n in numbers
     )
@@ -200,7 +210,7 @@ def _numbers(verdict: Verdict) -> list[Section]:
         "what was added, with standard errors. The last column is how far each moved, in declared spreads: "
         f"beyond 1 it has left what was declared{' (marked)' if beyond else '; none has'}."
     )
-    columns = ("number", "declared", "spread", "refitted", "unit", "moved by spreads")
+    columns = ("number", "declared", "spread", "refitted", "unit", "moved")
     return [TableSection("Refitted numbers", columns, rows, caption=caption, marked=beyond)]
 
 
@@ -214,7 +224,10 @@ def _next_steps(verdict: Verdict) -> list[Section]:
 def _left_out(verdict: Verdict) -> list[Section]:
     """Return what was masked, set aside or not compared, so that nothing is left out silently."""
     remarks = _list(
-        "Done to the records", "remark", verdict.remarks, "Samples that were masked or set aside."
+        "Done to the records",
+        "remark",
+        verdict.remarks,
+        "Samples that were masked or set aside, files that were not read, and what was chosen by default.",
     )
     if not verdict.skipped:
         return remarks

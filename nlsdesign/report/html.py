@@ -6,6 +6,8 @@ import re
 from html import escape
 
 _CODE = re.compile(r"`([^`\n]+)`")
+_DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])")
+"""Dots within a hierarchical name, behind which a line may break."""
 
 
 class Html(str):
@@ -32,6 +34,22 @@ def words(text: str) -> Html:
     '<code>a.b</code> &lt; 3'
     """
     return Html(_CODE.sub(r"<code>\1</code>", escape(text)))
+
+
+def breakable(text: Html) -> Html:
+    """Return HTML in which a line may break behind the dots of hierarchical names.
+
+    Parameters
+    ----------
+    text
+        HTML.
+
+    Examples
+    --------
+    >>> breakable(words("`a.b` of 1.5"))
+    '<code>a.<wbr>b</code> of 1.5'
+    """
+    return Html(_DOTS.sub(r"\1<wbr>", text))
 
 
 def prose(text: str) -> Html:

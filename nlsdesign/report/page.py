@@ -15,7 +15,7 @@ from ..errors import ExportError, ValueRangeError
 from ..figures.style import TONES
 from ..locations import version
 from ..writing import write_text
-from .html import Html, prose, words
+from .html import Html, breakable, prose, words
 from .sections import Chapter, PagePosition, Section
 
 _PAGE_TONES = {
@@ -130,6 +130,7 @@ def _environment() -> Environment:
     )  # fmt: skip
     environment.filters["prose"] = prose
     environment.filters["words"] = words
+    environment.filters["breakable"] = breakable
     return environment
 
 

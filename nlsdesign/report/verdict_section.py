@@ -15,7 +15,7 @@ VERDICTS = {
     "named": "effect named",
     "unknown": "an effect without a name",
     "undecidable": "the records cannot tell",
-    "data_suspect": "the data are suspect",
+    "data_suspect": "data or deck are suspect",
 }
 
 _WIDTH = 100.0
@@ -36,6 +36,8 @@ class VerdictSection(Section):
         The findings in one line.
     gap
         Error before and after; ``None`` where there is none to show.
+    after
+        How the model after differs from the one before.
     parts
         Sections with the evidence.
 
@@ -50,6 +52,7 @@ class VerdictSection(Section):
     _: KW_ONLY
     headline: str = ""
     gap: Gap | None = None
+    after: str = "with what was added"
     parts: tuple[Section, ...] = ()
     template: ClassVar[str] = "verdict.html"
 
@@ -72,19 +75,19 @@ class VerdictSection(Section):
             "verdict": self.verdict,
             "badge": VERDICTS[self.verdict],
             "headline": self.headline,
-            "gap": None if self.gap is None else _drawn(self.gap),
+            "gap": None if self.gap is None else _drawn(self.gap, self.after),
             "words": self.words,
             "parts": parts,
         }
 
 
-def _drawn(gap: Gap) -> Mapping[str, Any]:
+def _drawn(gap: Gap, after: str) -> Mapping[str, Any]:
     """Return the two bars of a gap and the numbers below them."""
     longest = max(gap.before, gap.after) or 1.0
     bars = {n: f"{_WIDTH * getattr(gap, n) / longest:.2f}" for n in ("before", "after")}
     records = "records that no fit has seen" if gap.role == "held_out" else "the fitted records"
     note = (
-        "before, the refitted declared model; after, with what was added. Both filtered alike."
+        f"before, the refitted declared model; after, {after}. Both filtered alike."
         if gap.changed
         else "the refitted declared model; nothing was added."
     )

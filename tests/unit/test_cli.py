@@ -180,3 +180,17 @@ def test_a_drive_with_a_gear_is_analysed_over_the_angle_of_its_motor(run: Run, t
     assert chart["observability.rank"][1:] == [3, 3]
     assert chart["stiffness.slow"][0] < chart["stiffness.slow"][1] < chart["stiffness.slow"][2]
     assert (tmp_path / "o" / "over_angle.csv").exists()
+
+
+def test_a_folder_that_cannot_be_made_after_all_is_one_message(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was asked for before the work; some file systems say no only when it is made."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    status, _, err = run("analyse", "--deck", DECK, "--out", str(tmp_path / "new"))
+    assert status == 2
+    assert "new: cannot be made (Read-only file system) -> name another folder" in err

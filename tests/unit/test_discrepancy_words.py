@@ -211,8 +211,65 @@ def test_an_effect_is_told_with_probability_evidence_and_class() -> None:
     assert "Probability 0.97." in words
     assert "not fitted to falls by 310 ± 12." in words
     assert "`sliding_effort` is 87.2 standard errors away from no effect" in words
-    assert "'slow': it loses 1.5." in words
+    assert "'slow': without it the density there rises by 1.50." in words
     assert "do not tell it from: backlash." in words
+
+
+def test_a_large_gain_is_told_without_a_power_of_ten() -> None:
+    assert "falls by 3480." in EffectEvidence(1e5, 2e4, worst_record="slow", worst_change=3478.2).words()
+
+
+def test_why_the_records_are_suspect_stands_in_the_card(tmp_path: Any) -> None:
+    """A reader of the card alone must learn what to look at."""
+    same = replace(GAPS[1], after=0.26)
+    course = replace(verdict().course, after=verdict().course.before)
+    strained = "declared numbers: refitted 2.3 standard deviations of their spread away before, 2.3 after"
+    reason = "slow.csv: column 'force_N', rows 5 to 9: rests at 3 for 5 samples: cut the record there"
+    said = verdict("data_suspect", where=(strained, reason), gaps=(same,), course=course)
+    assert said.headline() == "The records are suspect"
+    assert "slow.csv: column 'force_N', rows 5 to 9: rests at 3 for 5 samples" in said.words(), (
+        "as it is named"
+    )
+    assert "refitted 2.3" not in said.words()
+    assert str(said).lower().count("rests at 3") == 1, "once"
+    page = report.write_report(tmp_path / "r.html", *report.verdict_sections(said), title="t").read_text()
+    assert page.count("rests at 3") == 1, "once"
+    assert page.index("rests at 3") < page.index("refitted 2.3")
+
+
+def test_a_declared_number_that_is_wrong_does_not_make_the_records_suspect(tmp_path: Any) -> None:
+    wrong = "a declared number is probably wrong: motor.inertia is declared as 2 kg·m², but the records say 1"
+    said = verdict("data_suspect", where=(wrong,))
+    assert said.headline() == "Deck and records contradict each other"
+    assert "records are suspect" not in said.words()
+    assert "A declared number is probably wrong: motor.inertia" in said.words()
+    page = report.write_report(tmp_path / "r.html", *report.verdict_sections(said), title="t").read_text()
+    assert "after, with declared numbers let go." in page
+    assert "with what was added. Both" not in page
+
+
+def test_an_effect_beside_a_contradiction_is_not_said_to_explain_too_little() -> None:
+    (first, *_) = verdict("data_suspect").tried_words()
+    assert first.endswith("explains 99.9 % of the excess over the noise: deck and records contradict each "
+                          "other, so nothing is named.")  # fmt: skip
+
+
+def test_an_effect_of_several_forms_is_listed_once_with_its_best() -> None:
+    tried = (("backlash", 0.5, "too late"), ("backlash", 0.4, "too early"), ("self_heating", 0.3, "too cold"))
+    said = verdict("unknown", runners_up=tried)
+    assert len(said.tried_words()) == 2
+    assert said.tried_words()[0].endswith("too late.")
+    shares = next(p for p in report.verdict_sections(said)[1].parts if p.title == "Effects tried first")  # type: ignore[attr-defined]
+    labels = [t.get_text() for t in shares.figure.axes[0].get_yticklabels()]
+    assert labels == ["self heating", "backlash"]
+
+
+def test_the_course_of_an_unchanged_model_is_told_in_one_sentence() -> None:
+    same = replace(GAPS[1], after=0.26)
+    course = replace(verdict().course, after=verdict().course.before)
+    other = verdict("unknown", gaps=(same,), course=course)
+    captions = [getattr(p, "caption", "") for p in report.verdict_sections(other)[1].parts]  # type: ignore[attr-defined]
+    assert any("as the refitted model has it, to which nothing was added. Below" in c for c in captions)
 
 
 def test_why_the_richer_form_won_is_said() -> None:

@@ -343,6 +343,25 @@ def test_bars_are_as_high_as_the_errors_and_held_out_records_stand_right() -> No
     assert floors == [0.09, 0.08, 0.085]
 
 
+def test_no_number_of_a_bar_is_struck_through_by_the_noise_floor() -> None:
+    errors = [
+        figures.RecordError(n, h, h, 0.25, n == "c") for n, h in (("a", 0.236), ("b", 0.27), ("c", 0.1))
+    ]
+    axes = figures.gap_bars(errors, unit="N").axes[0]
+    heights = {text.get_text(): text.xy[1] for text in axes.texts if hasattr(text, "xy")}
+    assert heights == {"0.236": 0.25, "0.270": 0.27, "0.100": 0.1}
+
+
+def test_a_record_is_not_drawn_where_its_samples_do_not_count() -> None:
+    time = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(2.0, 3.0, 0.01)])
+    record = figures.HeldOut(time, np.sin(time), 0.9 * np.sin(time), np.sin(time), "force", "N")
+    upper, lower = figures.held_out_series(record).axes
+    for line in (*upper.lines, *lower.lines):
+        inside = (line.get_xdata() > 1.0) & (line.get_xdata() < 2.0)
+        assert inside.any()
+        assert np.all(np.isnan(line.get_ydata()[inside]))
+
+
 def test_before_and_after_have_the_same_colours_in_every_figure() -> None:
     bars, series, binned = (drawn(n).axes[0] for n in ("gap_bars", "held_out_series", "binned_errors"))
     before, after = "#d55e00", "#0072b2"

@@ -92,6 +92,12 @@ REFUSED = {
         [PLAIN[0], *(row.replace(".", ",") for row in PLAIN[1:])],
         r"row 2: has 6 cells, the heads are 3 -> separate the cells by semicolons",
     ),
+    "a comment between rows": (
+        [*PLAIN[:9], "# stopped here", *PLAIN[9:]],
+        r"a\.csv: row 10: has 1 cells, the heads are 3 -> give each row one cell for each head; comments",
+    ),
+    "a word": (cell(9, "high"), r"row 9: 'high' is not a number -> correct the cell, or cut the record"),
+    "nothing": ([], r"a\.csv: has 0 rows of numbers; at least 50 are needed -> take the file away"),
     "two units": (
         [PLAIN[0], "s,deg,N", *PLAIN[1:]],
         r"column 'cell.reading \[N\*m\]'.*is in N·m by its head and in N by the row below",
@@ -108,6 +114,13 @@ def test_what_cannot_be_meant_is_refused_with_its_place(case: str, tmp_path: Pat
     rows, words = REFUSED[case]
     with pytest.raises(MeasurementError, match=words):
         read(tmp_path, "\n".join(rows) + "\n", model)
+
+
+def test_text_that_is_not_utf_8_is_named_by_its_row(tmp_path: Path, model: FlatModel) -> None:
+    with pytest.raises(
+        MeasurementError, match=r"a\.csv: row 2: is no text in UTF-8.* -> save it as CSV in UTF-8"
+    ):
+        read(tmp_path, "\n".join(["# bench 3", "# Temperatur 20 °C", *PLAIN]) + "\n", model, "latin-1")
 
 
 def test_a_comment_moves_the_rows_that_messages_name(tmp_path: Path, model: FlatModel) -> None:

@@ -319,3 +319,21 @@ def test_a_direction_that_many_numbers_share_evenly_is_told_too() -> None:
     (words,) = known.unidentified()
     assert words.startswith("p")
     assert words.endswith("known to 100 % only")
+
+
+def test_slopes_that_overflow_are_no_place_to_begin_or_to_go_on_from() -> None:
+    """A strange model beside badly declared numbers answers with 1e200: one start less, not a crash."""
+
+    def steep(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([1.0, x[0] - 1.0]), np.array([[1e200, 1e200], [1.0, 0.0]])
+
+    box = np.full(2, -5.0), np.full(2, 5.0)
+    with pytest.raises(ConvergenceError, match="slopes that are not finite"):
+        minimise(steep, np.zeros(2), box, evaluations=20)
+
+    def steep_beyond(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([x[0] - 1.0]), np.array([[1.0 if x[0] < 0.5 else 1e200]])
+
+    found = minimise(steep_beyond, np.zeros(1), (np.full(1, -5.0), np.full(1, 5.0)), evaluations=20)
+    assert np.isfinite(found.cost)
+    assert found.x[0] < 0.5

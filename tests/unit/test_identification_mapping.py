@@ -92,3 +92,13 @@ def test_what_is_sound_is_read(tmp_path: Path) -> None:
     assert (mapping.time.name, mapping.resample, mapping.held_out) == ("t_ms", 500.0, ("c*",))
     assert mapping.held_out_after == 2.0
     assert mapping.columns[0].time == "t2_ms"
+
+
+def test_two_columns_of_one_signal_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "records.toml").write_text(
+        SOUND + '[columns.again]\nsignal = "encoder.reading"\nunit = "deg"\n', encoding="utf8"
+    )
+    with pytest.raises(
+        MeasurementError, match=r"columns.again: is mapped to 'encoder.reading', as 'theta_deg' is"
+    ):
+        read_mapping(tmp_path / "records.toml")

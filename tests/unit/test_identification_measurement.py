@@ -214,6 +214,7 @@ def test_a_wrong_mapping_is_answered_with_the_nearest_right_one(
 
 
 def test_a_folder_without_records_is_refused(tmp_path: Path, model: FlatModel) -> None:
+    (tmp_path / "nothing").mkdir()
     with pytest.raises(MeasurementError, match="holds no CSV file"):
         load_records(tmp_path / "nothing", model)
 

@@ -83,10 +83,19 @@ def test_spectrum_peaks_at_the_frequency_of_a_sine() -> None:
 def test_shapes_separate_forward_and_backward() -> None:
     time = np.arange(6000) * 0.002
     angle, speed = np.sin(time), np.cos(time)
-    found = shapes(0.3 * np.sign(speed), {"angle": angle}, speed, 0.002)
+    found = shapes(0.3 * np.sign(speed), {"angle": angle}, speed=speed, time=time, step=0.002)
     np.testing.assert_allclose(found["over angle, forward"].mean, 0.3, atol=1e-12)
     np.testing.assert_allclose(found["over angle, backward"].mean, -0.3, atol=1e-12)
     assert {"over frequency", "over time", "over speed"} <= set(found)
+
+
+def test_the_shape_over_time_is_that_of_the_records_not_of_their_order() -> None:
+    """Two records of 2 s are no record of 4 s: what both show at their end stands at 2 s."""
+    once = np.arange(1000) * 0.002
+    time = np.concatenate([once, once])
+    found = shapes(time, {}, speed=None, time=time, step=0.002)["over time"]
+    assert found.centre.max() < 2.0
+    np.testing.assert_allclose(found.mean, found.centre, atol=0.05)
 
 
 def test_filter_has_no_phase_and_unit_gain() -> None:

@@ -32,7 +32,7 @@ from nlsdesign.report.mathml import formula
 from tests import figure_samples as samples
 
 EVIL = "\"'><img src=x onerror=alert(1)><script>alert(2)</script>&amp;"
-VOID = {"meta", "link", "input", "br", "hr", "img"}
+VOID = {"meta", "link", "input", "br", "hr", "img", "wbr"}
 
 
 class Page(HTMLParser):
@@ -285,6 +285,14 @@ def test_hostile_names_stay_text_everywhere(tmp_path: Path) -> None:
     assert not [name for name in (n for _, a in page.elements for n in a) if name.startswith("on")]
     assert sum(EVIL in text for text in page.texts) > 40
     assert "a%20%26%20b%20%27%20%3Cx%3E.c" in page.values("href")
+
+
+def test_a_long_name_in_a_table_may_break_behind_its_dots(tmp_path: Path) -> None:
+    name = "spring.cable.rubber.relaxing.dashpot.viscosity"
+    section = report.TableSection("Numbers", ("number", "value"), ((name, "1.5 Pa·s"),))
+    page = report.write_report(tmp_path / "r.html", section, title="t").read_text(encoding="utf-8")
+    assert name.replace(".", ".<wbr>") in page
+    assert "1.5 Pa·s" in page
 
 
 def test_plain_text_becomes_paragraphs_and_code() -> None:

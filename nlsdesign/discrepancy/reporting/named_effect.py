@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ...components.assembly.named_parts import Assembly
-from ...quantity import significant, to_resolution, with_error, with_unit
+from ...quantity import significant, three_digits, to_resolution, with_error, with_unit
 from ..effects.plain_names import capitalised, effect_in_words, title
 
 _CLEAR = 2.0
@@ -53,11 +53,11 @@ class EffectEvidence:
         if math.isfinite(self.distance):
             text += f" Its `{self.number}` is {self.distance:.3g} standard errors away from no effect."
         if self.worst_record:
-            change = f"{abs(self.worst_change):.3g}"
-            text += f" The record that gains least is '{self.worst_record}': "
-            text += f"it gains {change}." if self.worst_change >= 0.0 else f"it loses {change}."
+            change = three_digits(abs(self.worst_change))
+            text += f" The record that gains least is '{self.worst_record}': without it the density there "
+            text += f"falls by {change}." if self.worst_change >= 0.0 else f"rises by {change}."
         if math.isfinite(self.next_leaves):
-            text += f" The best other name leaves {self.next_leaves:.3g} times as much."
+            text += f" The best other name leaves {three_digits(self.next_leaves)} times as much."
         return " ".join([text, *(self._over(*each) for each in self.over_simpler)])
 
     def _over(self, simpler: str, cost: float, error: float) -> str:

@@ -16,11 +16,13 @@ from ...identification.statistics.residuals import Binned
 from ...quantity import significant, three_digits, typeset_unit
 from ..effects.plain_names import capitalised, simpler_forms, title
 from ..planning.experiment import Experiment
+from ..selection.measures import DECLARED
 from ..selection.trials import Skipped
 from .circumstances import DiagnosisRun, settings_of
 from .fitted_numbers import fitted_numbers
 from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
+from .suspicion import CONTRADICTION, LET_GO, as_sentence
 
 Array = NDArray[np.float64]
 
@@ -292,11 +294,14 @@ class Verdict:
         if self.verdict == "named":
             effects = " and ".join(e.headline(self.actuator) for e in self.effects)
             return capitalised(effects)
-        return HEADLINES[self.verdict]
+        return LET_GO[0] if let_go(self) else HEADLINES[self.verdict]
 
     def paragraphs(self) -> tuple[str, ...]:
         """Return the verdict in words: what was found, each effect, what is left."""
         sentences = [] if self.verdict == "named" else [EXPLANATIONS[self.verdict]]
+        if let_go(self):
+            sentences = [LET_GO[1]]
+        sentences += [as_sentence(reason) for reason in suspicions(self)]
         if self.verdict == "none" and self.unidentified:
             sentences.append(
                 f"They leave {len(self.unidentified)} of its numbers or combinations of them open, so they "
@@ -324,7 +329,7 @@ class Verdict:
         """Return a sentence for each effect that helps and is not named: how much, and why not."""
         named = {effect.name for effect in self.effects}
         sentences = []
-        for name, share, *why in self.runners_up:
+        for name, share, *why in best_forms(self.runners_up):
             if name in named or not share > _HELPS:
                 continue
             alone = (
@@ -394,7 +399,7 @@ class Verdict:
                 f"{self.headline()}.",
                 *(self.gap(name).words() for name in self.blocks),
                 *self.paragraphs(),
-                *self.findings,
+                *(each for each in self.findings if each not in suspicions(self)),
                 *(self.tried_words() if self.verdict != "named" or not self.complete else ()),
                 *self.remarks,
                 *(f"not compared: {each}" for each in self.skipped),
@@ -403,10 +408,50 @@ class Verdict:
         )
 
 
+def let_go(verdict: Verdict) -> bool:
+    """Return whether the records contradict declared numbers, and other numbers explain them.
+
+    Parameters
+    ----------
+    verdict
+        Of a diagnosis.
+    """
+    return verdict.verdict == "data_suspect" and any(verdict.gap(name).changed for name in verdict.blocks)
+
+
+def suspicions(verdict: Verdict) -> tuple[str, ...]:
+    """Return why records or deck are suspect, in sentences; none with another verdict.
+
+    Parameters
+    ----------
+    verdict
+        Of a diagnosis.
+    """
+    if verdict.verdict != "data_suspect":
+        return ()
+    return tuple(text for text in verdict.findings if not text.startswith(f"{DECLARED}:"))
+
+
+def best_forms(tried: Sequence[tuple[Any, ...]]) -> tuple[tuple[Any, ...], ...]:
+    """Return of each effect the form or place that explains most: one name stands for all of them.
+
+    Parameters
+    ----------
+    tried
+        Name of the effect, share that it explains, and perhaps more, best first.
+    """
+    best: dict[str, tuple[Any, ...]] = {}
+    for each in tried:
+        best.setdefault(each[0], each)
+    return tuple(best.values())
+
+
 def _why_not(verdict: Verdict, name: str, named: Collection[str]) -> str:
     nested = [simple for simple in simpler_forms(verdict.declared, name) if simple in named]
     if nested:
         return f"{title(nested[0])}, its simpler form, predicts as well"
+    if verdict.verdict == "data_suspect":
+        return CONTRADICTION
     return "what was named accounts for it" if named and verdict.complete else _NOT_NAMED
 
 

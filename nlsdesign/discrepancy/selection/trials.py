@@ -206,7 +206,8 @@ class Trials:
     ) -> str:
         """Return why what takes long is not tried; empty if it is."""
         if not far:
-            return f"takes long, and {' and '.join(present.names)} leave little in the block"
+            leave = "leaves" if len(present.names) == 1 else "leave"
+            return f"takes long, and {' and '.join(present.names)} {leave} little in the block"
         step = self.step(present, quick, block)
         if step is not None and not self.excesses_of(step.chosen)[block].open:
             return f"takes long, and {step.effect} explains the block down to its noise"

@@ -17,6 +17,7 @@ Rows = Callable[[Array], tuple[Array, Array]]
 ENOUGH = 0.02
 """A predicted gain of half a sum of squares below this cannot matter to any decision on noisy data."""
 _LONGEST = 1.5
+_ENDLESS = "has slopes that are not finite"
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-9, 1e8
 
 
@@ -63,6 +64,11 @@ def minimise(
         Ends when the predicted gain is below this share of the cost, or below :data:`ENOUGH`.
     least
         Ends too when the predicted gain is below this.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no response at the start, or its slopes are not finite.
     """
     low, high = box
     x, damping = start, _FIRST_DAMPING
@@ -70,27 +76,39 @@ def minimise(
     cost = 0.5 * float(residual @ residual)
     if not x.size:
         return Minimum(x, cost, True)  # nothing is free: what is known is all there is
+    derivatives = _quadratic(residual, slope)
+    if derivatives is None:
+        raise ConvergenceError("fit", _ENDLESS, next_step="narrow the bounds")
+    gradient, curvature = derivatives
     for _ in range(evaluations):
-        gradient, curvature = slope.T @ residual, slope.T @ slope
         step = _step(gradient, curvature, damping, (x, low, high))
         gain = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
         if gain < max(ENOUGH, share * cost, least) * (1.0 if damping <= 1.0 else 1e-2):
             return Minimum(x, cost, True)
         try:
-            new_residual, new_slope = rows(x + step)
+            residual, slope = rows(x + step)
         except ConvergenceError:
             damping *= 10.0
             continue
-        new = 0.5 * float(new_residual @ new_residual)
-        if np.isfinite(new) and new < cost:
+        new = 0.5 * float(residual @ residual)
+        derivatives = _quadratic(residual, slope) if np.isfinite(new) and new < cost else None
+        if derivatives is not None:
             good = (cost - new) / gain
-            x, residual, slope, cost = x + step, new_residual, new_slope, new
+            x, (gradient, curvature), cost = x + step, derivatives, new
             damping = max(damping * (0.1 if good > 0.5 else 1.0 if good > 0.1 else 4.0), _LEAST_DAMPING)
         else:
             damping *= 10.0
             if damping > _MOST_DAMPING:
                 return Minimum(x, cost, True)
     return Minimum(x, cost, False)
+
+
+def _quadratic(residual: Array, slope: Array) -> tuple[Array, Array] | None:
+    """Return gradient and curvature of half the sum of squares; ``None`` where they overflow."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        gradient, curvature = slope.T @ residual, slope.T @ slope
+    finite = np.all(np.isfinite(gradient)) and np.all(np.isfinite(curvature))
+    return (gradient, curvature) if finite else None
 
 
 def _step(gradient: Array, curvature: Array, damping: float, place: tuple[Array, Array, Array]) -> Array:
@@ -114,4 +132,4 @@ def _root(matrix: Array, largest: float) -> Array:
             )
         except np.linalg.LinAlgError:
             lift *= 100.0
-    raise ConvergenceError("fit", "has slopes that are not finite", next_step="narrow the bounds")
+    raise ConvergenceError("fit", _ENDLESS, next_step="narrow the bounds")

@@ -179,7 +179,9 @@ def _uneven(layout: _Layout, row: int, cells: int) -> MeasurementError:
     return MeasurementError(
         f"{layout.file}: row {row}",
         f"has {cells} cells, the heads are {len(layout.heads)}",
-        next_step="separate the cells by semicolons where numbers have decimal commas" if comma else None,
+        next_step="separate the cells by semicolons where numbers have decimal commas"
+        if comma
+        else "give each row one cell for each head; comments may stand above the heads only",
     )
 
 
@@ -209,7 +211,9 @@ def _no_number(layout: _Layout, head: str, row: int, cell: str) -> MeasurementEr
     return MeasurementError(
         f"{layout.file}: column '{head}', row {row}",
         f"'{cell[:40]}' is not a number",
-        next_step="write numbers without separators of thousands" if both or "_" in cell else None,
+        next_step="write numbers without separators of thousands"
+        if both or "_" in cell
+        else "correct the cell, or cut the record before or after this row",
     )
 
 

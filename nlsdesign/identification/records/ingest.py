@@ -250,7 +250,10 @@ def _check_present(table: RecordTable, heads: list[str]) -> None:
     for head in heads:
         if head not in table.heads:
             raise MeasurementError(
-                f"{table.file}: column '{head}'", "is missing", did_you_mean=nearest(head, table.heads)
+                f"{table.file}: column '{head}'",
+                "is missing",
+                did_you_mean=nearest(head, table.heads),
+                next_step="record it in every file, or map in records.toml the columns that every file has",
             )
 
 

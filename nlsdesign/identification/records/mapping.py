@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,12 +10,9 @@ from typing import Any
 
 from ...errors import MeasurementError, UnitError, nearest
 from ...model import FlatModel
-from ...model.readings import reading_of
 from ...quantity import parse_unit, same_dimension, typeset_unit
 from .toml_fields import globs_at, number_at, table_at, text_at
 
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
-_TIME_NAMES = ("t", "time")
 _FASTEST = 1e6
 """Highest rate in Hz of a common clock: beyond it a record of minutes does not fit into memory."""
 
@@ -137,69 +133,14 @@ class ColumnMap:
         return replace(self.time, name=column.time) if column.time else self.time
 
 
-def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
-    """Return heads that name a time, with their units.
-
-    Parameters
-    ----------
-    heads
-        Of a table.
-    """
-    named = [(head, *_name_and_unit(head)) for head in heads]
-    return [(h, u) for h, n, u in named if u and same_dimension(u, "s") and n.lower() in _TIME_NAMES]
-
-
-def times_without_unit(heads: Sequence[str]) -> list[str]:
-    """Return heads that are called like a time and give no unit of time.
-
-    Parameters
-    ----------
-    heads
-        Of a table.
-    """
-    names = (*_TIME_NAMES, "timestamp", "seconds", "ms")
-    timed = {head for head, _ in times_among(heads)}
-    return [head for head in heads if head.lower().strip("[]() ") in names and head not in timed]
-
-
-def heads_with_units(file: str, heads: Sequence[str], units: Mapping[str, str]) -> list[str]:
-    """Return heads with the units that stand beside them in the file.
-
-    Parameters
-    ----------
-    file
-        For messages.
-    heads
-        In the order of the file.
-    units
-        By head.
-
-    Raises
-    ------
-    MeasurementError
-        If a head names another unit.
-    """
-    result = []
-    for head in heads:
-        name, own = _name_and_unit(head)
-        unit = units.get(head)
-        if unit and own and unit != own:
-            raise MeasurementError(
-                f"{file}: column '{head}'",
-                f"is in {typeset_unit(own)} by its head and in {typeset_unit(unit)} by the row below",
-                next_step="correct one of them",
-            )
-        result.append(f"{name} [{unit}]" if unit and not own else head)
-    return result
-
-
 def read_mapping(path: Path) -> ColumnMap:
     """Read the mapping of columns to signals.
 
     Parameters
     ----------
     path
-        TOML file.
+        TOML file. Where it has no table ``columns``, the heads of the records say what they are; where it has
+        no ``time`` either, also which column holds the time, and the name of that column is empty here.
 
     Raises
     ------
@@ -209,17 +150,19 @@ def read_mapping(path: Path) -> ColumnMap:
     try:
         tables = tomllib.loads(path.read_text(encoding="utf8"))
     except (OSError, ValueError, RecursionError) as error:  # ValueError: bad TOML, or no text in UTF-8
-        raise MeasurementError(path.name, f"cannot be read as a mapping: {error}") from None
+        raise MeasurementError(
+            path.name,
+            f"cannot be read as a mapping: {error}",
+            next_step="correct it, or write it again as TOML",
+        ) from None
     known = ("time", "columns", "held_out", "selection", "held_out_after", "resample_Hz", "align")
     _check_fields(path.name, tables, known)
     given = table_at(path.name, "columns", tables.get("columns", {}), 'write [columns.<head>] signal = "..."')
     columns = tuple(_mapped(path, head, table) for head, table in given.items())
-    if not columns:
-        raise MeasurementError(
-            path.name, "maps no column", next_step='add [columns.<head>] signal = "...", unit = "..."'
-        )
+    _check_signals_differ(path.name, columns)
+    timed = columns or "time" in tables
     mapping = ColumnMap(
-        _time(path.name, tables.get("time", {})),
+        _time(path.name, tables.get("time", {})) if timed else Column("", "time", "s"),
         columns,
         globs_at(path.name, "held_out", tables.get("held_out", [])),
         globs_at(path.name, "selection", tables.get("selection", [])),
@@ -229,6 +172,18 @@ def read_mapping(path: Path) -> ColumnMap:
     )
     _check_clock(path.name, mapping)
     return mapping
+
+
+def _check_signals_differ(file: str, columns: Sequence[Column]) -> None:
+    first: dict[str, str] = {}
+    for column in columns:
+        if column.signal in first:
+            raise MeasurementError(
+                f"{file}: columns.{column.name}",
+                f"is mapped to '{column.signal}', as '{first[column.signal]}' is",
+                next_step="map each column to a signal of its own",
+            )
+        first[column.signal] = column.name
 
 
 def _time(file: str, given: Any) -> Column:
@@ -351,99 +306,6 @@ def _size(where: str, field: str, given: Any) -> float:
     if size < 0.0:
         raise MeasurementError(f"{where}.{field}", f"{given!r} is negative", next_step=way_out)
     return size
-
-
-def default_mapping(heads: Sequence[str], model: FlatModel, file: str) -> ColumnMap:
-    """Return the mapping that follows from the heads of the columns.
-
-    Parameters
-    ----------
-    heads
-        ``name [unit]`` or ``name_unit``.
-    model
-        Its signals, and the readings of its sensors.
-    file
-        For messages.
-
-    Raises
-    ------
-    MeasurementError
-        If there is no time, or a column could be several signals or none.
-    """
-    split_heads = [(head, *_name_and_unit(head)) for head in heads]
-    times = times_among(heads)
-    if not times:
-        raise MeasurementError(file, "has no column of time", next_step="name it 't_s' or 'time [s]'")
-    columns = [
-        Column(head, signal, str(unit), *_declared(model, signal))
-        for head, name, unit in split_heads
-        if head != times[0][0] and (signal := _signal(head, name, unit, model, file))
-    ]
-    for column in columns:
-        if sum(other.signal == column.signal for other in columns) > 1:
-            raise MeasurementError(
-                f"{file}: column '{column.name}'",
-                f"is not the only one that could be '{column.signal}'",
-                next_step="write a records.toml that maps each column to its signal",
-            )
-    return ColumnMap(Column(times[0][0], "time", times[0][1]), tuple(columns))
-
-
-def _name_and_unit(head: str) -> tuple[str, str | None]:
-    match = _BRACKETED.match(head)
-    name, unit = (
-        (match["name"], match["unit"]) if match else (head.rpartition("_")[0], head.rpartition("_")[2])
-    )
-    try:
-        parse_unit(unit)
-    except UnitError:
-        return head, None
-    return name, unit
-
-
-def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str) -> str | None:
-    everything = {v.name: v for v in model.states + model.inputs + model.signals}
-    if unit is None:
-        raise MeasurementError(
-            f"{file}: column '{head}'",
-            "names no unit",
-            next_step="write for instance 'force_N', or map it in records.toml",
-        )
-    if name in everything:
-        return name
-    for group in ([everything[r.signal] for r in model.readings], list(model.inputs)):
-        fitting = _last_of_chains(model, [v.name for v in group if same_dimension(v.unit, unit)])
-        if len(fitting) == 1:
-            return fitting[0]
-        if fitting:
-            break
-    raise MeasurementError(
-        f"{file}: column '{head}'",
-        f"could be {' or '.join(fitting)}"
-        if fitting
-        else f"no sensor of the model reads in {typeset_unit(unit)}",
-        next_step="write a records.toml that maps each column to its signal"
-        + ("" if fitting else ", or give the deck of the rig that was measured"),
-    )
-
-
-def _last_of_chains(model: FlatModel, signals: Sequence[str]) -> list[str]:
-    """Leave out readings that another one of these signals passes on: a bench writes down the last."""
-    readings = [r for r in model.readings if r.signal in signals]
-    passed_on = {sensor for r in readings for sensor in r.sensors[1:]}
-    return [s for s in signals if s not in {r.signal for r in readings if r.sensors[0] in passed_on}]
-
-
-def _declared(model: FlatModel, signal: str) -> tuple[float, float]:
-    """Return noise and count of a signal: the largest of the sensors that pass its value on."""
-    noise = quantum = 0.0
-    reading = reading_of(model.readings, signal)
-    for sensor, law in zip(reading.sensors, reading.laws, strict=True):
-        noise = max(noise, model.values.get(f"{sensor}.noise", 0.0))
-        quantum = max(quantum, model.values.get(f"{sensor}.quantum", 0.0))
-        if not law.shows_value:
-            break
-    return noise, quantum
 
 
 def check_signals(file: str, columns: Sequence[Column], model: FlatModel) -> None:

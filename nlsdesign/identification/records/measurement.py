@@ -13,27 +13,23 @@ from numpy.typing import NDArray
 
 from ...errors import MeasurementError, nearest, unknown_name
 from ...model import FlatModel
+from ...quantity import parse_unit
 from ...simulation import Trace
 from ..statistics.residuals import noise_of, quantum_of
 from .clocks import Resolution
+from .heads import default_mapping, heads_with_units, times_among, times_without_unit
 from .held_out import surrounded
 from .ingest import read_run
 from .mapping import Column as Column
 from .mapping import ColumnMap as ColumnMap
-from .mapping import (
-    Inputs,
-    check_signals,
-    default_mapping,
-    heads_with_units,
-    read_mapping,
-    times_among,
-    times_without_unit,
-)
+from .mapping import Inputs, check_signals, read_mapping
 from .quality import Finding
-from .table_files import RecordTable, read_table, table_files
+from .table_files import RecordTable, read_table, table_files, unread_tables
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_COARSER = 3.0
+"""Declared counts beyond which the smallest step in all records is no matter of chance."""
 Role = Literal["fit", "selection", "held_out"]
 
 
@@ -204,8 +200,8 @@ def load_records(
         globs ``held_out`` and ``selection``, and ``held_out_after``, a time with unit at which every record
         is cut. ``resample_Hz`` puts all columns on one clock, also those with one of their own,
         ``[columns.<head>] time``; ``[[align]] column, to`` removes a lag first. By default ``records.toml``
-        in the folder; without it the heads must be names of signals, or name a unit that only one sensor of
-        the model has.
+        in the folder; where it maps no column, or is missing, the heads must be names of signals, or name a
+        unit that only one sensor of the model has.
     hold_out
         Globs on record names. Without any, here or in the mapping, a third of the records is held out, those
         that the others surround, see :func:`~.held_out.surrounded`; a single record is cut after two thirds.
@@ -225,9 +221,10 @@ def load_records(
     runs = {file: table for file, table in tables.items() if _is_run(table.heads, given)}
     if not runs:
         raise _without_time(str(folder), tables.values())
-    # Where files differ in the order of their columns, their names must not choose among them.
-    first = min(runs, key=lambda file: tuple(runs[file].heads))
-    chosen = given or default_mapping(runs[first].heads, model, first.name)
+    # Where files differ in their columns, their names must not choose among them; of the file with the most
+    # columns none is left out silently because another file lacks it.
+    first = min(runs, key=lambda file: (-len(runs[file].heads), tuple(runs[file].heads)))
+    chosen = default_mapping(runs[first].heads, model, first.name, given)
     check_signals(first.name, chosen.columns, model)
     chosen = replace(chosen, inputs=Inputs.of(model))
     whole = [_record(file, table, chosen) for file, table in runs.items()]
@@ -235,6 +232,8 @@ def load_records(
     findings = tuple(finding for one in whole for finding in one.findings)
     remarks = [remark for one in whole for remark in one.remarks]
     remarks += [_left_out(file) for file in tables if file not in runs]
+    remarks += [_not_read(file) for file in unread_tables(folder)]
+    remarks += _other_counts(records, chosen.columns)
     held = tuple(hold_out) or chosen.held_out
     if chosen.held_out_after is not None and not hold_out:
         parts = tuple(part for r in records for part in cut_in_time(r, chosen.held_out_after))
@@ -277,7 +276,7 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
     table = _table(file, given)
     if not _is_run(table.heads, given):
         raise _without_time(file.name, [table])
-    chosen = given or default_mapping(table.heads, model, file.name)
+    chosen = default_mapping(table.heads, model, file.name, given)
     check_signals(file.name, chosen.columns, model)
     one = _record(file, table, replace(chosen, inputs=Inputs.of(model)))
     return replace(one, records=(replace(one.records[0], role="held_out"),))
@@ -286,9 +285,10 @@ def load_record(file: Path, model: FlatModel, *, mapping: Path | None = None) ->
 def _table(file: Path, mapping: ColumnMap | None) -> RecordTable:
     """Return the table of a file; units below its heads become part of them where no mapping names these."""
     table = read_table(file)
-    if mapping is not None or not table.units:
+    if (mapping is not None and mapping.columns) or not table.units:
         return table
-    named = heads_with_units(file.name, table.heads, table.units)
+    units = {h: u for h, u in table.units.items() if mapping is None or h != mapping.time.name}
+    named = heads_with_units(file.name, table.heads, units)
     return replace(table, given={n: table.given[h] for n, h in zip(named, table.heads, strict=True)})
 
 
@@ -310,6 +310,23 @@ def _left_out(file: Path) -> Finding:
     return Finding(file.name, "has no column of time, so it is not taken for a record")
 
 
+def _not_read(file: Path) -> Finding:
+    return Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
+
+
+def _other_counts(records: Sequence[Record], columns: Sequence[Column]) -> list[Finding]:
+    """Tell of sensors whose counts are plainly coarser than declared: the noise floor would be too low."""
+    remarks = []
+    for column in columns:
+        count = min(r.resolution_of(column.signal).quantum for r in records)
+        if count > _COARSER * column.quantum > 0.0:
+            unit = parse_unit(column.unit)
+            seen, declared = (f"{each / unit.factor:.3g} {column.unit}" for each in (count, column.quantum))
+            text = f"moves in counts of {seen}, {declared} are declared: correct the quantum of the sensor"
+            remarks.append(Finding(f"column '{column.name}'", text))
+    return remarks
+
+
 def _by_default(records: Sequence[Record]) -> Finding:
     held = ", ".join(sorted(r.name for r in records if r.role == "held_out"))
     text = f"held out by default: {held}, inside the range of the others"
@@ -318,7 +335,7 @@ def _by_default(records: Sequence[Record]) -> Finding:
 
 def _is_run(heads: Sequence[str], mapping: ColumnMap | None) -> bool:
     """Tell whether a file is a record: tables without any of the columns may lie in the same folder."""
-    if mapping is not None:
+    if mapping is not None and mapping.time.name:
         return any(c.name in heads for c in (mapping.time, *mapping.columns))
     return bool(times_among(heads))
 

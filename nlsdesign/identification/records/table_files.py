@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import MeasurementError, missing_library
+from ...errors import MeasurementError, missing_library, nearest
 from .csv_files import read_csv
 
 Array = NDArray[np.float64]
@@ -23,6 +23,8 @@ LEAST_ROWS = 50
 _MOST_ROWS = 50_000_000
 """Largest number of rows of a record: 14 hours at 1 kHz."""
 _ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5")
+_NOT_READ = (".dat", ".ods", ".tdms", ".tsv", ".txt", ".xls", ".xlsx")
+"""Endings of other files that a bench may have left: one that is passed over is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,7 @@ class RecordTable:
 
 
 def table_files(folder: Path) -> list[Path]:
-    """Return the files of a folder that may hold tables, in order of name.
+    """Return the files of a folder that may hold tables, in order of name; hidden ones are none of a bench.
 
     Parameters
     ----------
@@ -92,7 +94,15 @@ def table_files(folder: Path) -> list[Path]:
     MeasurementError
         If there is none, or two files differ only in the ending.
     """
-    files = sorted(f for f in folder.glob("*") if f.suffix.lower() in _ENDINGS) if folder.is_dir() else []
+    if not folder.exists():
+        near = nearest(folder.name, [f.name for f in folder.parent.glob("*") if f.is_dir()])
+        raise MeasurementError(
+            str(folder),
+            "there is no such folder",
+            did_you_mean=near,
+            next_step="name the folder of the records",
+        )
+    files = sorted(f for f in folder.glob("[!.]*") if f.suffix.lower() in _ENDINGS)
     if not files:
         raise MeasurementError(
             str(folder),
@@ -107,6 +117,17 @@ def table_files(folder: Path) -> list[Path]:
                 next_step="rename or remove one",
             )
     return files
+
+
+def unread_tables(folder: Path) -> list[Path]:
+    """Return the files of a folder that probably hold tables in a form that is not read, in order of name.
+
+    Parameters
+    ----------
+    folder
+        Of records.
+    """
+    return sorted(f for f in folder.glob("[!.]*") if f.suffix.lower() in _NOT_READ)
 
 
 def read_table(file: Path) -> RecordTable:
@@ -132,8 +153,28 @@ def read_table(file: Path) -> RecordTable:
     reader = {".csv": _csv, ".parquet": _parquet, ".mat": _mat}.get(file.suffix.lower(), _hdf5)
     try:
         return reader(file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeasurementError(file.name, f"cannot be read: {error}") from None
+    except UnicodeDecodeError as error:
+        with file.open("rb") as stream:
+            row = sum(1 for _ in itertools.takewhile(_is_utf8, stream)) + 1
+        raise MeasurementError(
+            f"{file.name}: row {row}",
+            f"is no text in UTF-8: {error.reason}",
+            next_step="save it as CSV in UTF-8; other kinds of file are told by their ending",
+        ) from None
+    except OSError as error:
+        raise MeasurementError(
+            file.name,
+            f"cannot be read: {error.strerror or error}",
+            next_step="put a file there that can be read, or take this one away",
+        ) from None
+
+
+def _is_utf8(line: bytes) -> bool:
+    try:
+        line.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _library(name: str, file: Path) -> Any:
@@ -260,4 +301,8 @@ def _numeric(arrays: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def _too_short(file: str, rows: int) -> MeasurementError:
-    return MeasurementError(file, f"has {rows} rows of numbers; at least {LEAST_ROWS} are needed")
+    return MeasurementError(
+        file,
+        f"has {rows} {'row' if rows == 1 else 'rows'} of numbers; at least {LEAST_ROWS} are needed",
+        next_step="take the file away, or record for longer",
+    )

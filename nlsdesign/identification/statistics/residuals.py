@@ -169,7 +169,7 @@ def spectrum(residual: Array, step: float, bins: int = 60) -> Binned:
 
 
 def shapes(
-    residual: Array, signals: Mapping[str, Array], speed: Array | None, step: float
+    residual: Array, signals: Mapping[str, Array], *, speed: Array | None, time: Array, step: float
 ) -> dict[str, Binned]:
     """Return the residual over every measured signal, over frequency, and over the signals by direction.
 
@@ -181,12 +181,14 @@ def shapes(
         Measured signals by name, shape (n,).
     speed
         Rate of the motion, whose sign is the direction; ``None`` if there is none.
+    time
+        Since the beginning of the record that a sample belongs to, in s, shape (n,).
     step
         Time between samples in s.
     """
     result = {f"over {name}": binned(residual, values) for name, values in signals.items()}
     result["over frequency"] = spectrum(residual, step)
-    result["over time"] = binned(residual, np.arange(len(residual), dtype=np.float64) * np.float64(step))
+    result["over time"] = binned(residual, time)
     if speed is not None:
         result["over speed"] = binned(residual, speed)
         for direction, mask in (("forward", speed > 0.0), ("backward", speed < 0.0)):
