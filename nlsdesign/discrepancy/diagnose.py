@@ -156,27 +156,28 @@ def _searched(
     outcome = search(case.comparison, base, catalogue, case.criteria, progress)
     if closing and len(wrong_numbers(closing)) < len(outcome.last.unknowns):
         return replace(outcome, last=closing, steps=(), complete=True)
-    return outcome if outcome.complete else _beside_wrong_numbers(case, base, catalogue, progress, outcome)
-
-
-def _beside_wrong_numbers(
-    case: _Case,
-    base: Hypothesis,
-    catalogue: Sequence[EffectFunction],
-    progress: Callable[[str], None],
-    outcome: Outcome,
-) -> Outcome:
-    """Let go numbers where effects leave something, and search anew if that explains much of it."""
     progress("letting go declared numbers at the end of their ranges")
-    free = with_numbers_let_go(case.comparison, outcome.last, case.criteria)
+    fewer = _with_fewer_effects(case, outcome)
+    if fewer is not None or outcome.complete:
+        return fewer or outcome
+    free = with_numbers_let_go(case.comparison, base, case.criteria)
     if free is None:
         return outcome
-    if is_complete(case.excesses(free)):
-        return replace(outcome, last=free, complete=True)
-    start = case.comparison.polished(base, released=free.released)
-    again = search(case.comparison, start, catalogue, case.criteria, progress)
+    again = search(case.comparison, free, catalogue, case.criteria, progress)
     # Effects beside a wrong number are named only where nothing is left to be explained by something else.
     return again if again.complete and wrong_numbers(again.last) else outcome
+
+
+def _with_fewer_effects(case: _Case, outcome: Outcome) -> Outcome | None:
+    """Return the first of the effects beside wrong numbers, if these leave nothing and need fewer numbers."""
+    for count, step in enumerate(outcome.steps, 1):
+        present = outcome.last if count == len(outcome.steps) else case.comparison.polished(step.chosen)
+        free = with_numbers_let_go(case.comparison, present, case.criteria)
+        if free is None or not is_complete(case.excesses(free)):
+            continue
+        if not outcome.complete or len(wrong_numbers(free)) < len(outcome.last.unknowns) - len(free.unknowns):
+            return replace(outcome, last=free, steps=outcome.steps[:count], complete=True)
+    return None
 
 
 def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:

@@ -357,3 +357,20 @@ def test_what_an_inexact_form_leaves_is_near_to_closed() -> None:
     first = excess(1e5)
     assert is_far_from_closed(RULE, first, excess(1.02 * RULE.inexact * 1e5))
     assert not is_far_from_closed(RULE, first, excess(0.98 * RULE.inexact * 1e5))
+
+
+def test_an_effect_that_drives_declared_numbers_out_of_their_ranges_may_not_be_named() -> None:
+    """Ten numbers may depart by 3·10 squared standard deviations, and by twice that beside an effect."""
+
+    def with_strain(squares: float, *, first: float = 20.0) -> tuple[str, ...]:
+        now = replace(STRAINED, chi2=squares, fit=math.sqrt(squares / 10.0), open=squares > 30.0)
+        before = {**FIRST, DECLARED: replace(STRAINED, chi2=first, open=first > 30.0)}
+        one = replace(rival("a", 1, 100.0), excesses={**with_left(100.0), DECLARED: now})
+        return objections(RULE, before, one)
+
+    assert not with_strain(59.0)
+    assert with_strain(61.0) == (
+        "it drives the declared numbers 2.5 standard deviations of their spread away",
+    )
+    assert not with_strain(79.0, first=40.0), "they were strained before"
+    assert with_strain(81.0, first=40.0)

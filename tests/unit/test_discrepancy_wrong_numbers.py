@@ -53,3 +53,17 @@ def test_an_effect_beside_a_wrong_number_is_named_and_the_number_said(tmp_path: 
     assert found.verdict == "named"
     assert [e.name for e in found.effects] == ["coulomb_friction"]
     assert any(MODULUS in each for each in found.where)
+
+
+def test_a_wrong_torque_constant_beside_friction_is_not_taken_for_effects(tmp_path: Path) -> None:
+    """A gain of the cell and a weight would do too, with more numbers and strained moduli."""
+    arm = ACTUATORS["arm"]
+    drive = replace(arm.drivetrain, torque_constant=0.7 * arm.drivetrain.torque_constant)
+    write_declaration(tmp_path, replace(arm, drivetrain=drive))
+    write_records(tmp_path / "records", make_records(arm, {"coulomb_friction": 1.0}, 5, only=MOTIONS))
+    rig = declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv")
+    some = ("coulomb_friction", "force_sensor_gain", "gravity_load", "second_relaxation")
+    catalogue = tuple(each for each in ALL if each.__name__ in some)
+    found = diagnose(rig, load_records(tmp_path / "records", flatten(rig)), catalogue=catalogue)
+    assert [e.name for e in found.effects] == ["coulomb_friction"]
+    assert any("motor.torque_constant" in each for each in found.where)

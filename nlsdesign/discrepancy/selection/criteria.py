@@ -9,7 +9,8 @@ what its sum has beyond the number of residuals, which is what noise alone would
 An effect may be named if
  1. it explains a share of the excess that is left in some open block, and more than noise explains;
  2. that gain in prediction does not rest on a single piece of a record;
- 3. its numbers exclude "no effect", are known, and stand off the bounds of their search;
+ 3. its numbers exclude "no effect", are known, and stand off the bounds of their search, and it does not
+    drive declared numbers out of their ranges;
  4. no record is predicted worse than without it, and records left out as a whole are predicted better.
 Of several such effects the one that predicts best is taken, unless a simpler one predicts about as well.
 """
@@ -65,6 +66,10 @@ class Criteria:
     worse: float = _criterion(
         0.25,
         "share by which an effect may let the squares of a record grow, besides the noise margin",
+    )
+    strain: float = _criterion(
+        2.0,
+        "times by which an effect may let squared departures of declared numbers grow beyond their ranges",
     )
     richer: float = _criterion(
         2.0,
@@ -342,7 +347,19 @@ def objections(criteria: Criteria, before: Excesses, rival: Rival[T]) -> tuple[s
         words.append(
             f"without its best piece of a record the prediction gains {gained.rest:.3g} squares of the noise"
         )
+    words += _strained(criteria, before, after)
     return (*words, *objections_of_numbers(criteria, rival.standing), *_worse(criteria, before, after))
+
+
+def _strained(criteria: Criteria, before: Excesses, after: Excesses) -> list[str]:
+    """Return in words whether an effect drives declared numbers out of their ranges: it is another, then."""
+    now = after.get(DECLARED)
+    if now is None or not now.open:
+        return []
+    least = max(before[DECLARED].chi2, criteria.prior_per_number * now.rows)
+    if now.chi2 <= criteria.strain * least:
+        return []
+    return [f"it drives the declared numbers {now.fit:.1f} standard deviations of their spread away"]
 
 
 def objections_of_numbers(criteria: Criteria, standing: Standing) -> list[str]:
