@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -84,13 +85,16 @@ def test_rows_are_the_same_with_and_without_a_clock_of_the_mapping(folder: Path,
     np.testing.assert_array_equal(load_records(folder, model).records[0].trace["cell.reading"], plain)
 
 
-def test_counts_coarser_than_declared_are_told(folder: Path, model: FlatModel) -> None:
+def test_counts_coarser_than_declared_are_used_and_told(folder: Path, model: FlatModel) -> None:
     """The noise floor rests on the declared count; with a finer one, clean records look as if they lacked."""
     assert not any("counts" in str(r) for r in load_records(folder, model).remarks)
     for name in "abc":
         rows = table()
         rows[:, 1] = np.round(rows[:, 1])
         write(folder, name, rows, HEADS)
-    told = [str(r) for r in load_records(folder, model).remarks if "counts" in str(r)]
-    words = "moves in counts of 1 deg, 0.0573 deg are declared: correct the quantum of the sensor"
+    loaded = load_records(folder, model)
+    told = [str(r) for r in loaded.remarks if "counts" in str(r)]
+    (quantum,) = [c.quantum for c in loaded.columns if c.name == "theta_deg"]
+    assert quantum == pytest.approx(math.radians(1.0))
+    words = "moves in counts of 1 deg, 0.0573 deg are declared: the former are used"
     assert told == [f"column 'theta_deg': {words}"]

@@ -233,7 +233,8 @@ def load_records(
     remarks = [remark for one in whole for remark in one.remarks]
     remarks += [_left_out(file) for file in tables if file not in runs]
     remarks += [_not_read(file) for file in unread_tables(folder)]
-    remarks += _other_counts(records, chosen.columns)
+    chosen, coarser = _with_counts_as_seen(chosen, records)
+    remarks += coarser
     held = tuple(hold_out) or chosen.held_out
     if chosen.held_out_after is not None and not hold_out:
         parts = tuple(part for r in records for part in cut_in_time(r, chosen.held_out_after))
@@ -314,17 +315,19 @@ def _not_read(file: Path) -> Finding:
     return Finding(file.name, f"is not read: '{file.suffix}' is no ending of a table; export it as CSV")
 
 
-def _other_counts(records: Sequence[Record], columns: Sequence[Column]) -> list[Finding]:
-    """Tell of sensors whose counts are plainly coarser than declared: the noise floor would be too low."""
-    remarks = []
-    for column in columns:
+def _with_counts_as_seen(chosen: ColumnMap, records: Sequence[Record]) -> tuple[ColumnMap, list[Finding]]:
+    """Put counts in the place of declared ones that are plainly finer: the noise floor would be too low."""
+    remarks, columns = [], []
+    for column in chosen.columns:
         count = min(r.resolution_of(column.signal).quantum for r in records)
         if count > _COARSER * column.quantum > 0.0:
             unit = parse_unit(column.unit)
             seen, declared = (f"{each / unit.factor:.3g} {column.unit}" for each in (count, column.quantum))
-            text = f"moves in counts of {seen}, {declared} are declared: correct the quantum of the sensor"
+            text = f"moves in counts of {seen}, {declared} are declared: the former are used"
             remarks.append(Finding(f"column '{column.name}'", text))
-    return remarks
+            column = replace(column, quantum=count)
+        columns.append(column)
+    return replace(chosen, columns=tuple(columns)), remarks
 
 
 def _by_default(records: Sequence[Record]) -> Finding:
