@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 _file = click.Path(path_type=Path, dir_okay=False)
 _mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
 
+_OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
+"""Not every diagnosis writes these; one of an earlier run in the same folder would contradict the verdict."""
+
 
 @click.command()
 @deck_option
@@ -76,6 +79,8 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     run = DiagnosisRun(deck_name, str(records), date, command, version(), records_of_run(measured))
     verdict = replace(verdict, run=run)
     make_folder(out)
+    for left_over in _OF_THIS_RUN_ALONE:
+        (out / left_over).unlink(missing_ok=True)
     write_verdict(verdict, out)
     if verdict.experiment is not None:
         write_command(verdict.experiment, out / "next_record.csv")

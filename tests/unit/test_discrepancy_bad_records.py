@@ -95,6 +95,26 @@ def clipped(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
+    rig: Assembly, clean: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    records, out = tmp_path / "records", tmp_path / "out"
+    write_records(records, {"a": constant(clean.copy()), "b": clean})
+    write_deck(rig, tmp_path / "deck.toml")
+    out.mkdir()
+    for name in ("next_record.csv", "regeneration.json", "notes.txt"):
+        (out / name).write_text("earlier", encoding="utf8")
+    called = ["nlsdesign", "diagnose", "--deck", str(tmp_path / "deck.toml"), "--records", str(records)]
+    monkeypatch.setattr(sys, "argv", [*called, "--out", str(out)])
+    with pytest.raises(SystemExit) as leaving:
+        main()
+    assert leaving.value.code == 0
+    assert (out / "verdict.json").exists()
+    assert not (out / "next_record.csv").exists()
+    assert not (out / "regeneration.json").exists()
+    assert (out / "notes.txt").exists(), "what is not ours stays"
+
+
 def in_millinewton(rows: np.ndarray) -> np.ndarray:
     rows[:, FORCE] *= 1e3
     return rows
