@@ -26,11 +26,14 @@ class Calibration:
     ----------
     offset, distance, complete
         a, b and c of the module's formula.
+    most
+        No more is stated: so many cases cannot show that one in a hundred is wrong.
     """
 
     offset: float = 1.0
     distance: float = 1.05
     complete: float = 1.25
+    most: float = 0.99
 
     def probability(self, distance: float, *, complete: bool) -> float:
         """Return the probability that a name is right.
@@ -43,7 +46,7 @@ class Calibration:
             Whether nothing is left beyond the noise.
         """
         score = self.offset + self.distance * distance + self.complete * complete
-        return 1.0 / (1.0 + math.exp(-score))
+        return min(self.most, 1.0 / (1.0 + math.exp(-score)))
 
 
 CALIBRATION = Calibration()
