@@ -158,11 +158,8 @@ def _searched(
         return replace(outcome, last=closing, steps=(), complete=True)
     progress("letting go declared numbers at the end of their ranges")
     fewer = _with_fewer_effects(case, outcome)
-    if fewer is not None or outcome.complete:
+    if fewer is not None or outcome.complete or free is None:
         return fewer or outcome
-    free = with_numbers_let_go(case.comparison, base, case.criteria)
-    if free is None:
-        return outcome
     again = search(case.comparison, free, catalogue, case.criteria, progress)
     # Effects beside a wrong number are named only where nothing is left to be explained by something else.
     return again if again.complete and wrong_numbers(again.last) else outcome
