@@ -467,16 +467,27 @@ def choose(criteria: Criteria, before: Excesses, rivals: Sequence[Rival[T]], blo
     # Among what cannot be told apart the order of the catalogue decides, not the last digits of a fit.
     taken = alike.pop(next(reversed(alike)))
     unknown = [rival for rival in rivals if is_undecided(criteria, before, rival)]
-    if any(_leaves_far_less(criteria, rival, taken, block) for rival in unknown):
+    if any(imitates(criteria, taken, rival, block) for rival in unknown):
         return None
     return Choice(taken, tuple(alike.values()))
 
 
-def _leaves_far_less(criteria: Criteria, rival: Rival[T], taken: Rival[T], block: str) -> bool:
-    """Tell whether an effect whose numbers are not known explains far more than one that may be named.
+def imitates(criteria: Criteria, taken: Rival[T], other: Rival[T], block: str) -> bool:
+    """Tell whether an effect only imitates another, whose numbers are not known but that explains far more.
 
-    Then that one only imitates it: what it leaves shows that it is another.
+    What it leaves shows that it is the other one.
+
+    Parameters
+    ----------
+    criteria
+        Of the rule.
+    taken
+        Effect that may be named.
+    other
+        Effect that may not, because of its numbers alone.
+    block
+        Where something is lacking.
     """
-    here, there = ({block: each.excesses[block]} for each in (taken, rival))
-    less = criteria.richer * left_by(rival, block) < left_by(taken, block)
+    here, there = ({block: each.excesses[block]} for each in (taken, other))
+    less = criteria.richer * left_by(other, block) < left_by(taken, block)
     return less and is_more_than_noise(criteria, gain(here, there))

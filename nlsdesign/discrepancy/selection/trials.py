@@ -14,6 +14,7 @@ from .criteria import (
     Criteria,
     Rival,
     choose,
+    imitates,
     is_undecided,
     objections,
     objections_of_numbers,
@@ -280,11 +281,16 @@ class Trials:
         block
             Where something is lacking.
         """
-        left = dict(tried)
+        left, unknown = dict(tried), list[Rival[Hypothesis]]()
         while step := self._chosen(before, left, block):
-            if self.predicts_records(present, step.chosen) and self._stands_on_all(step.chosen):
+            rival = rival_of(step.chosen, left.pop(step.chosen))
+            if any(imitates(self.criteria, rival, each, block) for each in unknown):
+                return None
+            if not self.predicts_records(present, step.chosen):
+                continue
+            if self._stands_on_all(step.chosen):
                 return step
-            del left[step.chosen]
+            unknown.append(rival)
         return None
 
     def _stands_on_all(self, chosen: Hypothesis) -> bool:
