@@ -70,7 +70,7 @@ class GradualSaturation(DriveFault):
 
     At u_s the effort is π/4 = 79 % of the ideal one, and it approaches its limit π/2·u_s more slowly than
     :class:`CommandSaturation`; the gain is that of small commands. C∞. Valid for slow changes. Source:
-    Hanselman 2003 (saturation; the arctangent is a common curve of magnetisation).
+    Hanselman 2003 (saturation, arctangent as curve of magnetisation).
 
     Examples
     --------
