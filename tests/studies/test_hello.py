@@ -25,7 +25,8 @@ def test_the_study_keeps_its_claims(hello: tuple[Path, dict[str, float]]) -> Non
     out, results = hello
     assert set(results) == set(runner.claims("hello"))
     assert runner.not_as_claimed(results, runner.claims("hello")) == {}
-    assert "spring.cam.lever_arm" in (out / "report.html").read_text(encoding="utf8")
+    report = (out / "report.html").read_text(encoding="utf8")
+    assert "spring.cam.lever_arm" in report.replace("<wbr>", "")
 
 
 def test_it_fits_on_one_page(root: Path) -> None:

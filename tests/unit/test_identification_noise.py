@@ -43,9 +43,9 @@ def test_the_deviation_of_flicker_noise_is_told_from_rests_that_are_shorter_than
     assert np.median([noise.deviation(FORCE) ** 2 for noise in found]) == pytest.approx(true, rel=0.2)
     for noise in found:
         assert noise.evidence[FORCE] == "rest"
-        # Of each rest the last three quarters.
+        # Of each rest the last two thirds.
         assert len(noise.seen[FORCE]) == 7
-        assert noise.seen[FORCE] == pytest.approx((1.29,) * 7, abs=0.02)
+        assert noise.seen[FORCE] == pytest.approx((1.144,) * 7, abs=0.02)
 
 
 def floors_with(parts: tuple[NoisePart, ...]) -> dict[str, Floor]:

@@ -162,7 +162,10 @@ def _quiet(record: Record, motions: Mapping[str, float]) -> tuple[list[slice], l
 
 
 def _rests(counts: Sequence[Array]) -> list[slice]:
-    """Return the stretches in which no motion leaves its count by more than one, without their begin."""
+    """Return the stretches in which no motion leaves its count by more than one, without their first third.
+
+    There rubber still creeps, which would be taken for slow noise.
+    """
     n = len(counts[0])
     least = max(_LEAST_SAMPLES, n // _MOST_STRETCHES)
     result, first = [], 0
@@ -172,7 +175,7 @@ def _rests(counts: Sequence[Array]) -> list[slice]:
             for each in counts
         )
         if behind - first >= least:
-            result.append(slice(first + (behind - first) // 4, behind))
+            result.append(slice(first + (behind - first) // 3, behind))
             first = behind
         else:
             # What has moved on since this sample is not at rest at any sample before it left either.
