@@ -16,6 +16,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.effects.candidate import Candidate, Unknown
 from nlsdesign.discrepancy.fitting.unpredictable import Tally
 from nlsdesign.discrepancy.screening.other_rig import numbers_explain, other_numbers
+from nlsdesign.discrepancy.screening.wrong_numbers import with_numbers_let_go
 from nlsdesign.discrepancy.selection.comparison import Comparison
 from nlsdesign.discrepancy.selection.criteria import Criteria
 from nlsdesign.discrepancy.selection.excess import excesses
@@ -248,3 +249,25 @@ def test_numbers_must_explain_98_percent_and_twice_what_effects_do() -> None:
     assert explain(left=24.0)
     assert not explain(after=4.0)
     assert explain(after=4.0, named=False)
+
+
+# --- a wrong number -------------------------------------------------------------------------------
+
+
+def let_go(base: Hypothesis, free: Fit, left: float) -> Hypothesis | None:
+    class Released(Freed):
+        def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
+            done = super().polished(hypothesis, released=released)
+            return replace(done, assembly=hypothesis.assembly, released=frozenset(released))
+
+    return with_numbers_let_go(cast(Comparison, Released(free, left)), base, RULE)
+
+
+def test_numbers_at_their_ends_are_let_go_only_where_something_is_left() -> None:
+    assert let_go(refitted(101.0), FAR, 1.0) is not None
+    assert let_go(refitted(1.3), FAR, 0.5) is None, "no block is open, whatever other numbers gain"
+    inside = refitted(101.0, fitted(spring_stiffness=1.1, wheel_inertia=1.1))
+    assert let_go(inside, FAR, 1.0) is None, "no number stands at its end"
+    assert let_go(refitted(101.0), FAR, 60.0) is None, "it explains less than half"
+    near = fitted(spring_stiffness=1.2**1.9, wheel_inertia=1.0)
+    assert let_go(refitted(101.0), near, 1.0) is None, "the number ends inside twice its range"

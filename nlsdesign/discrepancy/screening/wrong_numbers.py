@@ -12,7 +12,7 @@ import math
 from ...errors import ConvergenceError
 from ...quantity import with_unit
 from ..selection.comparison import Comparison
-from ..selection.criteria import Criteria, is_more_than_noise, objections_of_numbers
+from ..selection.criteria import Criteria, is_complete, is_more_than_noise, objections_of_numbers
 from ..selection.excess import excesses
 from ..selection.hypothesis import Hypothesis
 from ..selection.measures import DECLARED, Excesses, gain
@@ -36,25 +36,24 @@ def with_numbers_let_go(
     comparison
         Evaluates hypotheses.
     hypothesis
-        Fitted to all samples, with or without effects, with a block that is open.
+        Fitted to all samples, with or without effects.
     criteria
         Of the decision.
 
     Returns
     -------
     Hypothesis or None
-        Refitted; nothing where no number stands at its end, where letting go explains less than an effect
-        would have to, or where the numbers end near their declared ranges.
+        Refitted; nothing where no block is open or no number stands at its end, where letting go explains
+        less than an effect would have to, or where the numbers end near their declared ranges.
     """
-    stuck = stuck_numbers(hypothesis)
-    if not stuck:
+    stuck, every = stuck_numbers(hypothesis), excesses(hypothesis, comparison.bench, criteria)
+    if not stuck or is_complete(every):
         return None
     try:
         free = comparison.polished(hypothesis, released=stuck)
     except ConvergenceError:
         return None
-    before = _blocks(excesses(hypothesis, comparison.bench, criteria))
-    after = _blocks(excesses(free, comparison.bench, criteria))
+    before, after = _blocks(every), _blocks(excesses(free, comparison.bench, criteria))
     left, now = (sum(e.excess for e in each.values()) for each in (before, after))
     if now > (1.0 - criteria.least_share) * left or not is_more_than_noise(criteria, gain(before, after)):
         return None
