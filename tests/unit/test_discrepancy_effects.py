@@ -15,10 +15,13 @@ from nlsdesign.components import (
     ForceSensor,
     GearedMotor,
     Inertia,
+    LossHeat,
     SampleAndHold,
+    SelfHeating,
     Spring,
     TorqueSensor,
     TransportDelay,
+    WorkHeat,
     parallel,
     tie,
 )
@@ -354,3 +357,17 @@ def test_a_second_effect_keeps_the_numbers_of_the_first(first: Effect, rig: Asse
                 rows = (u.name.partition("[")[0] for u in one.unknowns)
                 names = {moved.get(row, row) for row in rows}
                 assert names <= numbers, f"{one.effect}, then {two.effect}"
+
+
+def test_rubber_may_grow_warm_by_all_work_or_by_its_loss_and_soften_in_part_or_as_a_whole(
+    rig: Assembly,
+) -> None:
+    """What heats and what softens is not known beforehand: one name, three forms."""
+    heats = []
+    for candidate in self_heating(rig):
+        where = candidate.unknowns[0].name.rpartition(".")[0]
+        warm = candidate.assembly.element(where)
+        assert isinstance(warm, SelfHeating)
+        share = warm.heat.relaxing_share.number if isinstance(warm.heat, LossHeat) else None
+        heats.append((type(warm.heat), share))
+    assert sorted(heats, key=str) == sorted([(WorkHeat, None), (LossHeat, 0.0), (LossHeat, 1.0)], key=str)
