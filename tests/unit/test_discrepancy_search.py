@@ -411,3 +411,15 @@ def test_a_simpler_form_takes_its_place_once_the_other_effects_are_named() -> No
     assert names(outcome(Table(left), *effects)) == ["plain", "b"]
     left["b", "plain"] = (9e3,)
     assert names(outcome(Table(left), *effects)) == ["rich", "b"], "much more is left"
+
+
+def test_an_effect_that_has_no_response_on_all_samples_leaves_the_search_to_others() -> None:
+    class Ending(Table):
+        def polished(self, hypothesis: Hypothesis) -> Hypothesis:
+            if "a" in hypothesis.names:
+                raise ConvergenceError("fit", "has no response", next_step="give up")
+            return super().polished(hypothesis)
+
+    found = outcome(Ending({(): (1e5,), ("a",): (1e3,), ("b",): (1.9e3,)}), effect("a"), effect("b"))
+    assert names(found) == ["b"]
+    assert "a at motor: on all samples has no response" in map(str, found.skipped)

@@ -79,7 +79,7 @@ def other_numbers(
     try:
         free = comparison.polished(base, released=positive_numbers(base))
     except ConvergenceError:
-        return OtherNumbers("", False)
+        return OtherNumbers("", False)  # numbers without a response explain nothing: they are none of a rig
     left, far = _left(free, comparison.bench, criteria), _far_numbers(free, base)
     share = 1.0 - left / before
     if far and numbers_explain(share, left=left, after=after, before=before, named=better is not base):

@@ -52,7 +52,7 @@ def with_numbers_let_go(
     try:
         free = comparison.polished(hypothesis, released=stuck)
     except ConvergenceError:
-        return None
+        return None  # numbers without a response explain nothing; the hypothesis stays as it is
     before, after = _blocks(every), _blocks(excesses(free, comparison.bench, criteria))
     left, now = (sum(e.excess for e in each.values()) for each in (before, after))
     if now > (1.0 - criteria.least_share) * left or not is_more_than_noise(criteria, gain(before, after)):

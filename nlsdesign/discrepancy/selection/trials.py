@@ -296,8 +296,11 @@ class Trials:
     def _stands_on_all(self, chosen: Hypothesis) -> bool:
         """Tell whether the numbers of the newest effect stand when they are fitted to all samples."""
         newest = chosen.newest
-        fits = self.comparison.polished(chosen).fits.values()
-        why = objections_of_numbers(self.criteria, standing_of(newest.unknowns, fits))
+        try:
+            fits = self.comparison.polished(chosen).fits.values()
+            why = objections_of_numbers(self.criteria, standing_of(newest.unknowns, fits))
+        except ConvergenceError as error:
+            why = [error.rule]  # it cannot be named, but others may
         if why:
             reason = f"on all samples {'; '.join(why)}"
             self.skipped.append(Skipped(newest.effect, newest.location, chosen.names[:-1], reason))

@@ -124,7 +124,7 @@ def _name_and_unit(head: str) -> tuple[str, str | None]:
     try:
         parse_unit(unit)
     except UnitError:
-        return head, None
+        return head, None  # brackets that hold no unit belong to the name
     return name, unit
 
 
