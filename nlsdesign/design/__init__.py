@@ -1,12 +1,9 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
-from .cam_drawing import fingerprint, write_drawings
-from .contour import CamFit, cam_from_profile, contour_of_cam
-from .energy import CamProfile, energy_profile
-from .equilibrium import ElasticLaw, elastic_law, equilibrium_torque
-from .geometry import Contour, contour_from_curvature, contour_from_lever_arm
-from .goals import Goal, LeastRubber, SmoothContour, TorqueError
-from .limits import (
+from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
+from .drawing.cam_drawing import fingerprint, write_drawings
+from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
+from .optimisation.limits import (
     AnchorDistance,
     AreaRange,
     Limit,
@@ -20,9 +17,12 @@ from .limits import (
     PretensionRange,
     RestLengthRange,
 )
-from .result import CamDesign, LimitState, Sensitivity, TorqueCheck
-from .solve import design_cam, torque_check, torque_sensitivity
-from .target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
+from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .optimisation.solve import design_cam, torque_check, torque_sensitivity
+from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
+from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
+from .statics.energy import CamProfile, energy_profile
+from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
 
 __all__ = [
     "AnchorDistance",

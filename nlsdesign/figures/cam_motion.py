@@ -12,7 +12,7 @@ from matplotlib.patches import Arc
 from numpy.typing import NDArray
 
 from ..design import Contour, elastic_law
-from ..design.geometry import turn
+from ..design.statics.contour import turn
 from ..errors import ValueRangeError
 from ..model import FlatModel
 from .style import (

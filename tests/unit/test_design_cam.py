@@ -22,8 +22,8 @@ from nlsdesign.design import (
     TorqueError,
     design_cam,
     equilibrium_torque,
-    program,
 )
+from nlsdesign.design.optimisation import program
 from nlsdesign.errors import (
     ArrangementError,
     ConvergenceError,

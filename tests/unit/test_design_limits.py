@@ -25,8 +25,8 @@ from nlsdesign.design import (
     RestLengthRange,
     design_cam,
 )
-from nlsdesign.design.conflict import row_of
-from nlsdesign.design.problem import design_problem
+from nlsdesign.design.optimisation.conflict import row_of
+from nlsdesign.design.optimisation.problem import design_problem
 from nlsdesign.errors import ArrangementError, UnitError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.quantity import quantity

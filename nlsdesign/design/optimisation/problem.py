@@ -21,16 +21,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InfeasibleError, ValueRangeError, unknown_name
-from ..model import FlatModel, Variable
-from ..model.structure import CamNames
-from ..symbolic import Expression
-from .contour import contour_of_cam, two_sided
+from ...errors import InfeasibleError, ValueRangeError, unknown_name
+from ...model import FlatModel, Variable
+from ...model.structure import CamNames
+from ...symbolic import Expression
+from ..curves.target import Target
+from ..statics.declared_cam import contour_of_cam, two_sided
+from ..statics.energy import closed_form
+from ..statics.equilibrium import ElasticLaw, cam_function, elastic_law
 from .design_point import DesignPoint, anchor_of
-from .energy import closed_form
-from .equilibrium import ElasticLaw, cam_function, elastic_law
 from .program import Rows
-from .target import Target
 
 Floats = NDArray[np.float64]
 

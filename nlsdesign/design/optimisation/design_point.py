@@ -8,10 +8,10 @@ from typing import Literal
 
 import casadi as ca
 
-from ..errors import ArrangementError
-from ..model.structure import CamNames
-from ..symbolic import Expression
-from .target import Target
+from ...errors import ArrangementError
+from ...model.structure import CamNames
+from ...symbolic import Expression
+from ..curves.target import Target
 
 
 def anchor_of(cam: CamNames) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..errors import UnitError, ValueRangeError
-from ..quantity import Quantity, degrees, same_dimension, with_unit
+from ...errors import UnitError, ValueRangeError
+from ...quantity import Quantity, degrees, same_dimension, with_unit
 
 _SLIPS = {"m": (("mm", 1e-3), ("cm", 1e-2)), "m^2": (("mm^2", 1e-6), ("cm^2", 1e-4)), "Pa": (("MPa", 1e6),)}
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..errors import ValueRangeError
-from ..quantity import Quantity, parse_unit, typeset_unit, with_unit
-from ..symbolic import Expression
+from ...errors import ValueRangeError
+from ...quantity import Quantity, parse_unit, typeset_unit, with_unit
+from ...symbolic import Expression
+from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint, anchor_of
-from .numbers import in_si, plain
 
 
 @dataclass(frozen=True, eq=False)

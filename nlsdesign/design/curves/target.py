@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator, PPoly
 
-from ..errors import ValueRangeError
-from ..quantity import Quantity
-from ..symbolic import Expression
+from ...errors import ValueRangeError
+from ...quantity import Quantity
+from ...symbolic import Expression
 from .numbers import in_si, plain
 
 Floats = NDArray[np.float64]

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components.assembly.named_parts import Assembly
-from ..errors import InfeasibleError, ValueRangeError
-from ..model import flatten
+from ...components.assembly.named_parts import Assembly
+from ...errors import InfeasibleError, ValueRangeError
+from ...model import flatten
+from ..curves.target import Target
 from .equilibrium import ElasticLaw, elastic_law
-from .target import Target
 
 Floats = NDArray[np.float64]
 

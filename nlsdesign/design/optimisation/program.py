@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..symbolic import Expression
+from ...symbolic import Expression
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InfeasibleError
+from ...errors import ConvergenceError, InfeasibleError
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Program, Rows

@@ -10,23 +10,23 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components.assembly.named_parts import Assembly
-from ..errors import ConvergenceError
-from ..model import FlatModel, flatten
-from ..model.roles import series_cam, series_spring
-from ..quantity import Quantity, significant
+from ...components.assembly.named_parts import Assembly
+from ...errors import ConvergenceError
+from ...model import FlatModel, flatten
+from ...model.roles import series_cam, series_spring
+from ...quantity import Quantity, significant
+from ..curves.target import Target
+from ..statics.contour import Contour, contour_from_curvature
+from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
+from ..statics.equilibrium import torque_function
+from ..statics.rounding import has_corners
 from .conflict import feasible_point, row_of
-from .contour import CamFit, cam_from_profile, contour_of_cam
 from .design_point import anchor_of
-from .equilibrium import torque_function
-from .geometry import Contour, contour_from_curvature
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Bound, Limit
 from .problem import DesignProblem, contour_names, design_problem
 from .program import Program, Solution
 from .result import CamDesign, LimitState, Sensitivity, TorqueCheck
-from .rounding import has_corners
-from .target import Target
 
 Floats = NDArray[np.float64]
 

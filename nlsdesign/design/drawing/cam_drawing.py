@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..quantity import Quantity
-from ..writing import write_text
-from .geometry import Contour, turn
+from ...quantity import Quantity
+from ...writing import write_text
+from ..statics.contour import Contour, turn
 
 Floats = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import ArrangementError, ConvergenceError
-from ..model import FlatModel, Variable
-from ..model.roles import series_cam, series_spring
-from ..model.structure import CamNames
-from ..symbolic import Expression, depends
+from ...errors import ArrangementError, ConvergenceError
+from ...model import FlatModel, Variable
+from ...model.roles import series_cam, series_spring
+from ...model.structure import CamNames
+from ...symbolic import Expression, depends
 from .rounding import rounded
 
 _NEWTON_STEPS = 30

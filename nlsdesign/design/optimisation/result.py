@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components.assembly.named_parts import Assembly
-from ..quantity import Quantity, parse_unit, with_unit
-from .cam_drawing import fingerprint
-from .geometry import Contour
-from .target import Target
+from ...components.assembly.named_parts import Assembly
+from ...quantity import Quantity, parse_unit, with_unit
+from ..curves.target import Target
+from ..drawing.cam_drawing import fingerprint
+from ..statics.contour import Contour
 
 Floats = NDArray[np.float64]
 

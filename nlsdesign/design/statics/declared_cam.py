@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from ..components.transmission.cam import TwoSidedCam
-from ..errors import ArrangementError, ValueRangeError
-from ..quantity import Quantity, significant
-from .geometry import Contour, contour_from_lever_arm
+from ...components.transmission.cam import TwoSidedCam
+from ...errors import ArrangementError, ValueRangeError
+from ...quantity import Quantity, significant
+from .contour import Contour, contour_from_lever_arm
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..symbolic import Expression
+from ...symbolic import Expression
 from .design_point import DesignPoint
 
 _LENGTH = 0.01
