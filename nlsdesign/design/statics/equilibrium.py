@@ -247,23 +247,26 @@ def _at_rest(
     symbols = model.symbols()
     names = [v.name for v in model.signals]
     movable = ca.vertcat(symbols.state, symbols.input)
-    handle = _handle(symbols.signal[names.index(motion)], movable, motion)
+    handle, slope = _handle(symbols.signal[names.index(motion)], movable, motion)
     inner = [i for i, v in enumerate(model.states) if v.name in states]
-    angle = movable[handle]
+    angle = ca.SX.sym("angle")
     others = ca.vertcat(*[movable[i] for i in range(movable.shape[0]) if i not in (handle, *inner)])
     both = ca.vertcat(symbols.signal, symbols.derivative)
-    both = ca.substitute(both, others, ca.SX.zeros(others.shape))
+    old, new = ca.vertcat(others, movable[handle]), ca.vertcat(ca.SX.zeros(others.shape), angle / slope)
+    both = ca.substitute(both, old, new)
     at_rest = ca.vertcat(*[symbols.state[i] for i in inner])
     rates = ca.vertcat(*[both[len(names) + i] for i in inner])
     signals = ca.substitute(both[: len(names)], at_rest, _resting_states(ca.SX(rates), ca.SX(at_rest)))
     return dict(zip(names, ca.vertsplit(signals), strict=True)), angle, symbols.parameter
 
 
-def _handle(angle: Expression, movable: Expression, motion: str) -> int:
-    slopes = ca.jacobian(angle, movable)
-    for i in range(movable.shape[0]):
-        if ca.is_equal(slopes[i], ca.SX(1)):
-            return i
+def _handle(angle: Expression, movable: Expression, motion: str) -> tuple[int, Expression]:
+    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio)."""
+    slopes = ca.SX(ca.jacobian(angle, movable))
+    places = [i for i in range(movable.shape[0]) if not slopes[i].is_zero()]
+    places.sort(key=lambda i: not ca.is_equal(slopes[i], ca.SX(1)))
+    if places and not depends(slopes[places[0]], movable):
+        return places[0], slopes[places[0]]
     raise ArrangementError(
         f"'{motion}'", "is neither a state nor an input of the model",
         next_step="tie the spring between one body that moves and one that rests",
