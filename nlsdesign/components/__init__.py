@@ -11,6 +11,7 @@ from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, parallel
 from .core.part import Part
+from .core.part_numbers import NotDeclared
 from .core.series import Series, series
 from .core.springs import LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
@@ -30,7 +31,7 @@ from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.rate_independent import SlidingFillers
 from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
 from .materials.smooth_hysteresis import BoucWen
-from .materials.specimen import Specimen, specimen
+from .materials.specimen import Area, Specimen, Strength, Strip, specimen
 from .materials.springpot import Springpot
 from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
@@ -64,7 +65,7 @@ from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
 from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
-from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
+from .transmission.cam import Cable, Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
 from .transmission.cam_error import CamWithProfileError
 from .transmission.cam_shapes import AnchoredCam, OneSidedCam
@@ -77,6 +78,7 @@ __all__ = [
     "ROTATION",
     "TRANSLATION",
     "AnchoredCam",
+    "Area",
     "ArrheniusShift",
     "ArrudaBoyce",
     "Assembly",
@@ -85,6 +87,7 @@ __all__ = [
     "Body",
     "BoucWen",
     "Buckling",
+    "Cable",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
@@ -140,6 +143,7 @@ __all__ = [
     "MassOnArm",
     "Material",
     "NeoHooke",
+    "NotDeclared",
     "Ogden",
     "OgdenRoxburgh",
     "OneSidedCam",
@@ -170,9 +174,11 @@ __all__ = [
     "Spring",
     "Springpot",
     "StrainStiffening",
+    "Strength",
     "StressSoftening",
     "StretchyCable",
     "StribeckFriction",
+    "Strip",
     "Tachometer",
     "Through",
     "Tie",

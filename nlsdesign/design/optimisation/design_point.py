@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -113,9 +114,9 @@ class DesignPoint:
                 f"has no specimen behind its cam, so it has no {field.replace('_', ' ')}",
                 next_step="leave this limit out, or declare the rubber with specimen(...)",
             )
-        names = [
-            piece.area if field == "area" else piece.rest_length
+        rows = [
+            piece.section if field == "area" else (piece.rest_length,)
             for piece in self.cam.specimens
             if piece.name in self.strains
         ]
-        return {name: self.parameters[name] for name in names}
+        return {" * ".join(row): math.prod((self.parameters[n] for n in row), start=ca.SX(1)) for row in rows}

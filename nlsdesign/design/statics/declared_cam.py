@@ -124,6 +124,7 @@ def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, 
         changeover=like.changeover,
         anchor_distance=like.anchor_distance,
         elements=like.elements,
+        cable=like.cable,
     )
     return CamFit(cam, error)
 
