@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from .assembly.deck_reader import component_classes
 from .assembly.named_parts import Assembly, assembly
+from .assembly.other_rubber import with_rubber
 from .assembly.renamed import renamed
 from .assembly.smooth_form import smoothed
 from .core.contacts import Regularised, Rounded, Sharp
@@ -13,13 +14,14 @@ from .core.element import Element, Parallel, parallel
 from .core.part import Part
 from .core.part_numbers import NotDeclared
 from .core.series import Series, series
-from .core.springs import LinearElastic, Spring, StrainStiffening
+from .core.springs import FittedRange, LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
+from .materials.material_law import MaterialLaw, law_of, material_laws, rubber_of
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,
@@ -114,6 +116,7 @@ __all__ = [
     "Encoder",
     "EndStop",
     "ExtendedTube",
+    "FittedRange",
     "Fixed",
     "FlowingChains",
     "Following",
@@ -142,6 +145,7 @@ __all__ = [
     "Mass",
     "MassOnArm",
     "Material",
+    "MaterialLaw",
     "NeoHooke",
     "NotDeclared",
     "Ogden",
@@ -204,17 +208,21 @@ __all__ = [
     "control_values",
     "generalised_maxwell",
     "kelvin_voigt",
+    "law_of",
     "material",
+    "material_laws",
     "materials",
     "maxwell",
     "parallel",
     "pull_only",
+    "rubber_of",
     "series",
     "smoothed",
     "specimen",
     "standard_linear_solid",
     "through",
     "tie",
+    "with_rubber",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take any misspelt name for a part

@@ -189,7 +189,9 @@ def line(name: str, value: float, unit: str) -> str:
         ),
         (line("area", 1, "cm^2") + line("tensile_strength", 5, "MPa"), "needs 'elongation_at_break'"),
         (
-            line("area", 1, "cm^2") + line("tensile_strenght", 5, "MPa") + line("elongation_at_break", 5, "1"),
+            line("area", 1, "cm^2")
+            + line("tensile_strenght", 5, "MPa")
+            + line("elongation_at_break", 5, "1"),
             "did you mean 'tensile_strength'",
         ),
         (line("area", 20, "m^2"), "was 'mm^2' meant? 20 mm² is in the range"),
