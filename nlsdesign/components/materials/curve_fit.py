@@ -95,8 +95,8 @@ def _yeoh(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[Fitt
     if len(strain) < _MOST:
         return
     columns = _yeoh_columns(strain)
-    found, *_ = np.linalg.lstsq(columns / stress[:, None], np.ones(len(stress)), rcond=None)
-    constants = _short(np.asarray(found, dtype=float))
+    solution, *_ = np.linalg.lstsq(columns / stress[:, None], np.ones(len(stress)), rcond=None)
+    constants = _short(np.asarray(solution, dtype=float))
     rising = np.diff(_yeoh_columns(np.linspace(0.0, strain[-1], _DENSE)) @ constants)
     if constants[0] > 0.0 and np.all(rising > 0.0):
         c1, c2, c3 = (_constant((float(c),), "Pa", like, row=False) for c in constants)

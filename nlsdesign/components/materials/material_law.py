@@ -120,7 +120,9 @@ def law_of(material: Material, *, using: str | None = None) -> MaterialLaw:
     if not chosen.name.startswith(_CURVE):
         return MaterialLaw(material, chosen.name, _from_constants(material, chosen), strength)
     fit = fit_curve(
-        chosen.conditions["strain"].values, chosen.quantity.values, like=_told(material, chosen, "fitted to ")
+        chosen.conditions["strain"].values,
+        chosen.quantity.values,
+        like=_cited(material, chosen, "fitted to "),
     )
     return MaterialLaw(material, chosen.name, (("stiff", fit.law),), strength, fit.rms_error, fit.worst_error)
 
@@ -182,7 +184,7 @@ def _gives_law(material: Material, known: Property) -> bool:
     return known.name.startswith(_GAUSS) and known.evidence != "range"
 
 
-def _told(material: Material, known: Property, how: str = "") -> Quantity:
+def _cited(material: Material, known: Property, how: str = "") -> Quantity:
     """Return what is known, with a source that says of which rubber and from which property."""
     return replace(known.quantity, source=f"{how}{material.name}, {known.name}: {known.quantity.source}")
 
@@ -193,27 +195,27 @@ def _from_constants(material: Material, known: Property) -> tuple[tuple[str, Ele
     law: FittedLaw
     if known.name.startswith(_OGDEN):
         exponents = material[known.name.replace("moduli", "exponents")]
-        law = Ogden(moduli=_told(material, known), exponents=_told(material, exponents))
+        law = Ogden(moduli=_cited(material, known), exponents=_cited(material, exponents))
     else:
-        law = NeoHooke(shear_modulus=_told(material, known))
+        law = NeoHooke(shear_modulus=_cited(material, known))
     return (("stiff", law),)
 
 
 def _engaging(material: Material, known: Property) -> tuple[tuple[str, Element], ...]:
     """Return moduli that engage, and the branch of the same publication: names that end alike."""
-    moduli, end = _told(material, known), known.name.removeprefix(_ENGAGING)
+    moduli, end = _cited(material, known), known.name.removeprefix(_ENGAGING)
     strain = known.conditions["strain"]
     reach = f"largest_strain{end}"
     data: Reading = NotDeclared()
     if reach in material:
-        data = FittedRange(_told(material, material[reach]))
+        data = FittedRange(_cited(material, material[reach]))
     knots = replace(strain, source=moduli.source)
     members: tuple[tuple[str, Element], ...] = (
         ("stiff", StrainStiffening(modulus=moduli, knots=knots, data=data)),
     )
     names = f"relaxing_modulus{end}", f"viscosity{end}"
     if all(name in material for name in names):
-        modulus, viscosity = (_told(material, material[name]) for name in names)
+        modulus, viscosity = (_cited(material, material[name]) for name in names)
         spring, dashpot = LinearElastic(modulus=modulus), ViscousMaterial(viscosity=viscosity)
         members += (("relaxing", series(spring=spring, dashpot=dashpot)),)
     return members
@@ -222,9 +224,9 @@ def _engaging(material: Material, known: Property) -> tuple[tuple[str, Element],
 def _strength(material: Material) -> Reading:
     stress, strain = _ends_of_curves(material)
     if "ultimate_stress" in material:
-        stress = _told(material, material["ultimate_stress"])
+        stress = _cited(material, material["ultimate_stress"])
     if "ultimate_strain" in material:
-        strain = _told(material, material["ultimate_strain"])
+        strain = _cited(material, material["ultimate_strain"])
     if stress is None or strain is None:
         return NotDeclared()
     return Strength(tensile_strength=stress, elongation_at_break=strain)
@@ -236,9 +238,9 @@ def _ends_of_curves(material: Material) -> tuple[Quantity | None, Quantity | Non
     if not curves:
         return None, None
     furthest = max(curves, key=lambda p: p.conditions["strain"].values[-1])
-    told = _told(material, furthest, "assumed: at least this, for the curve goes on to it, ")
+    cited = _cited(material, furthest, "assumed: at least this, for the curve goes on to it, ")
     strain = furthest.conditions["strain"]
     return (
-        Quantity(furthest.quantity.values[-1], furthest.quantity.unit, told.source, told.spread),
-        Quantity(strain.values[-1], strain.unit, told.source),
+        Quantity(furthest.quantity.values[-1], furthest.quantity.unit, cited.source, cited.spread),
+        Quantity(strain.values[-1], strain.unit, cited.source),
     )
