@@ -117,6 +117,7 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
             changeover=self.part.changeover,
             anchor_distance=self.part.anchor_distance,
             elements=self.part.elements,
+            cable=self.part.cable,
         )
         return CamFit(cam, error)
 

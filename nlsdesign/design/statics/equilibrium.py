@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -150,7 +151,9 @@ def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
 
     force = cut(cam.force)
     strains = [cut(piece.strain) for piece in cam.specimens]
-    stresses = [cut(piece.force) / parameters[place[piece.area]] for piece in cam.specimens]
+    sections = [[parameters[place[name]] for name in piece.section] for piece in cam.specimens]
+    pieces = zip(cam.specimens, sections, strict=True)
+    stresses = [cut(piece.force) / math.prod(section) for piece, section in pieces]
     results = [force, ca.jacobian(force, extension), ca.vertcat(*strains), ca.vertcat(*stresses)]
     function = ca.Function("law", [extension, parameters], [ca.SX(e) for e in results])
     if not np.isfinite(float(function(1e-3, model.start(model.parameters))[0])):
