@@ -118,5 +118,7 @@ def test_contour_of_a_declared_cam_is_that_of_the_design(kind: str) -> None:
     again = contour_of_cam(found.actuator["spring.cam"], last_angle=found.target.last_angle, points=401)
     inside = slice(20, -5)
     arms = np.interp(again.angles[inside], found.contour.angles, found.contour.lever_arms)
-    assert again.lever_arms[inside] == pytest.approx(arms, abs=2e-6 + 1.1e-3 * np.gradient(arms).max())
+    # The law turns the contour back by the width of its change of sides or onset, at most 1 mrad.
+    steepest = float(np.gradient(arms, again.angles[inside]).max())
+    assert again.lever_arms[inside] == pytest.approx(arms, abs=2e-6 + 1e-3 * steepest)
     assert isinstance(found, CamDesign)
