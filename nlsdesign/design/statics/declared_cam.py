@@ -167,8 +167,9 @@ class _Anchored(DeclaredCam[AnchoredCam]):
 
         directions = np.linspace(0.0, end, max(points, 1001))
         reached = directions - np.arcsin(support(directions) / anchor)
-        # The change of sides turns the contour back by its width, so that much more of the angle is covered.
-        covered = float(reached[-1]) + self.part.changeover.number
+        # The change of sides turns the contour back by its width, so that much more of the angle is covered;
+        # what a fit of the end point is off by is far less than that width.
+        covered = float(reached[-1]) + 1.1 * self.part.changeover.number
         last = min(_end(covered, last_angle), float(reached[-1]))
         directions = np.linspace(0.0, float(np.interp(last, reached, directions)), points)
         p = support(directions)
