@@ -2,6 +2,7 @@
 
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
@@ -14,13 +15,16 @@ from .optimisation.limits import (
     MaximumStress,
     MaximumTorqueError,
     MinimumRadiusOfCurvature,
+    NumberRange,
     PositiveStiffness,
     PretensionRange,
     RestLengthRange,
 )
+from .optimisation.limits_of_use import OverTravel
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
-from .optimisation.solve import design_cam, torque_check, torque_sensitivity
+from .optimisation.solve import design_cam
+from .optimisation.stock import Choice, RubberStock, Stock
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
@@ -32,6 +36,7 @@ __all__ = [
     "CamDesign",
     "CamFit",
     "CamProfile",
+    "Choice",
     "Contour",
     "DesignSettings",
     "ElasticLaw",
@@ -46,12 +51,16 @@ __all__ = [
     "MaximumStress",
     "MaximumTorqueError",
     "MinimumRadiusOfCurvature",
+    "NumberRange",
+    "OverTravel",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
     "RestLengthRange",
+    "RubberStock",
     "Sensitivity",
     "SmoothContour",
+    "Stock",
     "TabulatedTorque",
     "Target",
     "TorqueCheck",

@@ -72,6 +72,8 @@ class DesignPoint:
         All parameters of the flat model by name; symbols where they are free.
     element
         What one element does at an extension in m.
+    shown_units
+        Unit in which each parameter is shown.
     """
 
     cam: CamNames
@@ -90,6 +92,7 @@ class DesignPoint:
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
+    shown_units: Mapping[str, str]
 
     @property
     def elements(self) -> Expression:

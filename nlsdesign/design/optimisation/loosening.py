@@ -207,8 +207,7 @@ class Loosened:
             Of :meth:`least`.
         """
         values = self.open.problem.named(outcome.point[: self.count])
-        units = [self.open.question.model.variable(name).unit for name in names]
-        shown = tuple({"m": "mm", "m^2": "mm^2"}.get(unit, unit) for unit in units)
+        shown = tuple(self.open.problem.design.shown_units[name] for name in names)
         error = None
         if self.error is not None:
             mean_square = self.open.problem.design.mean_square_error

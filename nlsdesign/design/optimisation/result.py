@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,6 +164,29 @@ class StartOutcome:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """What became of one combination of a stock.
+
+    Parameters
+    ----------
+    choice
+        In words.
+    cost, rms
+        Sum of the goals and torque error in N·m; ``None`` where there is no design.
+    met
+        Whether it meets the target.
+    reason
+        Why not.
+    """
+
+    choice: str
+    cost: float | None
+    rms: float | None
+    met: bool
+    reason: str
+
+
+@dataclass(frozen=True)
 class Miss:
     """Why a design is not a success.
 
@@ -178,7 +201,7 @@ class Miss:
     binding
         Limits that the design sits on.
     remedies
-        What would help.
+        What would help; ``None`` where it was not looked for.
     advice
         The same as sentences.
     """
@@ -188,7 +211,7 @@ class Miss:
     worst_angle: float
     worst_error: float
     binding: tuple[str, ...]
-    remedies: Remedies
+    remedies: Remedies | None
     advice: tuple[str, ...]
 
     def __str__(self) -> str:
@@ -238,6 +261,8 @@ class CamDesign:
         Why the design is no success; ``None`` if it is one.
     remarks
         What a designer should know besides.
+    alternatives
+        All combinations of the stock that was offered.
     """
 
     target: Target
@@ -255,7 +280,8 @@ class CamDesign:
     taken: int
     valleys: tuple[Valley, ...] = ()
     miss: Miss | None = None
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -337,6 +363,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         ("solver", f"{design.starts[design.taken].iterations} iterations{fit}"),
         ("fingerprint", design.fingerprint),
     ]
+    rows += [("stock", _alternative(design, each)) for each in design.alternatives]
     rows += [("remark", remark) for remark in design.remarks]
     inside = design.within_tolerance
     return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
@@ -351,6 +378,13 @@ def _starts(design: CamDesign) -> str:
         return text + "; no second one to compare with"
     ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
     return text + f"; the next best has {ratio:.4g} times the cost, {1e3 * others[0].rms:.3g} mN·m rms"
+
+
+def _alternative(design: CamDesign, each: Alternative) -> str:
+    if each.rms is None:
+        return f"{each.choice}: no design, {each.reason}"
+    share = 100.0 * each.rms / design.target.largest
+    return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}" + ("" if each.met else ", a miss")
 
 
 def _cost(outcome: StartOutcome) -> float:

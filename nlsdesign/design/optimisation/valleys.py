@@ -122,5 +122,4 @@ def _valley(
     search: Search, name: str, ends: Sequence[dict[str, float] | None], value: float, allowed: float
 ) -> Valley:
     lowest, highest = (None if end is None else end[name] for end in ends)
-    unit = search.question.model.variable(name).unit
-    return Valley(name, lowest, highest, value, {"m": "mm", "m^2": "mm^2"}.get(unit, unit), allowed)
+    return Valley(name, lowest, highest, value, search.problem.design.shown_units[name], allowed)
