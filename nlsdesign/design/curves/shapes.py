@@ -50,7 +50,7 @@ class PolynomialTorque(Target):
         )
         object.__setattr__(self, "coefficients", given)
         object.__setattr__(self, "angle", in_si("angle", self.angle, "rad", minimum=1e-3, maximum=6.3))
-        if not any(given):
+        if not any(each != 0.0 for each in given):
             raise ValueRangeError(
                 f"PolynomialTorque of {len(given)} coefficients", "is zero everywhere",
                 next_step="give c1, c2, ... in N*m/rad, N*m/rad^2, ...",
@@ -67,7 +67,8 @@ class PolynomialTorque(Target):
         """Return where torque per angle is least, and the torque there."""
         per_angle = np.polynomial.Polynomial(self.coefficients)
         flat = per_angle.deriv().roots()
-        inner = [float(r.real) for r in flat if abs(r.imag) < 1e-9 and 0.0 < r.real < self.last_angle]
+        real = np.real(flat[np.abs(np.imag(flat)) < 1e-9])
+        inner = [float(each) for each in real if 0.0 < float(each) < self.last_angle]
         at = min((0.0, self.last_angle, *inner), key=lambda angle: float(per_angle(angle)))
         # At zero the torque is zero whatever its slope; a little beyond it has the sign of that slope.
         beside = at or 1e-6 * self.last_angle
@@ -249,6 +250,7 @@ class TorqueBand:
         angle, torque
             Of one shape, in rad and N·m.
         """
-        low, high = (np.interp(angle, self.angles, edge) for edge in (self.lower, self.upper))
-        inside: NDArray[np.bool_] = (low <= np.asarray(torque)) & (np.asarray(torque) <= high)
+        at, given = np.asarray(angle, dtype=float), np.asarray(torque, dtype=float)
+        low, high = (np.interp(at, self.angles, edge) for edge in (self.lower, self.upper))
+        inside: NDArray[np.bool_] = (low <= given) & (given <= high)
         return inside

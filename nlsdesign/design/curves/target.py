@@ -64,7 +64,7 @@ class Target(ABC):
         angle
             Numbers of any shape in rad.
         """
-        return _over(self.weight_law, np.asarray(angle, dtype=float))
+        return np.asarray(_over(self.weight_law, np.asarray(angle, dtype=float)))
 
     @overload
     def torque(self, angle: Expression) -> Expression: ...
