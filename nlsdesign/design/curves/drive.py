@@ -299,12 +299,13 @@ def _deflections(spring: Target, size: Floats) -> tuple[Floats, Floats, Floats]:
     torque = spring.torque_law(angle)
     slope = ca.gradient(torque, angle)
     law = ca.Function("spring", [angle], [torque, slope, ca.gradient(slope, angle)]).map(len(size))
-    low, high = np.zeros_like(size), np.full_like(size, spring.last_angle)
-    for _ in range(60):  # halves the bracket, to below the resolution of a double
-        middle = 0.5 * (low + high)
-        below = np.array(law(middle)[0]).ravel() < size
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    at: Floats = 0.5 * (low + high)
+    grid = np.linspace(0.0, spring.last_angle, 2001)
+    known = spring.torque(grid)
+    cell = np.clip(np.searchsorted(known, size) - 1, 0, len(grid) - 2)
+    at: Floats = np.interp(size, known, grid)
+    for _ in range(8):  # Newton within the cell of the grid; a cell that it would leave is closed at its edge
+        value, rise = (np.array(each).ravel() for each in law(at)[:2])
+        at = np.clip(at - (value - size) / np.maximum(rise, 1e-300), grid[cell], grid[cell + 1])
     stiffness, stiffening = (np.array(each).ravel() for each in law(at)[1:])
     if not np.all(stiffness > 0.0):
         worst = float(np.degrees(at[int(np.argmin(stiffness))]))

@@ -11,7 +11,7 @@ from typing import overload
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator, PPoly
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
 from ...errors import ValueRangeError
 from ...quantity import Quantity
@@ -251,6 +251,8 @@ class TabulatedTorque(Target):
     weights
         Of the error at each point, see :meth:`Target.weight_law`; straight between them. Empty for one
         everywhere.
+    slopes
+        Stiffness at each point in N·m/rad, where it is known; empty for the monotone cubic.
 
     Raises
     ------
@@ -261,6 +263,7 @@ class TabulatedTorque(Target):
     angles: tuple[float, ...]
     torques: tuple[float, ...]
     weights: tuple[float, ...] = ()
+    slopes: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -269,6 +272,9 @@ class TabulatedTorque(Target):
         points = table_of_curve("target table", "torque", self.angles, self.torques)
         if points[1, 0] != 0.0 or np.any(points[1] < 0.0):
             raise ValueRangeError("target table", "torques must start at zero and be nowhere negative")
+        if self.slopes:
+            object.__setattr__(self, "slopes", tuple(float(item) for item in self.slopes))
+            table_of_curve("target table", "slope", self.angles, self.slopes)
         if self.weights:
             object.__setattr__(self, "weights", tuple(float(item) for item in self.weights))
             weights = table_of_curve("target table", "weight", self.angles, self.weights)[1]
@@ -278,17 +284,23 @@ class TabulatedTorque(Target):
                 )
 
     @property
+    def _curve(self) -> PPoly:
+        if self.slopes:
+            return CubicHermiteSpline(self.angles, self.torques, self.slopes)
+        return PchipInterpolator(self.angles, self.torques)
+
+    @property
     def last_angle(self) -> float:
         """The last angle of the table."""
         return self.angles[-1]
 
     def torque_law(self, angle: Expression) -> Expression:
         """Return the interpolated torque."""
-        return piecewise(PchipInterpolator(self.angles, self.torques), angle)
+        return piecewise(self._curve, angle)
 
     def energy_law(self, angle: Expression) -> Expression:
         """Return the exact integral of the interpolation."""
-        return piecewise(PchipInterpolator(self.angles, self.torques).antiderivative(), angle)
+        return piecewise(self._curve.antiderivative(), angle)
 
     def weight_law(self, angle: Expression) -> Expression:
         """Return the weight, straight between the points."""

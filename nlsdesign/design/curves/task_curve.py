@@ -22,8 +22,10 @@ Floats = NDArray[np.float64]
 
 _RIGID = 0.01
 """Deflection in rad under the largest torque below which a spring counts as rigid."""
-_POINTS = 81
-"""Points of the table of the curve."""
+_POINTS = 4
+"""Points of the table of the curve for each piece of the compliance."""
+_RATIO, _HALVINGS = 1.5, 8
+"""Between two points the stiffness changes by this factor at most; else there are points between them."""
 
 
 class TaskGoal(ABC):
@@ -56,7 +58,7 @@ class LeastEnergy(TaskGoal):
 
 @dataclass(frozen=True)
 class LeastPeakPower(TaskGoal):
-    """Least peak power at the motor shaft in W. Not convex: the best of three local optima, without a bound."""
+    """Least peak power at the motor shaft in W. Not convex: the best of three local optima, unproved."""
 
     def best(self, program: TaskProgram) -> TaskOptimum:
         """Return the best local optimum."""
@@ -124,7 +126,7 @@ class TaskCurve:
     linear_stiffness
         Of the best linear spring in N·m/rad.
     bound
-        Below which no spring of this symmetry gets, in the unit of the goal; ``None`` where nothing is proved.
+        Below which no spring of this symmetry gets, in the unit of the goal; ``None`` if nothing is proved.
     two_branch
         The goal with a spring whose directions differ; what an odd or one-sided one cannot have.
     """
@@ -258,8 +260,6 @@ def curve_for_task(task: Task, drive: MotorAndGear, problem: TaskProblem | None 
     ------
     InfeasibleError
         If no spring keeps the limits, with the amounts; or if the spring has no influence on the motor.
-    ConvergenceError
-        If no start ends (least peak power).
     ValueRangeError
         If the task has no torque.
 
@@ -304,13 +304,24 @@ def _branches(program: TaskProgram, unknowns: Floats) -> tuple[TabulatedTorque, 
     """Return the curve for positive and for negative torque, each as a table from zero."""
     tables = []
     for most in (program.spline.high, program.spline.low):
-        # Without torque in this direction it stays a short straight line, which nothing asks for.
-        end = most if most != 0.0 else _RIGID * float(np.max(np.abs(program.cycle.torque)))
-        torque = np.linspace(0.0, end, _POINTS)
-        deflection = program.spline.matrices(torque)[0] @ program.coefficients(unknowns)
-        if most == 0.0:
-            deflection = program.floor * torque
-        tables.append(TabulatedTorque(angles=tuple(np.abs(deflection)), torques=tuple(np.abs(torque))))
+        if most == 0.0:  # no torque in this direction: a short line as stiff as allowed, which nothing uses
+            angles = np.linspace(0.0, _RIGID, 3)
+            tables.append(TabulatedTorque(angles=tuple(angles), torques=tuple(angles / program.floor)))
+            continue
+        along = np.unique(program.spline.knots * np.sign(most))
+        knots = np.concatenate([[0.0], along[along > 1e-9 * abs(most)]])
+        torque = np.interp(np.arange(_POINTS * (len(knots) - 1) + 1) / _POINTS, np.arange(len(knots)), knots)
+        for _ in range(_HALVINGS):
+            compliance = program.spline.matrices(np.sign(most) * torque)[1] @ program.coefficients(unknowns)
+            steep = np.abs(np.diff(np.log(compliance))) > np.log(_RATIO)
+            torque = np.sort(np.append(torque, 0.5 * (torque[:-1] + torque[1:])[steep]))
+        matrices = program.spline.matrices(np.sign(most) * torque)
+        deflection, compliance = (each @ program.coefficients(unknowns) for each in matrices[:2])
+        tables.append(
+            TabulatedTorque(
+                angles=tuple(np.abs(deflection)), torques=tuple(torque), slopes=tuple(1.0 / compliance)
+            )
+        )
     return tables[0], tables[1]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
-from ...errors import ConvergenceError, InfeasibleError
+from ...errors import InfeasibleError
 from .compliance import ComplianceSpline
 from .drive import MotorAndGear, MotorCycle, driven_cycle, motion_through
 from .numbers import plain
@@ -258,9 +258,8 @@ def conflict(program: TaskProgram) -> InfeasibleError:
             bounds=[(floor, None)] * size + [(0.0, None)],
         )
         if found.status == 0 and found.x[-1] > 1.0 + 1e-7:
-            missed.append(
-                f"{each.name} {each.largest:.4g} {each.unit} would have to be {found.x[-1] * each.largest:.4g}"
-            )
+            needed = f"{found.x[-1] * each.largest:.4g}"
+            missed.append(f"{each.name} {each.largest:.4g} {each.unit} would have to be {needed}")
     named = "; ".join(missed) or "each alone can be kept, together they cannot: " + ", ".join(
         r.name for r in rows
     )
@@ -274,7 +273,8 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     """Return a spring with small peak power at the motor shaft; a local optimum, the problem is not convex.
 
     Without the inertia of the motor it is convex (linear). From that spring, from the one of least energy and
-    from the best linear one an interior-point method goes down to the nearest optimum; the best is taken.
+    from the linear one of least peak power a sequence of linear programs goes down, each within a region in
+    which the tangents of the power were found to hold; the best end is taken.
 
     Parameters
     ----------
@@ -285,61 +285,66 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     ------
     InfeasibleError
         If the limits contradict each other.
-    ConvergenceError
-        If no start ends.
     """
-    start = least_energy(program).unknowns
-    straight = np.full(len(start), float(least_energy(program.linear()).unknowns[0]))
-    unit = max(float(np.mean(start)), program.floor)
-    limits = program.limits()
-    rows = {name: (m[::_THIN], o[::_THIN]) for name, (m, o) in program.affine().items()}
-    y = ca.MX.sym("y", len(start) + 1)
-    torque, speed = (ca.DM(m) @ (unit * y[:-1]) + ca.DM(o) for m, o in (rows["torque"], rows["speed"]))
-    scale = program.motor(start).peak_power
-    power = torque * speed / scale
-    kept = [(ca.DM(each.matrix) @ (unit * y[:-1]) + ca.DM(each.offset)) / each.largest for each in limits]
-    inside: Any = {"x": y, "f": y[-1], "g": ca.vertcat(power - y[-1], -power - y[-1], *kept)}
-    sides = 2 * power.shape[0], sum(len(each.offset) for each in limits)
-    solver = ca.nlpsol("least_peak_power", "ipopt", inside, {**_QUIET, "ipopt.max_iter": 300})
-    ended = []
-    for first in (start, _without_inertia(program, start), straight):
-        found = solver(
-            x0=np.append(first / unit, program.motor(first).peak_power / scale),
-            lbx=np.append(np.full(len(start), program.floor / unit), 0.0),
-            lbg=np.repeat([-np.inf, -1.0], sides),
-            ubg=np.repeat([0.0, 1.0], sides),
-        )
-        if solver.stats()["success"]:
-            ended.append(np.maximum(np.array(found["x"]).ravel()[:-1] * unit, program.floor))
-    if not ended:
-        raise ConvergenceError(
-            "spring of least peak power", "no start ended", next_step="use fewer pieces, or LeastEnergy()"
-        )
-    return TaskOptimum(min(ended, key=lambda each: program.motor(each).peak_power), None)
+    energetic = least_energy(program).unknowns
+    starts = [energetic, _without_inertia(program, energetic)]
+    if len(energetic) > 1:
+        starts.append(np.full(len(energetic), float(least_peak_power(program.linear()).unknowns[0])))
+    starts = [each for each in starts if _kept(program.limits(), each)]
+    ends = starts + [_descended(program, each) for each in starts]
+    return TaskOptimum(min(ends, key=lambda each: program.motor(each).peak_power), None)
+
+
+_STEPS = 60
+"""Largest number of linear programs from one start."""
+
+
+def _kept(limits: tuple[LimitRows, ...], unknowns: Floats) -> bool:
+    return all(np.max(np.abs(e.offset + e.matrix @ unknowns)) <= e.largest * (1.0 + 1e-6) for e in limits)
+
+
+def _descended(program: TaskProgram, start: Floats) -> Floats:
+    """Return where linear programs lead from a start: nowhere is the peak power larger than before."""
+    rows, limits = program.affine(), program.limits()
+    (a, b), (c, d) = ((m[::2], o[::2]) for m, o in (rows["torque"], rows["speed"]))
+    best, reach = start, 0.5 * float(np.max(start))
+    for _ in range(_STEPS):
+        torque, speed = a @ best + b, c @ best + d
+        peak = float(np.max(np.abs(torque * speed)))
+        slope = a * speed[:, None] + c * torque[:, None]
+        inside = np.maximum(best - reach, program.floor), best + reach
+        found = _least_largest(slope, torque * speed - slope @ best, limits, inside)
+        promised = peak - float(np.max(np.abs(torque * speed + slope @ (found - best))))
+        if promised <= 1e-6 * peak or reach < 1e-9 * float(np.max(start)):
+            break
+        gained = peak - float(np.max(np.abs((a @ found + b) * (c @ found + d))))
+        best = found if gained > 0.0 else best
+        reach *= 2.0 if gained > 0.75 * promised else 0.5 if gained < 0.25 * promised else 1.0
+    return best
+
+
+def _least_largest(
+    matrix: Floats, offset: Floats, limits: tuple[LimitRows, ...], inside: tuple[Floats, Floats]
+) -> Floats:
+    """Return y with the least maximum of abs(matrix·y + offset) in limits and bounds; else their middle."""
+    blocks = [(matrix, offset, -1.0, 0.0), *((e.matrix, e.offset, 0.0, e.largest) for e in limits)]
+    sides = [(sign, block) for sign in (1.0, -1.0) for block in blocks]
+    found = linprog(
+        np.append(np.zeros(matrix.shape[1]), 1.0),
+        A_ub=np.vstack([np.column_stack([sign * m, np.full(len(o), p)]) for sign, (m, o, p, _) in sides]),
+        b_ub=np.concatenate([room - sign * o for sign, (_, o, _, room) in sides]),
+        bounds=[*zip(*inside, strict=True), (0.0, None)],
+    )
+    return np.asarray(found.x[:-1]) if found.status == 0 else 0.5 * (inside[0] + inside[1])
 
 
 def _without_inertia(program: TaskProgram, otherwise: Floats) -> Floats:
     """Return the spring of least peak power of a motor without inertia: a linear program."""
     light = replace(program, drive=replace(program.drive, inertia=0.0, output_inertia=0.0, damping=0.0))
     rows = light.affine()
-    torque, (matrix, offset) = rows["torque"][1], rows["speed"]
-    limits = light.limits()
-    matrix, offset = torque[:, None] * matrix, torque * offset
-    column, none = -np.ones((len(torque), 1)), [np.zeros((len(each.offset), 1)) for each in limits]
-    sides = [
-        np.hstack([sign * m, c])
-        for sign in (1.0, -1.0)
-        for m, c in [(matrix, column), *zip((e.matrix for e in limits), none, strict=True)]
-    ]
-    right = [
-        room - sign * o
-        for sign in (1.0, -1.0)
-        for o, room in [(offset, 0.0), *((e.offset, e.largest) for e in limits)]
-    ]
-    found = linprog(
-        np.append(np.zeros(matrix.shape[1]), 1.0),
-        A_ub=np.vstack(sides),
-        b_ub=np.concatenate(right),
-        bounds=[(program.floor, None)] * matrix.shape[1] + [(0.0, None)],
+    torque, (matrix, offset) = rows["torque"][1][::_THIN], rows["speed"]
+    bounds = np.full(len(otherwise), program.floor), np.full(len(otherwise), np.inf)
+    found = _least_largest(
+        torque[:, None] * matrix[::_THIN], torque * offset[::_THIN], light.limits(), bounds
     )
-    return np.asarray(found.x[:-1]) if found.status == 0 else otherwise
+    return found if np.all(np.isfinite(found)) else otherwise
