@@ -1,7 +1,7 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
 from .curves.compliance import OddSpring, OneSidedSpring, SpringSymmetry, TwoBranchSpring
-from .curves.drive import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
+from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.shapes import PolynomialTorque, TabulatedStiffness, TorqueBand
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
 from .curves.target_files import read_band, read_target

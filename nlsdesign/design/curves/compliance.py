@@ -13,6 +13,9 @@ from .task import TaskCycle
 
 Floats = NDArray[np.float64]
 
+_MARGIN = 1.001
+"""The range goes a thousandth beyond the largest sampled torque, which a finer sampling may pass a little."""
+
 
 @dataclass(frozen=True, eq=False)
 class ComplianceSpline:
@@ -76,7 +79,7 @@ class OddSpring(SpringSymmetry):
 
     def spline(self, cycle: TaskCycle, pieces: int) -> ComplianceSpline:
         """Return the spline over ± the largest torque."""
-        most = float(np.max(np.abs(cycle.torque)))
+        most = _MARGIN * float(np.max(np.abs(cycle.torque)))
         return ComplianceSpline(-most, most, pieces + pieces % 2)
 
     def freedom(self, spline: ComplianceSpline, floor: float) -> tuple[Floats, Floats]:
@@ -119,7 +122,7 @@ class TwoBranchSpring(SpringSymmetry):
 
 def _with_knot_at_zero(cycle: TaskCycle, pieces: int) -> ComplianceSpline:
     """Return equal pieces over the torques, with zero at a knot; the range grows to a whole piece."""
-    low, high = min(float(np.min(cycle.torque)), 0.0), max(float(np.max(cycle.torque)), 0.0)
+    low, high = (_MARGIN * each for each in (min(*cycle.torque, 0.0), max(*cycle.torque, 0.0)))
     width = (high - low) / pieces
     below, above = int(np.ceil(-low / width - 1e-9)), int(np.ceil(high / width - 1e-9))
     return ComplianceSpline(-below * width, above * width, below + above)

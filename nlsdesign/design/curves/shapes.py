@@ -53,7 +53,7 @@ class PolynomialTorque(Target):
         if not any(each != 0.0 for each in given):
             raise ValueRangeError(
                 f"PolynomialTorque of {len(given)} coefficients", "is zero everywhere",
-                next_step="give c1, c2, ... in N*m/rad, N*m/rad^2, ...",
+                next_step="give c₁, c₂, … in N·m/rad, N·m/rad², …",
             )  # fmt: skip
         at, lowest = self._lowest()
         if lowest < 0.0:

@@ -181,7 +181,7 @@ class Task:
         time = self._period * np.arange(count) / count
         basis = [self._basis(time, derivative) for derivative in range(3)]
         angle, torque = (self._coefficients(column) for column in self._columns[1:])
-        (a, b, c), (d, e, f) = ([each @ found for each in basis] for found in (angle, torque))
+        (a, b, c), (d, e, f) = ([each @ solution for each in basis] for solution in (angle, torque))
         return TaskCycle(time, a, b, c, d, e, f, self._period)
 
     @property

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InfeasibleError, NlsError, ValueRangeError
 from ...quantity import Quantity, with_unit
 from .compliance import OddSpring, SpringSymmetry, TwoBranchSpring
-from .drive import MotorAndGear, MotorCycle, motor_cycle
+from .motor_and_gear import MotorAndGear, MotorCycle, motor_cycle
 from .numbers import in_si, plain
 from .target import TabulatedTorque
 from .task import Task
@@ -122,24 +122,26 @@ class TaskCurve:
         What was made small.
     rigid, linear, best
         The motor over a period: rigidly coupled, with the best linear spring, and with the curve as it stands
-        in ``target`` and ``opposite``. The rigid drive need not keep the limits.
+        in ``target`` and ``opposite``. The rigid drive need not keep the limits; ``linear`` is ``None`` where
+        no linear spring does.
     linear_stiffness
-        Of the best linear spring in N·m/rad.
+        Of the best linear spring in N·m/rad, ``None`` where there is none.
     bound
         Below which no spring of this symmetry gets, in the unit of the goal; ``None`` if nothing is proved.
     two_branch
-        The goal with a spring whose directions differ; what an odd or one-sided one cannot have.
+        The goal with a spring whose directions differ; what an odd or one-sided one cannot have. ``None``
+        where it was not found.
     """
 
     target: TabulatedTorque
     opposite: TabulatedTorque | None
     goal: TaskGoal
     rigid: MotorCycle
-    linear: MotorCycle
+    linear: MotorCycle | None
     best: MotorCycle
-    linear_stiffness: float
+    linear_stiffness: float | None
     bound: float | None
-    two_branch: float
+    two_branch: float | None
 
     @property
     def gap(self) -> float | None:
@@ -152,37 +154,38 @@ class TaskCurve:
         """Return a table: what, rigid, best linear spring, this curve."""
         cycles = (self.rigid, self.linear, self.best)
 
-        def row(name: str, values: Sequence[float], unit: str) -> tuple[str, str, str, str]:
-            a, b, c = (with_unit(f"{value:.4g}", unit) for value in values)
+        def row(name: str, unit: str, value: Callable[[MotorCycle], float]) -> tuple[str, str, str, str]:
+            a, b, c = (with_unit(f"{value(each):.4g}", unit) if each else "none" for each in cycles)
             return name, a, b, c
 
-        peaks = [each.peaks for each in cycles]
         return [
-            row("Joule heat per period", [each.heat for each in cycles], "J"),
-            row("heat and work per period", [each.energy for each in cycles], "J"),
-            row("peak power of the motor", [each.peak_power for each in cycles], "W"),
-            row("peak current", [each["current"] for each in peaks], "A"),
-            row("peak voltage", [each["voltage"] for each in peaks], "V"),
-            row("peak motor speed", [each["speed"] for each in peaks], "rad/s"),
-            row("peak deflection", [float(np.degrees(each["deflection"])) for each in peaks], "deg"),
+            row("Joule heat per period", "J", lambda motor: motor.heat),
+            row("heat and work per period", "J", lambda motor: motor.energy),
+            row("peak power of the motor", "W", lambda motor: motor.peak_power),
+            row("peak current", "A", lambda motor: motor.peaks["current"]),
+            row("peak voltage", "V", lambda motor: motor.peaks["voltage"]),
+            row("peak motor speed", "rad/s", lambda motor: motor.peaks["speed"]),
+            row("peak deflection", "deg", lambda motor: float(np.degrees(motor.peaks["deflection"]))),
         ]
 
     def __str__(self) -> str:
         unit = "J" if isinstance(self.goal, LeastEnergy) else "W"
-        lines = [f"{name}: rigid {a}, linear {b}, curve {c}" for name, a, b, c in self.rows()]
-        stiffness = with_unit(f"{self.linear_stiffness:.4g}", "N*m/rad")
+
+        def shown(value: float | None, unit: str) -> str:
+            return "none keeps the limits" if value is None else with_unit(f"{value:.4g}", unit)
+
         proof = (
             "no bound is proved: the problem is not convex"
             if self.bound is None
-            else f"no spring of this kind gets below {with_unit(f'{self.bound:.4g}', unit)}"
+            else f"no spring of this kind gets below {shown(self.bound, unit)}"
         )
-        other = with_unit(f"{self.two_branch:.4g}", unit)
+        lines = [f"{name}: rigid {a}, linear {b}, curve {c}" for name, a, b, c in self.rows()]
         return "\n".join(
             [
                 *lines,
-                f"best linear spring: {stiffness}",
+                f"best linear spring: {shown(self.linear_stiffness, 'N*m/rad')}",
                 proof,
-                f"with a curve of its own in each direction: {other}",
+                f"with a curve of its own in each direction: {shown(self.two_branch, unit)}",
             ]
         )
 
@@ -206,7 +209,7 @@ class TaskProblem:
     goal: TaskGoal = field(default_factory=LeastEnergy)
     symmetry: SpringSymmetry = field(default_factory=OddSpring)
     limits: SpringLimits = field(default_factory=SpringLimits)
-    pieces: int = 32
+    pieces: int = 48
 
     def program(self, task: Task, drive: MotorAndGear) -> TaskProgram:
         """Return the program.
@@ -268,36 +271,35 @@ def curve_for_task(task: Task, drive: MotorAndGear, problem: TaskProblem | None 
     >>> from nlsdesign.design import walking_task
     >>> motor = MotorAndGear(inertia=1.4e-5, torque_constant=0.03, resistance=0.3, gear_ratio=60.0)
     >>> curve = curve_for_task(walking_task("ankle", body_mass=75.0).scaled(0.05), motor)
-    >>> curve.best.energy < curve.linear.energy < curve.rigid.energy
+    >>> curve.best.heat < 0.4 * curve.rigid.heat
     True
     """
     problem = problem or TaskProblem()
     program = problem.program(task, drive)
-    found = problem.goal.best(program)
-    straight = program.linear()
-    best_linear = problem.goal.best(straight)
-    target, opposite = _branches(program, found.unknowns)
+    solution = problem.goal.best(program)
+    target, opposite = _branches(program, solution.unknowns)
     odd = isinstance(problem.symmetry, OddSpring)
+    straight = _best_or_none(problem.goal, program.linear())
+    wider = replace(problem, symmetry=TwoBranchSpring()).program(task, drive)
+    any_spring = _best_or_none(problem.goal, wider)
     return TaskCurve(
         target=target,
         opposite=None if odd else opposite,
         goal=problem.goal,
         rigid=motor_cycle(task, drive),
-        linear=straight.motor(best_linear.unknowns),
+        linear=program.linear().motor(straight.unknowns) if straight else None,
         best=motor_cycle(task, drive, spring=target, opposite=None if odd else opposite),
-        linear_stiffness=1.0 / float(best_linear.unknowns[0]),
-        bound=found.bound,
-        two_branch=_two_branch(task, drive, problem),
+        linear_stiffness=1.0 / float(straight.unknowns[0]) if straight else None,
+        bound=solution.bound,
+        two_branch=problem.goal.of(wider.motor(any_spring.unknowns)) if any_spring else None,
     )
 
 
-def _two_branch(task: Task, drive: MotorAndGear, problem: TaskProblem) -> float:
-    """Return the goal where each direction has a curve of its own."""
-    wider = TaskProblem(
-        goal=problem.goal, symmetry=TwoBranchSpring(), limits=problem.limits, pieces=problem.pieces
-    )
-    program = wider.program(task, drive)
-    return problem.goal.of(program.motor(problem.goal.best(program).unknowns))
+def _best_or_none(goal: TaskGoal, program: TaskProgram) -> TaskOptimum | None:
+    try:
+        return goal.best(program)
+    except InfeasibleError:  # the curve keeps the limits and this comparison does not: there is none to show
+        return None
 
 
 def _branches(program: TaskProgram, unknowns: Floats) -> tuple[TabulatedTorque, TabulatedTorque]:
@@ -332,10 +334,12 @@ def scan_gear_ratio(
 
     Parameters
     ----------
-    task, drive, problem
+    task, drive
         As for :func:`curve_for_task`.
     ratios
         Motor turns per turn of the output.
+    problem
+        As for :func:`curve_for_task`.
     """
     curves: dict[float, TaskCurve | NlsError] = {}
     for ratio in ratios:

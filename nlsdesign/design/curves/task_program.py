@@ -18,7 +18,7 @@ from scipy.optimize import linprog, nnls
 
 from ...errors import InfeasibleError
 from .compliance import ComplianceSpline
-from .drive import MotorAndGear, MotorCycle, driven_cycle, motion_through
+from .motor_and_gear import MotorAndGear, MotorCycle, driven_cycle, motion_through
 from .numbers import plain
 from .task import TaskCycle
 
@@ -205,11 +205,11 @@ def least_energy(program: TaskProgram) -> TaskOptimum:
         "g": ca.DM(matrix * unit) @ y + ca.DM(offset),
     }
     solver = ca.nlpsol("least_energy", "ipopt", inside, {**_QUIET, **_QUADRATIC})
-    found = solver(x0=program.floor / unit, lbx=program.floor / unit, lbg=-1.0, ubg=1.0)
+    solution = solver(x0=program.floor / unit, lbx=program.floor / unit, lbg=-1.0, ubg=1.0)
     if not solver.stats()["success"]:
         raise conflict(program)
-    unknowns = np.maximum(np.array(found["x"]).ravel() * unit, program.floor)
-    prices = np.array(found["lam_g"]).ravel() * scale
+    unknowns = np.maximum(np.array(solution["x"]).ravel() * unit, program.floor)
+    prices = np.array(solution["lam_g"]).ravel() * scale
     paid = float(np.sum(np.abs(prices)) - prices @ offset) if len(prices) else 0.0
     slope = gradient + (matrix.T @ prices if len(prices) else 0.0)
     return TaskOptimum(unknowns, _lowest(hessian, slope, program.floor) - paid + constant)
@@ -251,14 +251,14 @@ def conflict(program: TaskProgram) -> InfeasibleError:
     for each in rows:
         count, size = each.matrix.shape
         column = np.full((count, 1), -each.largest)
-        found = linprog(
+        solution = linprog(
             np.append(np.zeros(size), 1.0),
             A_ub=np.vstack([np.hstack([each.matrix, column]), np.hstack([-each.matrix, column])]),
             b_ub=np.concatenate([-each.offset, each.offset]),
             bounds=[(floor, None)] * size + [(0.0, None)],
         )
-        if found.status == 0 and found.x[-1] > 1.0 + 1e-7:
-            needed = f"{found.x[-1] * each.largest:.4g}"
+        if solution.status == 0 and solution.x[-1] > 1.0 + 1e-7:
+            needed = f"{solution.x[-1] * each.largest:.4g}"
             missed.append(f"{each.name} {each.largest:.4g} {each.unit} would have to be {needed}")
     named = "; ".join(missed) or "each alone can be kept, together they cannot: " + ", ".join(
         r.name for r in rows
@@ -274,7 +274,7 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
 
     Without the inertia of the motor it is convex (linear). From that spring, from the one of least energy and
     from the linear one of least peak power a sequence of linear programs goes down, each within a region in
-    which the tangents of the power were found to hold; the best end is taken.
+    which the tangents of the power proved to hold; the best end is taken.
 
     Parameters
     ----------
@@ -289,10 +289,17 @@ def least_peak_power(program: TaskProgram) -> TaskOptimum:
     energetic = least_energy(program).unknowns
     starts = [energetic, _without_inertia(program, energetic)]
     if len(energetic) > 1:
-        starts.append(np.full(len(energetic), float(least_peak_power(program.linear()).unknowns[0])))
+        starts += [np.full(len(energetic), each) for each in _linear_of_least_peak_power(program)]
     starts = [each for each in starts if _kept(program.limits(), each)]
     ends = starts + [_descended(program, each) for each in starts]
     return TaskOptimum(min(ends, key=lambda each: program.motor(each).peak_power), None)
+
+
+def _linear_of_least_peak_power(program: TaskProgram) -> list[float]:
+    try:
+        return [float(least_peak_power(program.linear()).unknowns[0])]
+    except InfeasibleError:  # no linear spring keeps the limits, so it is no start
+        return []
 
 
 _STEPS = 60
@@ -313,12 +320,12 @@ def _descended(program: TaskProgram, start: Floats) -> Floats:
         peak = float(np.max(np.abs(torque * speed)))
         slope = a * speed[:, None] + c * torque[:, None]
         inside = np.maximum(best - reach, program.floor), best + reach
-        found = _least_largest(slope, torque * speed - slope @ best, limits, inside)
-        promised = peak - float(np.max(np.abs(torque * speed + slope @ (found - best))))
+        solution = _least_largest(slope, torque * speed - slope @ best, limits, inside)
+        promised = peak - float(np.max(np.abs(torque * speed + slope @ (solution - best))))
         if promised <= 1e-6 * peak or reach < 1e-9 * float(np.max(start)):
             break
-        gained = peak - float(np.max(np.abs((a @ found + b) * (c @ found + d))))
-        best = found if gained > 0.0 else best
+        gained = peak - float(np.max(np.abs((a @ solution + b) * (c @ solution + d))))
+        best = solution if gained > 0.0 else best
         reach *= 2.0 if gained > 0.75 * promised else 0.5 if gained < 0.25 * promised else 1.0
     return best
 
@@ -329,13 +336,13 @@ def _least_largest(
     """Return y with the least maximum of abs(matrix·y + offset) in limits and bounds; else their middle."""
     blocks = [(matrix, offset, -1.0, 0.0), *((e.matrix, e.offset, 0.0, e.largest) for e in limits)]
     sides = [(sign, block) for sign in (1.0, -1.0) for block in blocks]
-    found = linprog(
+    solution = linprog(
         np.append(np.zeros(matrix.shape[1]), 1.0),
         A_ub=np.vstack([np.column_stack([sign * m, np.full(len(o), p)]) for sign, (m, o, p, _) in sides]),
         b_ub=np.concatenate([room - sign * o for sign, (_, o, _, room) in sides]),
         bounds=[*zip(*inside, strict=True), (0.0, None)],
     )
-    return np.asarray(found.x[:-1]) if found.status == 0 else 0.5 * (inside[0] + inside[1])
+    return np.asarray(solution.x[:-1]) if solution.status == 0 else 0.5 * (inside[0] + inside[1])
 
 
 def _without_inertia(program: TaskProgram, otherwise: Floats) -> Floats:
@@ -344,7 +351,7 @@ def _without_inertia(program: TaskProgram, otherwise: Floats) -> Floats:
     rows = light.affine()
     torque, (matrix, offset) = rows["torque"][1][::_THIN], rows["speed"]
     bounds = np.full(len(otherwise), program.floor), np.full(len(otherwise), np.inf)
-    found = _least_largest(
+    solution = _least_largest(
         torque[:, None] * matrix[::_THIN], torque * offset[::_THIN], light.limits(), bounds
     )
-    return found if np.all(np.isfinite(found)) else otherwise
+    return solution if np.all(np.isfinite(solution)) else otherwise

@@ -19,6 +19,9 @@ from .task import Task, TaskCycle
 
 Floats = NDArray[np.float64]
 
+_SOFTEST = 1e-3
+"""Share of the mean stiffness below which a spring cannot serve a task: the deflection would jump there."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MotorAndGear:
@@ -307,11 +310,13 @@ def _deflections(spring: Target, size: Floats) -> tuple[Floats, Floats, Floats]:
         value, rise = (np.array(each).ravel() for each in law(at)[:2])
         at = np.clip(at - (value - size) / np.maximum(rise, 1e-300), grid[cell], grid[cell + 1])
     stiffness, stiffening = (np.array(each).ravel() for each in law(at)[1:])
-    if not np.all(stiffness > 0.0):
-        worst = float(np.degrees(at[int(np.argmin(stiffness))]))
+    secant = np.diff(known) / np.diff(grid)
+    used = secant[np.min(cell) : np.max(cell) + 1]
+    if np.min(used) < _SOFTEST * most / spring.last_angle or not np.all(stiffness > 0.0):
+        worst = float(np.degrees(grid[np.min(cell) + int(np.argmin(used))]))
         raise InfeasibleError(
             f"{type(spring).__name__} at {worst:.3g}°",
-            "its stiffness is not positive, so the motor would jump",
+            "its stiffness is not positive, or next to zero, so the motor would jump",
             next_step="give the curve a positive slope from angle zero on",
         )
     return at, 1.0 / stiffness, -stiffening / stiffness**3
