@@ -1,6 +1,21 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
+from .curves.compliance import OddSpring, OneSidedSpring, SpringSymmetry, TwoBranchSpring
+from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
+from .curves.shapes import PolynomialTorque, TabulatedStiffness, TorqueBand
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
+from .curves.target_files import read_band, read_target
+from .curves.task import Task, TaskCycle, read_task, walking_task
+from .curves.task_curve import (
+    LeastEnergy,
+    LeastPeakPower,
+    SpringLimits,
+    TaskCurve,
+    TaskGoal,
+    TaskProblem,
+    curve_for_task,
+    scan_gear_ratio,
+)
 from .drawing.cam_drawing import fingerprint, write_drawings
 from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.defaults import safe_limits
@@ -42,6 +57,8 @@ __all__ = [
     "ElasticLaw",
     "ExponentialTorque",
     "Goal",
+    "LeastEnergy",
+    "LeastPeakPower",
     "LeastRubber",
     "Limit",
     "LimitState",
@@ -51,8 +68,13 @@ __all__ = [
     "MaximumStress",
     "MaximumTorqueError",
     "MinimumRadiusOfCurvature",
+    "MotorAndGear",
+    "MotorCycle",
     "NumberRange",
+    "OddSpring",
+    "OneSidedSpring",
     "OverTravel",
+    "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
@@ -60,22 +82,40 @@ __all__ = [
     "RubberStock",
     "Sensitivity",
     "SmoothContour",
+    "SpringLimits",
+    "SpringSymmetry",
     "Stock",
+    "TabulatedStiffness",
     "TabulatedTorque",
     "Target",
+    "Task",
+    "TaskCurve",
+    "TaskCycle",
+    "TaskGoal",
+    "TaskProblem",
+    "TorqueBand",
     "TorqueCheck",
     "TorqueError",
+    "TwoBranchSpring",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
+    "curve_for_task",
     "design_cam",
     "elastic_law",
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "motor_and_gear",
+    "motor_cycle",
+    "read_band",
+    "read_target",
+    "read_task",
     "safe_limits",
+    "scan_gear_ratio",
     "torque_check",
     "torque_sensitivity",
+    "walking_task",
     "write_drawings",
 ]

@@ -19,6 +19,7 @@ from .over_angle import observability_over_angle, observer_stability, stability_
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
+from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "closed_loop",
     "closed_loop_of",
     "compact",
+    "curve_of_task",
     "curves",
     "described",
     "gap_bars",
@@ -46,6 +48,7 @@ __all__ = [
     "inline_svg",
     "loop_area",
     "metric_note",
+    "motor_over_task",
     "observability_over_angle",
     "observer_error",
     "observer_stability",

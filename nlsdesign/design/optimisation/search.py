@@ -163,9 +163,9 @@ class Search:
             largest = np.maximum(largest, np.nan_to_num(found, nan=1.0, posinf=1.0).max(axis=0))
         idle = [v.name for v, size in zip(problem.scalars, largest, strict=True) if size < _NO_INFLUENCE]
         if idle:
-            others = [
-                name for name in movable_numbers(self.question.model, problem.law.cam) if name not in idle
-            ]
+            movable = movable_numbers(self.question.model, problem.law.cam)
+            behind = f"{problem.law.cam.drive}."
+            others = [name for name in movable if name not in idle and name.startswith(behind)]
             raise ValueRangeError(
                 "free: " + ", ".join(f"'{name}'" for name in idle),
                 "changes neither a goal nor a limit of this design, so any value of it would do",
