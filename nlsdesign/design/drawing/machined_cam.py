@@ -344,7 +344,7 @@ class MachinedTwoSidedCam(MachinedCam):
             raise ArrangementError(
                 f"hub bore of {numbers['hub_bore']}",
                 "would cut the channel of the cable, which runs through the axis",
-                next_step="give a groove_depth, so that the bore is in the base alone, or bolts without a bore",
+                next_step="give a groove_depth, or leave hub_bore out and take bolts",
             )
         if self.bolts is not None and self.groove_depth is None and self.bolts.count < 4:
             raise ArrangementError(
@@ -362,7 +362,9 @@ class MachinedTwoSidedCam(MachinedCam):
         if isinstance(self.cable_end, ClampScrew):
             size = plain(self.cable_end.diameter)
             away = numbers["channel_width"].number / 2 + plain(self.minimum_wall) + size / 2
-            holes += [Hole("clamp hole", np.array([0.0, side * away]), size) for side in (-1.0, 1.0)]
+            # Beside the bore in the base, which lies under them.
+            aside = plain(self.hub_bore) / 2 + plain(self.minimum_wall) + size / 2 if self.hub_bore else 0.0
+            holes += [Hole("clamp hole", side * np.array([-aside, away]), size) for side in (-1.0, 1.0)]
         beyond = 0.35 * float(contour.radii.max())
         half = _cable(contour, float(contour.angles[-1]), beyond)
         turned = np.vstack([-half[::-1], half])
