@@ -2,6 +2,15 @@
 
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .drawing.cam_part import CamPart, Hole
+from .drawing.machined_cam import (
+    BoltCircle,
+    ClampScrew,
+    FerruleSeat,
+    MachinedCam,
+    MachinedOneSidedCam,
+    MachinedTwoSidedCam,
+)
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -27,16 +36,24 @@ from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
 __all__ = [
     "AnchorDistance",
     "AreaRange",
+    "BoltCircle",
     "CamDesign",
     "CamFit",
+    "CamPart",
     "CamProfile",
+    "ClampScrew",
     "Contour",
     "ElasticLaw",
     "ExponentialTorque",
+    "FerruleSeat",
     "Goal",
+    "Hole",
     "LeastRubber",
     "Limit",
     "LimitState",
+    "MachinedCam",
+    "MachinedOneSidedCam",
+    "MachinedTwoSidedCam",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumStrain",
