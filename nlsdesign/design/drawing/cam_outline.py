@@ -121,7 +121,7 @@ def _back(circles: list[tuple[Floats, float]], first: float, last: float) -> Arc
         raise ArrangementError(
             f"body of radius {_MM * body[1]:.4g} mm",
             "has no convex back together with the ends of the edge",
-            next_step="take a smaller body_radius or over_travel, or a longer lead-in",
+            next_step="take a smaller over_travel or body_radius, or a shorter lead_in",
         )
     return joined(*(clockwise_arc(centre, size, first=a, last=b) for (centre, size), a, b in pieces))
 

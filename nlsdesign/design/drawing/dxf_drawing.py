@@ -127,7 +127,8 @@ def _text(document: Drawing) -> str:
     stream = io.StringIO()
     with _undated():
         document.write(stream)
-    return stream.getvalue()
+    # Other letters in the way of DXF, so that the file is ASCII and reads the same on every system.
+    return "".join(c if ord(c) < 128 else f"\\U+{ord(c):04X}" for c in stream.getvalue())
 
 
 def _rounded(value: float) -> float:

@@ -354,7 +354,7 @@ class MachinedTwoSidedCam(MachinedCam):
         numbers["channel_width"] = _derived(2 * radius + clearance, "cable diameter and clearance")
         numbers["mouth_width"] = _derived(2 * (radius - offset), "cable diameter: the lips guide the cable")
         numbers["channel_length"] = _derived(2 * float(contour.slopes[0]), "between the mouths")
-        self._body_radius(min(float(np.hypot(*lip.path.polygon().T).min()), lip.last_support), numbers)
+        self._body_radius(lip.last_support, numbers)
         outlines = list(two_sided_outlines(lip, numbers))
         holes = []
         if self.hub_bore is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import tempfile
 from pathlib import Path
@@ -14,6 +15,8 @@ from .arc_path import ArcPath
 from .cam_part import CamPart
 
 _MM = 1e3
+_PRODUCT = re.compile(r"PRODUCT\('[^']*','[^']*'")
+_USE = re.compile(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'")
 _STAMP = re.compile(r"(FILE_NAME\(\s*')[^']*('\s*,\s*')[^']*(')")
 
 
@@ -27,7 +30,7 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
     part
         The cam.
     name
-        Name of the product in the file, ASCII.
+        Name of the product in the file; what is neither letter nor digit becomes ``_``.
 
     Raises
     ------
@@ -36,6 +39,7 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
     ExportError
         If Open CASCADE makes no solid, or cannot write it.
     """
+    name = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
     try:
         from OCP.Interface import Interface_Static
         from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
@@ -45,7 +49,7 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
     _be_quiet()
     writer = STEPControl_Writer()
     for key, value in (("write.step.schema", "AP214IS"), ("write.step.unit", "MM"),
-                       ("write.step.product.name", name.encode("ascii", "replace").decode())):  # fmt: skip
+                       ("write.step.product.name", name)):  # fmt: skip
         Interface_Static.SetCVal_s(key, value)
     writer.Transfer(shape, STEPControl_AsIs)
     with tempfile.TemporaryDirectory() as folder:
@@ -54,7 +58,11 @@ def part_step(part: CamPart, *, name: str = "cam") -> str:
         if not file.is_file():
             raise ExportError("STEP", "Open CASCADE did not write it", next_step="take DXF or SVG instead")
         text = file.read_text(encoding="ascii", errors="replace")
-    return _STAMP.sub(rf"\g<1>{name}\g<2>2000-01-01T00:00:00\g<3>", text, count=1)
+    plain = _STAMP.sub(rf"\g<1>{name}\g<2>2000-01-01T00:00:00\g<3>", text, count=1)
+    # Open CASCADE counts the products and uses of a session.
+    plain = _PRODUCT.sub(f"PRODUCT('{name}','{name}'", plain)
+    number = itertools.count(1)
+    return _USE.sub(lambda _: f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{next(number)}'", plain)
 
 
 def _be_quiet() -> None:
