@@ -20,6 +20,7 @@ from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_erro
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
     "CamMotion",
@@ -28,7 +29,9 @@ __all__ = [
     "ClosedLoopRun",
     "Figure",
     "HeldOut",
+    "InspectionRow",
     "RecordError",
+    "TitleBlock",
     "alternative_text",
     "binned_errors",
     "cam_motion",
@@ -58,5 +61,6 @@ __all__ = [
     "torque_against_target",
     "torque_curve",
     "torque_loops",
+    "workshop_drawing",
     "write_figures",
 ]

@@ -336,8 +336,8 @@ REFUSED: dict[str, tuple[type[NlsError], str, Making]] = {
         lambda two, one: MachinedTwoSidedCam(cable_radius=CABLE, over_travel=math.radians(170)).part(two),
     ),
     "body": (
-        ValueRangeError, "body_radius 14 mm: stands out over the edge",
-        lambda two, one: MachinedTwoSidedCam(cable_radius=CABLE, body_radius=mm(14)).part(two),
+        ValueRangeError, "body_radius 20 mm: stands out over the edge",
+        lambda two, one: MachinedTwoSidedCam(cable_radius=CABLE, body_radius=mm(20)).part(two),
     ),
     "crossing": (
         ArrangementError, "edge of the cam: crosses itself at x = -5",
