@@ -17,6 +17,15 @@ from .curves.task_curve import (
     scan_gear_ratio,
 )
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .drawing.cam_part import CamPart, Hole
+from .drawing.machined_cam import (
+    BoltCircle,
+    ClampScrew,
+    FerruleSeat,
+    MachinedCam,
+    MachinedOneSidedCam,
+    MachinedTwoSidedCam,
+)
 from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
@@ -48,20 +57,28 @@ from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
 __all__ = [
     "AnchorDistance",
     "AreaRange",
+    "BoltCircle",
     "CamDesign",
     "CamFit",
+    "CamPart",
     "CamProfile",
     "Choice",
+    "ClampScrew",
     "Contour",
     "DesignSettings",
     "ElasticLaw",
     "ExponentialTorque",
+    "FerruleSeat",
     "Goal",
+    "Hole",
     "LeastEnergy",
     "LeastPeakPower",
     "LeastRubber",
     "Limit",
     "LimitState",
+    "MachinedCam",
+    "MachinedOneSidedCam",
+    "MachinedTwoSidedCam",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumStrain",

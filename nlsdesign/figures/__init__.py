@@ -21,6 +21,7 @@ from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
     "CamMotion",
@@ -29,7 +30,9 @@ __all__ = [
     "ClosedLoopRun",
     "Figure",
     "HeldOut",
+    "InspectionRow",
     "RecordError",
+    "TitleBlock",
     "alternative_text",
     "binned_errors",
     "cam_motion",
@@ -61,5 +64,6 @@ __all__ = [
     "torque_against_target",
     "torque_curve",
     "torque_loops",
+    "workshop_drawing",
     "write_figures",
 ]
