@@ -23,6 +23,11 @@ from .statics.contour import Contour, contour_from_curvature, contour_from_lever
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
+from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.monte_carlo import tolerance_analysis
+from .tolerance.tolerance_result import CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect
+from .tolerance.trimming import Trim
 
 __all__ = [
     "AnchorDistance",
@@ -30,6 +35,8 @@ __all__ = [
     "CamDesign",
     "CamFit",
     "CamProfile",
+    "Cause",
+    "CauseEffect",
     "Contour",
     "ElasticLaw",
     "ExponentialTorque",
@@ -37,31 +44,44 @@ __all__ = [
     "LeastRubber",
     "Limit",
     "LimitState",
+    "MaterialScatter",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumStrain",
     "MaximumStress",
     "MaximumTorqueError",
     "MinimumRadiusOfCurvature",
+    "NormalSpread",
+    "OneBatch",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
+    "QuantileEstimate",
     "RestLengthRange",
     "Sensitivity",
+    "SeparateModuli",
     "SmoothContour",
+    "SpreadReading",
+    "SpreadRules",
     "TabulatedTorque",
     "Target",
+    "ToleranceResult",
     "TorqueCheck",
     "TorqueError",
+    "Trim",
+    "TrimEffect",
+    "UniformSpread",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
     "design_cam",
+    "draw_deviations",
     "elastic_law",
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "tolerance_analysis",
     "torque_check",
     "torque_sensitivity",
     "write_drawings",

@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 from ..components.assembly.named_parts import Assembly
 from ..components.core.element import MATERIAL, Domain, Element
 from ..components.core.part import Part, walk
+from ..components.core.part_numbers import templates
 from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen
 from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
 from ..components.mechanics.motor import ElectricMotor
 from ..components.transmission.cam_drive import Through
+from ..components.transmission.capstan import CapstanFriction
 from .gear_train import trains
 from .readings import ReadingNames
 
@@ -141,6 +143,8 @@ class CamNames:
         Inner states of the element.
     specimens
         The pieces of material in it.
+    guides
+        For each guide that bends its cable the parameters whose product is the exponent µφ of its friction.
     """
 
     name: str
@@ -159,6 +163,7 @@ class CamNames:
     numbers: tuple[str, ...]
     states: tuple[str, ...]
     specimens: tuple[SpecimenNames, ...]
+    guides: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -369,7 +374,12 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
         numbers=tuple(_single_numbers({path: part, **pieces})),
         states=tuple(_declared_by(pieces, owners.states)),
         specimens=tuple(_specimen(name, p) for name, p in pieces.items() if isinstance(p, Specimen)),
+        guides=tuple(_exponent(name, p) for name, p in pieces.items() if isinstance(p, CapstanFriction)),
     )
+
+
+def _exponent(path: str, part: CapstanFriction) -> tuple[str, ...]:
+    return tuple(f"{path}.{field}" for field in templates(type(part.guide)))
 
 
 def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:
