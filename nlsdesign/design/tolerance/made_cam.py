@@ -40,7 +40,8 @@ _NEAR_ZERO = 80
 _BEYOND = 1.3
 """How far the contour is looked at, relative to the last angle: errors move the point of contact."""
 _FINER = 16
-_STEPS = 100
+_NEWTON_STEPS = 15
+_STEPS = 75
 _SETTLED = 1e-10
 """Angle in rad to which the point of contact is found."""
 _CLEARANCE = 0.02
@@ -174,7 +175,7 @@ class MadeCam:
         u, arms = wanted.copy(), np.zeros(wanted.size)
         low, high = np.zeros(wanted.size), np.full(wanted.size, self.table.x[-1])
         open_ones, residual = np.arange(wanted.size), np.zeros(0)
-        for _ in range(_STEPS):
+        for number in range(_STEPS):
             row, here = open_ones // count, u[open_ones]
             anchor, nominal = anchors[row], self.table(here)
             phi = here + np.arcsin(nominal / self.anchor)
@@ -185,13 +186,15 @@ class MadeCam:
             unsettled = np.abs(residual) > _SETTLED
             if not np.any(unsettled):
                 return arms.reshape(-1, count)
-            # Newton's step without the slope of the errors; where it leaves the bracket, its middle.
+            # Newton's step without the slope of the errors; where that leaves the bracket or takes long, as
+            # with an anchor that nearly touches a hollow cam, the middle of the bracket.
             near = 1.0 / np.sqrt(self.anchor**2 - nominal**2) - (support > 0.0) / np.sqrt(anchor**2 - arm**2)
             step = here - residual / np.maximum(1.0 + self.table(here, 1) * near, 0.2)
             low[open_ones] = np.where(residual <= 0.0, here, low[open_ones])
             high[open_ones] = np.where(residual >= 0.0, here, high[open_ones])
             first, last = low[open_ones], high[open_ones]
-            u[open_ones] = np.where((step > first) & (step < last), step, (first + last) / 2)
+            newton = (step > first) & (step < last) & (number < _NEWTON_STEPS)
+            u[open_ones] = np.where(newton, step, (first + last) / 2)
             open_ones = open_ones[unsettled]
         if np.max(np.abs(residual)) > 1e-6 * self.angles[-1]:
             raise ConvergenceError(

@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 
 _ANGLES = 101
 _FEWEST, _MOST = 20, 100_000
+_SMALL = 0.01
+"""Share of the variance below which a cause counts to first order where less of it is asked for."""
 _NODES, _STRATA = 41, 800
 _BAND = (0.05, 0.5, 0.95)
 
@@ -118,7 +120,7 @@ def tolerance_analysis(
     errors = made.rms(torques)
     ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
     tried, best = _tried(made, deviations, torques, ranges)
-    effects = _effects(made, deviations, best, acting, rules.reading)
+    effects = _effects(made, _WithLess(made, deviations, torques, best), acting, rules.reading)
     return ToleranceResult(
         target=target,
         angles=made.angles,
@@ -187,50 +189,64 @@ def _tried(
 class _WithLess:
     """The 95 % quantiles if a cause deviated less, as built and trimmed anew, in N·m.
 
-    The second trim is the first one and one step of Gauss and Newton.
+    The second trim is the first one and one step of Gauss and Newton. Of small causes only the part of first
+    order is taken off.
     """
 
-    def __init__(self, made: MadeSpring, deviations: Floats, best: _BestTrim | None) -> None:
+    def __init__(self, made: MadeSpring, deviations: Floats, torques: Floats, best: _BestTrim | None) -> None:
         self.made, self.deviations, self.best = made, deviations, best
+        self.torques = (torques, torques if best is None else best.result.torques)
         self.touched = made.contour.deviating(made.causes, deviations)
+
+    def small(self, rows: tuple[Floats, Floats], column: int, share: float) -> tuple[float, float]:
+        """Return the quantiles for a cause that does little, from its rows as built and after the trim."""
+        off = share * self.deviations[:, column, None]
+        pairs = zip(self.torques, rows, strict=True)
+        return self._quantiles(*(torques - off * row for torques, row in pairs))
 
     def __call__(self, column: int, share: float) -> tuple[float, float]:
         made, less = self.made, self.deviations.copy()
         less[:, column] *= 1.0 - share
         of_cam = not isinstance(made.causes[column], NumberCause)
         touched = made.contour.deviating(made.causes, less) if of_cam else self.touched
-        built = made.rms(made.torques(less, touched))
-        after = built if self.best is None else made.rms(self._trimmed(self.best, less, touched))
-        return float(np.quantile(built, SHARES[-1])), float(np.quantile(after, SHARES[-1]))
+        built = made.torques(less, touched)
+        return self._quantiles(built, built if self.best is None else self._trimmed(self.best, less, touched))
 
     def _trimmed(self, best: _BestTrim, less: Floats, touched: tuple[Floats, Floats]) -> Floats:
-        made, trim = self.made, best.column
-        own, tangent = made.causes[trim], best.result.tangents
+        made, trim, tangent = self.made, best.column, best.result.tangents
         low, high = trim_range(made, less, column=trim, ends=best.ends)
         less[:, trim] = np.clip(best.result.places, low, high)
-        known = touched if isinstance(own, NumberCause) else None
+        known = touched if isinstance(made.causes[trim], NumberCause) else None
         torques = made.torques(less, known)
         step = ((made.wanted - torques) * tangent) @ made.weights / (tangent**2 @ made.weights)
         less[:, trim] = np.clip(less[:, trim] + step, low, high)
         return made.torques(less, known)
 
+    def _quantiles(self, *torques: Floats) -> tuple[float, float]:
+        built, after = (float(np.quantile(self.made.rms(each), SHARES[-1])) for each in torques)
+        return built, after
+
 
 def _effects(
-    made: MadeSpring, deviations: Floats, best: _BestTrim | None, acting: Sequence[int],
-    reading: SpreadReading,
+    made: MadeSpring, with_less: _WithLess, acting: Sequence[int], reading: SpreadReading
 ) -> list[CauseEffect]:  # fmt: skip
     rows = made.sensitivities
+    best = with_less.best
     left = rows if best is None else _without(rows, rows[best.column], made.weights)
     sizes, sizes_left = ((part[list(acting)] ** 2 @ made.weights) for part in (rows, left))
     totals = [float(np.sum(each)) or 1.0 for each in (sizes, sizes_left)]
-    with_less, effects = _WithLess(made, deviations, best), []
+    effects = []
     for k, size, size_left in zip(acting, sizes, sizes_left, strict=True):
-        halved, measured = with_less(k, 0.5), with_less(k, 1.0)
+        shares = float(size) / totals[0], float(size_left) / totals[1]
+        if max(shares) < _SMALL:
+            halved, measured = (with_less.small((rows[k], left[k]), k, part) for part in (0.5, 1.0))
+        else:
+            halved, measured = (with_less(k, part) for part in (0.5, 1.0))
         effects.append(
             CauseEffect(
                 cause=made.causes[k],
-                share=float(size) / totals[0],
-                share_after_trim=float(size_left) / totals[1],
+                share=shares[0],
+                share_after_trim=shares[1],
                 alone=_alone(made, k, reading),
                 halved=halved[0],
                 measured=measured[0],
