@@ -18,7 +18,7 @@ from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit
 from .declared_spreads import SpreadRules, spring_causes
 from .made_spring import MadeSpring, made_spring
 from .tolerance_result import SHARES, CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect, quantile
-from .trimming import Trim, Trimmed, trim_range, trimmed
+from .trimming import Trim, Trimmed, trimmed
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +28,8 @@ _SMALL = 0.01
 """Share of the variance below which a cause counts to first order where less of it is asked for."""
 _NODES, _STRATA = 41, 800
 _BAND = (0.05, 0.5, 0.95)
+
+_Built = tuple[tuple[Floats, Floats], Floats]
 
 
 class _BestTrim(NamedTuple):
@@ -116,11 +118,12 @@ def tolerance_analysis(
     deviations[:, acting] = draw_deviations(
         [causes[k] for k in acting], draws, seed=seed, reading=rules.reading
     )
-    torques = made.torques(deviations)
+    touched = made.contour.deviating(made.causes, deviations)
+    torques = made.torques(deviations, touched)
     errors = made.rms(torques)
     ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
-    tried, best = _tried(made, deviations, torques, ranges)
-    effects = _effects(made, _WithLess(made, deviations, torques, best), acting, rules.reading)
+    tried, best = _tried(made, deviations, touched, ranges)
+    effects = _effects(made, _WithLess(made, deviations, (touched, torques), best), acting, rules.reading)
     return ToleranceResult(
         target=target,
         angles=made.angles,
@@ -170,14 +173,17 @@ def _band(made: MadeSpring, torques: Floats) -> Floats:
 
 
 def _tried(
-    made: MadeSpring, deviations: Floats, torques: Floats, trims: Sequence[tuple[str, tuple[float, float]]]
+    made: MadeSpring,
+    deviations: Floats,
+    touched: tuple[Floats, Floats],
+    trims: Sequence[tuple[str, tuple[float, float]]],
 ) -> tuple[list[TrimEffect], _BestTrim | None]:
     """Return the effect of each trim, and the best."""
     effects: list[TrimEffect] = []
     best: _BestTrim | None = None
     least, first = np.inf, len(made.causes) - len(trims)
     for column, (name, ends) in enumerate(trims, start=first):
-        result = trimmed(made, deviations, torques, column=column, ends=ends)
+        result = trimmed(made, deviations, column=column, ends=ends, touched=touched)
         unit = shown_unit(made.causes[column].unit)
         band = _band(made, result.torques)
         effects.append(TrimEffect(name, unit, _quantiles(result.rms), result.rms, result.settings, band))
@@ -189,14 +195,13 @@ def _tried(
 class _WithLess:
     """The 95 % quantiles if a cause deviated less, as built and trimmed anew, in N·m.
 
-    The second trim is the first one and one step of Gauss and Newton. Of small causes only the part of first
-    order is taken off.
+    Of small causes only the part of first order is taken off.
     """
 
-    def __init__(self, made: MadeSpring, deviations: Floats, torques: Floats, best: _BestTrim | None) -> None:
+    def __init__(self, made: MadeSpring, deviations: Floats, built: _Built, best: _BestTrim | None) -> None:
         self.made, self.deviations, self.best = made, deviations, best
+        self.touched, torques = built
         self.torques = (torques, torques if best is None else best.result.torques)
-        self.touched = made.contour.deviating(made.causes, deviations)
 
     def small(self, rows: tuple[Floats, Floats], column: int, share: float) -> tuple[float, float]:
         """Return the quantiles for a cause that does little, from its rows as built and after the trim."""
@@ -209,18 +214,11 @@ class _WithLess:
         less[:, column] *= 1.0 - share
         of_cam = not isinstance(made.causes[column], NumberCause)
         touched = made.contour.deviating(made.causes, less) if of_cam else self.touched
-        built = made.torques(less, touched)
-        return self._quantiles(built, built if self.best is None else self._trimmed(self.best, less, touched))
-
-    def _trimmed(self, best: _BestTrim, less: Floats, touched: tuple[Floats, Floats]) -> Floats:
-        made, trim, tangent = self.made, best.column, best.result.tangents
-        low, high = trim_range(made, less, column=trim, ends=best.ends)
-        less[:, trim] = np.clip(best.result.places, low, high)
-        known = touched if isinstance(made.causes[trim], NumberCause) else None
-        torques = made.torques(less, known)
-        step = ((made.wanted - torques) * tangent) @ made.weights / (tangent**2 @ made.weights)
-        less[:, trim] = np.clip(less[:, trim] + step, low, high)
-        return made.torques(less, known)
+        built, best = made.torques(less, touched), self.best
+        if best is None:
+            return self._quantiles(built, built)
+        after = trimmed(made, less, column=best.column, ends=best.ends, touched=touched, start=best.result)
+        return self._quantiles(built, after.torques)
 
     def _quantiles(self, *torques: Floats) -> tuple[float, float]:
         built, after = (float(np.quantile(self.made.rms(each), SHARES[-1])) for each in torques)

@@ -18,8 +18,10 @@ from .made_spring import MadeSpring
 Floats = NDArray[np.float64]
 
 _STEPS = 12
-_SETTLED = 1e-5
-"""Step, relative to a tenth of the number, below which the trim is found."""
+_SETTLED = 1e-4
+"""Step, relative to a tenth of the number, below which the trim is settled."""
+_USABLE = 1e-7
+"""Step, likewise, from which on the change of the torque gives a derivative."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,13 @@ class Trimmed:
 
 
 def trimmed(
-    spring: MadeSpring, deviations: Floats, torques: Floats, *, column: int, ends: tuple[float, float]
+    spring: MadeSpring,
+    deviations: Floats,
+    *,
+    column: int,
+    ends: tuple[float, float],
+    touched: tuple[Floats, Floats] | None = None,
+    start: Trimmed | None = None,
 ) -> Trimmed:
     """Return springs whose trim makes their rms error least.
 
@@ -121,12 +129,14 @@ def trimmed(
         As made.
     deviations
         In units of the standard deviations, shape (draws, causes); the column of the trim is zero.
-    torques
-        Before the trim, shape (draws, columns).
     column
         Of the trim.
     ends
         Range of the number as set, in SI.
+    touched
+        Lever arms and extensions before the trim, where they are known already.
+    start
+        Trim of similar springs.
 
     Raises
     ------
@@ -139,20 +149,27 @@ def trimmed(
             f"'{cause.name}'", "does not change the torque at rest",
             next_step="trim the pretension, or another number that does",
         )  # fmt: skip
-    start = cause.nominal + deviations @ _moves(spring, column)
     low, high = trim_range(spring, deviations, column=column, ends=ends)
-    place, current = np.zeros(len(deviations)), torques
-    tangent = np.tile(spring.sensitivities[column], (len(deviations), 1))
-    before = spring.rms(torques)
-    # Whoever stands outside the range is put to its end first, also where that is worse.
-    inside = (low <= 0.0) & (high >= 0.0)
-    best_rms = np.where(inside, before, np.inf)
-    best_place, best_torques = place.copy(), torques.copy()
-    active = np.arange(len(deviations))
-    # What does not move the cam leaves the points of contact where they are.
-    touched = None
-    if isinstance(cause, NumberCause):
+    if isinstance(cause, NumberCause) and touched is None:
         touched = spring.contour.deviating(spring.causes, deviations)
+    # What moves the cam moves the points of contact too.
+    fixed = touched if isinstance(cause, NumberCause) else None
+
+    def torques(rows: NDArray[np.intp], at: Floats) -> Floats:
+        changed = deviations[rows].copy()
+        changed[:, column] = at
+        return spring.torques(changed, None if fixed is None else (fixed[0][rows], fixed[1][rows]))
+
+    active = np.arange(len(deviations))
+    place = np.clip(0.0 if start is None else start.places, low, high)
+    current = torques(active, place)
+    tangent = np.tile(spring.sensitivities[column], (len(deviations), 1)) if start is None else start.tangents
+    tangent, best_place, best_torques, best_rms = (
+        tangent.copy(),
+        place.copy(),
+        current.copy(),
+        spring.rms(current),
+    )
     for _ in range(_STEPS):
         error = current[active] - spring.wanted
         slope = tangent[active]
@@ -160,13 +177,10 @@ def trimmed(
         step = -((error * slope) @ spring.weights) / size
         new = np.clip(place[active] + step, low[active], high[active])
         moved = new - place[active]
-        changed = deviations[active].copy()
-        changed[:, column] = new
-        known = None if touched is None else (touched[0][active], touched[1][active])
-        after = spring.torques(changed, known)
-        usable = np.abs(moved) > 1e-9
+        after = torques(active, new)
+        usable = np.abs(moved) > _USABLE
         tangent[active[usable]] = (after - current[active])[usable] / moved[usable, None]
-        place[active], current = new, _replaced(current, active, after)
+        place[active], current[active] = new, after
         rms = spring.rms(after)
         better = rms < best_rms[active]
         chosen = active[better]
@@ -174,13 +188,8 @@ def trimmed(
         active = active[np.abs(moved) > _SETTLED]
         if not len(active):
             break
-    return Trimmed(start + cause.deviation * best_place, best_place, best_torques, tangent, best_rms)
-
-
-def _replaced(rows: Floats, places: NDArray[np.intp], new: Floats) -> Floats:
-    result = rows.copy()
-    result[places] = new
-    return result
+    settings = cause.nominal + deviations @ _moves(spring, column) + cause.deviation * best_place
+    return Trimmed(settings, best_place, best_torques, tangent, best_rms)
 
 
 def trim_range(
