@@ -2,6 +2,7 @@
 
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -18,6 +19,7 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .optimisation.settings import DesignSettings
 from .optimisation.solve import design_cam, torque_check, torque_sensitivity
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
@@ -38,6 +40,7 @@ __all__ = [
     "Cause",
     "CauseEffect",
     "Contour",
+    "DesignSettings",
     "ElasticLaw",
     "ExponentialTorque",
     "Goal",
@@ -81,6 +84,7 @@ __all__ = [
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "safe_limits",
     "tolerance_analysis",
     "torque_check",
     "torque_sensitivity",

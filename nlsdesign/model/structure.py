@@ -368,7 +368,12 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
         force=f"{element}.{inner.effort}",
         pretension=f"{path}.pretension",
         elements=f"{cam}.elements",
-        control_values=tuple(number_names(cam, part.cam, "lever_arm")) if "lever_arm" in of_cam else (),
+        control_values=tuple(
+            name
+            for row in ("lever_arm", "support")
+            if row in of_cam
+            for name in number_names(cam, part.cam, row)
+        ),
         anchor_distance=f"{cam}.anchor_distance" if "anchor_distance" in of_cam else None,
         last_angle=f"{cam}.last_angle" if "last_angle" in of_cam else None,
         numbers=tuple(_single_numbers({path: part, **pieces})),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -19,32 +20,43 @@ from ..curves.target import Target
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from ..statics.equilibrium import torque_function
-from ..statics.rounding import has_corners
-from .conflict import feasible_point, row_of
-from .design_point import anchor_of
+from .conflict import feasible_point
+from .defaults import safe_limits, with_defaults
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Bound, Limit
-from .problem import DesignProblem, contour_names, design_problem
-from .program import Program, Solution
-from .result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .problem import DesignProblem, contour_names
+from .program import Solution
+from .remedies import find_remedies
+from .result import (
+    CamDesign,
+    DesignCurves,
+    LimitState,
+    Miss,
+    Sensitivity,
+    StartOutcome,
+    TorqueCheck,
+)
+from .search import Question, Search, carried_over
+from .settings import DesignSettings
+from .valleys import valleys
 
 Floats = NDArray[np.float64]
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
 
+USUAL = DesignSettings()
+"""Four starts, 1 % of the largest torque as the largest error, limits of the declared cable and rubber."""
+
 _ANGLES = 801
 _ACTIVE = 1e-3
 _MOST_MODULI = 10
-_ROUNDING = 0.003
-"""Width over which the knots of a rubber's law are rounded where needed, relative to its stretch."""
-_ITERATION_LIMIT = "Maximum_Iterations_Exceeded"
-"""IPOPT's status where Newton's method does not settle, as at the knots of a law."""
 _CONTROL_VALUES = 64
-
-
-def _quiet() -> None:
-    """Report no progress."""
+_NARROWED = 2
+"""How often the rounding of knots is narrowed at most."""
+_PROMISED = 2e-4
+"""Difference between the error that the optimiser saw and that of the finished assembly, relative to the
+largest torque, from which the rounding of knots is narrowed."""
 
 
 def design_cam(
@@ -52,16 +64,17 @@ def design_cam(
     *,
     target: Target,
     free: Sequence[str] | None = None,
-    keep: Sequence[Limit],
+    keep: Sequence[Limit] = (),
     spring: str | None = None,
     goals: Sequence[Goal] = GOALS,
-    progress: Callable[[], None] = _quiet,
+    settings: DesignSettings = USUAL,
 ) -> CamDesign:
     """Design the cam of a spring, and with it whatever else is free, for a target torque curve.
 
     The static law is that of the flat model with all relaxation at rest. The result is converted to the
     numbers of the declared cam, put into a copy of the assembly, flattened anew, and its torque error is
-    measured there.
+    measured there. A design whose rms error exceeds what the settings allow comes back too, with ``met``
+    false and ``miss`` saying why and what to free.
 
     Parameters
     ----------
@@ -75,13 +88,13 @@ def design_cam(
         number behind the cam, for instance ``spring.cam.contour`` and ``spring.rubber.area``. The contour
         alone by default.
     keep
-        Limits.
+        Limits, besides those of the settings.
     spring
         Path of the cam spring; decided from the structure if it is left out.
     goals
         What is made small, as a sum.
-    progress
-        Called after each starting point.
+    settings
+        Starts, seed, what counts as a miss, limits that hold by default, whom to tell of progress.
 
     Returns
     -------
@@ -91,106 +104,211 @@ def design_cam(
     Raises
     ------
     InfeasibleError
-        If the limits contradict each other, with their names and how much each would have to give.
+        If the limits contradict each other, with their names, how much each would have to give, and which
+        number to free.
     ConvergenceError
         If the solver stops without a solution.
+    ValueRangeError
+        If a free number changes neither a goal nor a limit.
     UnknownNameError
         If a free name does not exist.
     ArrangementError
-        If the structure does not say which spring is meant, or it has no two-sided cam.
+        If the structure does not say which spring is meant, or its cam has no contour.
     """
     model = flatten(actuator)
     names = series_cam(model, spring)
-    cam, chosen = actuator[names.name], contour_names(names)[:1] if free is None else free
-
-    def program_of(rounding: float) -> _DesignProgram:
-        problem = design_problem(
-            model, cam, target=target, free=chosen, spring=names.drive, rounding=rounding
-        )
-        return _DesignProgram(problem, keep, goals, progress)
-
-    solved, outcomes = _solved(program_of)
-    return _finished(actuator, solved.problem, solved.bounds, _best(outcomes))
-
-
-def _solved(program_of: Callable[[float], _DesignProgram]) -> tuple[_DesignProgram, list[Solution]]:
-    """Return the program that was solved and the solution from each start."""
-    plain = program_of(0.0)
-    first, *others = plain.problem.starts
-    outcomes = plain.solve(first)
-    if outcomes[0].solved:
-        return plain, outcomes + plain.solve(*others)
-    # Whether there is any cam at all is found out with softened limits.
-    feasible = feasible_point(plain.problem, plain.bounds, plain.progress)
-    if outcomes[0].status == _ITERATION_LIMIT and has_corners(plain.problem.law.function):
-        smooth = program_of(_ROUNDING)
-        outcomes = smooth.solve(*smooth.problem.starts)
-        if any(outcome.solved for outcome in outcomes):
-            return smooth, outcomes
-    return plain, plain.solve(feasible, *others)
+    chosen = tuple(contour_names(names)[:1] if free is None else free)
+    defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
+    question = Question(
+        model=model,
+        cam=actuator[names.name],
+        drive=names.drive,
+        target=target,
+        keep=with_defaults(keep, defaults),
+        goals=tuple(goals),
+        settings=settings,
+    )
+    search = question.search(chosen)
+    search.require_influence()
+    outcomes = search.outcomes()
+    if not any(outcome.solved for outcome in outcomes):
+        # Whether there is any cam at all is found out with softened limits.
+        outcomes.append(search.program.solve(feasible_point(search, chosen)))
+    found = _Found(actuator, search, chosen, outcomes, _best(outcomes))
+    return _finished(_narrowed(found))
 
 
-class _DesignProgram:
-    """A problem with its limits and goals as a program."""
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A search with its outcomes, the one that was taken, and the assembly that follows from it."""
 
-    def __init__(
-        self,
-        problem: DesignProblem,
-        keep: Sequence[Limit],
-        goals: Sequence[Goal],
-        progress: Callable[[], None],
-    ) -> None:
-        self.problem, self.progress = problem, progress
-        self.bounds = [bound for limit in keep for bound in limit.bounds(problem.design)]
-        self.program = Program(
-            problem.vector,
-            np.array([v.lower for v in problem.variables]),
-            np.array([v.upper for v in problem.variables]),
-            sum((goal.cost(problem.design) for goal in goals), start=ca.SX(0)),
-            (*problem.structure, *(row_of(bound) for bound in self.bounds)),
-        )
+    actuator: Assembly
+    search: Search
+    free: tuple[str, ...]
+    outcomes: Sequence[Solution]
+    taken: int
 
-    def solve(self, *starts: Floats) -> list[Solution]:
-        """Solve from each starting point."""
-        return self.program.solve(*starts, progress=self.progress)
+    @property
+    def best(self) -> Solution:
+        return self.outcomes[self.taken]
+
+    @cached_property
+    def predicted_rms(self) -> float:
+        return self.rms(self.best)
+
+    def rms(self, outcome: Solution) -> float:
+        problem = self.search.problem
+        square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
+        return float(np.sqrt(max(square, 0.0)))
+
+    @cached_property
+    def contour_fit(self) -> tuple[Contour, CamFit | None]:
+        return _contour(self.actuator, self.search.problem, self.best)
+
+    @cached_property
+    def changes(self) -> dict[str, Quantity]:
+        problem = self.search.problem
+        target, values = problem.design.target, problem.named(self.best.point)
+        known = self.actuator.quantities()
+        source = f"designed for {type(target).__name__}, {target.largest:.6g} N·m"
+        changes = {n: _designed(known[n], value, source) for n, value in values.items() if n in known}
+        fit = self.contour_fit[1]
+        if fit is not None:
+            changes |= {f"{problem.law.cam.name}.{field}": given for field, given in fit.changes().items()}
+        return changes
+
+    @cached_property
+    def changed(self) -> Assembly:
+        return self.actuator.with_values(self.changes)
+
+    @cached_property
+    def model(self) -> FlatModel:
+        return flatten(self.changed)
+
+    @cached_property
+    def check(self) -> TorqueCheck:
+        spring = _spring_of(self.model, self.search.problem.law.cam.name)
+        return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
 
 
-def _best(outcomes: Sequence[Solution]) -> Solution:
-    solved = [outcome for outcome in outcomes if outcome.solved]
+def _narrowed(found: _Found) -> _Found:
+    """Return the design on a law whose knots are rounded less, where the rounding shows in the torque."""
+    for _ in range(_NARROWED):
+        target, rounding = found.search.problem.design.target, found.search.rounding
+        finer = found.search.question.finer(rounding)
+        if finer is None or abs(found.check.rms - found.predicted_rms) <= _PROMISED * target.largest:
+            break
+        search = found.search.question.search(found.free, finer)
+        outcome = search.program.solve(carried_over(found.search, found.best.point, search))
+        if not outcome.solved:
+            break
+        outcomes = [*found.outcomes]
+        outcomes[found.taken] = outcome
+        better = _Found(found.actuator, search, found.free, outcomes, found.taken)
+        if better.check.rms >= found.check.rms:
+            break
+        found = better
+    return found
+
+
+def _best(outcomes: Sequence[Solution]) -> int:
+    solved = [i for i, outcome in enumerate(outcomes) if outcome.solved]
     if not solved:
         raise ConvergenceError(
             "design", f"IPOPT stopped with '{outcomes[0].status}' after {outcomes[0].iterations} iterations",
             next_step="widen the narrowest limit, free one number more, or smooth the rubber's law",
         )  # fmt: skip
-    return min(solved, key=lambda outcome: outcome.cost)
+    return min(solved, key=lambda i: outcomes[i].cost)
 
 
-def _finished(
-    actuator: Assembly, problem: DesignProblem, bounds: Sequence[Bound], best: Solution
-) -> CamDesign:
-    target, cam = problem.design.target, problem.law.cam
-    values = problem.named(best.point)
-    contour, fit = _contour(actuator, problem, best)
-    known, source = actuator.quantities(), f"designed for {type(target).__name__}, {target.largest:.6g} N·m"
-    changes = {name: _designed(known[name], value, source) for name, value in values.items() if name in known}
-    if fit is not None:
-        changes |= {f"{cam.name}.{field}": given for field, given in fit.changes().items()}
-    changed = actuator.with_values(changes)
-    model = flatten(changed)
-    spring = next(each.name for each in model.springs for inside in each.cams if inside.name == cam.name)
-    mean_square = problem.evaluate(problem.design.mean_square_error, best.point)[0]
+def _finished(found: _Found) -> CamDesign:
+    search, problem, best = found.search, found.search.problem, found.best
+    contour, fit = found.contour_fit
+    settings, design = search.question.settings, problem.design
+    limits = tuple(_state(problem, bound, best.point) for bound in search.bounds)
     return CamDesign(
-        target=target,
-        changes=tuple(changes.items()),
-        actuator=changed,
-        check=torque_check(model, target=target, spring=spring),
-        predicted_rms=float(np.sqrt(mean_square)),
+        target=design.target,
+        changes=tuple(found.changes.items()),
+        actuator=found.changed,
+        check=found.check,
+        predicted_rms=found.predicted_rms,
         contour=contour,
         fit_error=0.0 if fit is None else fit.error,
-        limits=tuple(_state(problem, bound, best.point) for bound in bounds),
-        sensitivity=torque_sensitivity(model, target=target, spring=spring),
-        iterations=best.iterations,
+        limits=limits,
+        sensitivity=torque_sensitivity(
+            found.model, target=design.target, spring=_spring_of(found.model, problem.law.cam.name)
+        ),
+        curves=_curves(problem, best.point),
+        rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
+        starts=tuple(
+            StartOutcome(o.solved, o.status, o.iterations, o.cost, found.rms(o)) for o in found.outcomes
+        ),
+        taken=found.taken,
+        valleys=valleys(search, best.point, found.predicted_rms) if settings.look_for_valleys else (),
+        miss=_miss(found, limits),
+        remarks=_remarks(search),
     )
+
+
+def _miss(found: _Found, limits: Sequence[LimitState]) -> Miss | None:
+    settings, target, check = found.search.question.settings, found.search.problem.design.target, found.check
+    allowed = settings.largest_error * target.largest
+    if check.rms <= allowed:
+        return None
+    remedies = find_remedies(
+        found.search, found.free, found.best.point, allowed=allowed, error=check.rms,
+        binding=[i for i, state in enumerate(limits) if state.active],
+    )  # fmt: skip
+    worst = int(np.argmax(np.abs(check.errors)))
+    return Miss(
+        error=check.rms / target.largest,
+        allowed=settings.largest_error,
+        worst_angle=float(check.angles[worst]),
+        worst_error=float(check.errors[worst]),
+        binding=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
+        remedies=remedies,
+        advice=tuple(remedies.sentences(target.largest)),
+    )
+
+
+def _remarks(search: Search) -> tuple[str, ...]:
+    cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
+    said = []
+    if "MaximumCableTension" not in kinds:
+        said.append(
+            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
+        )
+    if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
+        said.append("no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for")
+    return tuple(said)
+
+
+def _curves(problem: DesignProblem, point: Floats) -> DesignCurves:
+    design = problem.design
+    columns = [
+        design.angles, design.lever_arms, design.radii_of_curvature, design.radii, design.torques,
+        design.tangent_stiffness, design.extensions, design.forces,
+        *design.strains.values(), *design.stresses.values(),
+    ]  # fmt: skip
+    table = problem.evaluate(ca.vertcat(*columns), point).reshape(len(columns), -1)
+    pieces = len(design.strains)
+    angles, arms, rho, radii, torques, stiffnesses, extensions, forces = table[:8]
+    return DesignCurves(
+        angles=angles,
+        lever_arms=arms,
+        radii_of_curvature=rho,
+        radii=radii,
+        torques=torques,
+        stiffnesses=stiffnesses,
+        extensions=extensions,
+        forces=forces,
+        strains=dict(zip(design.strains, table[8 : 8 + pieces], strict=True)),
+        stresses=dict(zip(design.stresses, table[8 + pieces :], strict=True)),
+    )
+
+
+def _spring_of(model: FlatModel, cam: str) -> str:
+    return next(each.name for each in model.springs for inside in each.cams if inside.name == cam)
 
 
 def _designed(old: Quantity, value: float, source: str) -> Quantity:
@@ -203,12 +321,15 @@ def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tupl
     design, cam = problem.design, actuator[problem.law.cam.name]
     if problem.contour is None:
         return contour_of_cam(cam), None
-    anchor = design.parameters[anchor_of(design.cam)]
+    anchor = design.cam.anchor_distance
     contour = contour_from_curvature(
         problem.evaluate(design.directions, best.point),
         problem.evaluate(design.radii_of_curvature, best.point),
         first_slope=float(problem.evaluate(problem.contour.first_slope.value, best.point)[0]),
-        anchor_distance=float(problem.evaluate(anchor, best.point)[0]),
+        first_lever_arm=float(problem.evaluate(design.lever_arms[0], best.point)[0]),
+        anchor_distance=(
+            np.inf if anchor is None else float(problem.evaluate(design.parameters[anchor], best.point)[0])
+        ),
     )
     return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
 
