@@ -86,7 +86,7 @@ class NormalSpread(SpreadReading):
 class UniformSpread(SpreadReading):
     """A spread is a bound, and every number within it is equally likely.
 
-    Source: JCGM 100 2008, 4.3.7 (the standard deviation is the half width over √3).
+    Source: JCGM 2008, 4.3.7 (the standard deviation is the half width over √3).
     """
 
     def deviation(self, spread: float) -> float:

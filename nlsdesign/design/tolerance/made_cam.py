@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from ...errors import ConvergenceError
+from ...symbolic import depends
 from ..statics.equilibrium import ElasticLaw
 from .causes import AnchorCause, Cause, ProfileCause, WaveCause
 
@@ -258,6 +259,11 @@ def made_cam(law: ElasticLaw, cam: ca.Function, angles: Floats, causes: Sequence
         np.concatenate([[0.0], np.geomspace(1e-7, end / _NODES, _NEAR_ZERO), np.linspace(0.0, end, _NODES)])
     )
     values, slopes = (np.array(item, dtype=float) for item in both(nodes.reshape(1, -1), numbers))
+    if anchored is not None and depends(arm, parameters[names.index(anchored)]):
+        # Such a law holds for any contour: its lever arm has moved with the point of contact, Δ·√(D² − p²)/f.
+        turning = 1.0 / (1.0 + slopes[0] / np.sqrt(anchor**2 - values[0] ** 2))
+        values[1:] *= turning
+        slopes[1:] = np.gradient(values[1:], nodes, axis=1)
     splines = [CubicHermiteSpline(nodes, v, s) for v, s in zip(values, slopes, strict=True)]
     stretched = ca.Function("extension", [angle, parameters], [extension])(angles.reshape(1, -1), numbers)
     return MadeCam(

@@ -49,7 +49,7 @@ def quantile(errors: Floats, share: float) -> QuantileEstimate:
     """Return a quantile of independent draws with its confidence interval.
 
     The number of draws below the true quantile is binomial, whatever the distribution, so two of the ordered
-    draws enclose it. Source: David and Nagaraja 2003, sec. 7.1.
+    draws enclose it.
 
     Parameters
     ----------
