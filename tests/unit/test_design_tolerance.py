@@ -61,11 +61,24 @@ def test_declared_spreads_are_standard_deviations() -> None:
 def test_what_no_deck_declares_is_assumed_with_a_reason() -> None:
     assumed = {name: cause for name, cause in published().items() if cause.assumed}
     edge = [f"spring.cam.contour.{part}" for part in ("offset", "half_wave", "wave")]
-    assert set(assumed) == {"spring.pretension", "spring.cam.cable_radius", *edge}
+    assert set(assumed) == {"spring.pretension", *edge}
     assert all(len(cause.source) > 30 for cause in assumed.values())
     # Offset and two waves share the mean square of the edge equally; a wave has half the square of its size.
     shares = np.array([1.0, 0.5, 0.5]) * [assumed[name].deviation ** 2 for name in edge]
     assert shares == pytest.approx(np.full(3, (5e-5 / np.sqrt(3)) ** 2 / 3))
+
+
+def test_the_declared_cable_deviates_as_it_is_declared() -> None:
+    cable = published()["spring.cam.cable_radius"]
+    assert cable.deviation == pytest.approx(0.5 * 0.9e-3 * 0.05)
+    assert cable.source == "declared: spread 5 %"
+    rules = SpreadRules()
+    (other,) = (
+        cause
+        for cause in spring_causes(flatten(actuator(CONCAVE)), None, rules)
+        if cause.name == "spring.cam.cable_radius"
+    )
+    assert other.assumed
 
 
 def test_given_spreads_replace_declared_and_assumed_ones() -> None:

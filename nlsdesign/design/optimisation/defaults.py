@@ -49,8 +49,6 @@ def safe_limits(model: FlatModel, spring: str | None = None) -> tuple[Limit, ...
 
 def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
     cam, values = series_cam(model, spring), model.values
-    if not hasattr(cam, "cable"):
-        return
     if cam.cable is not None:
         radius = values[cam.cable.diameter] * values[cam.cable.bend_ratio] / 2.0
         yield MinimumRadiusOfCurvature(radius)

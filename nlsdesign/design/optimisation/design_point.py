@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
@@ -147,7 +148,7 @@ class DesignPoint:
     def rubber_volume(self) -> Expression:
         """Volume of all rubber behind the cam in m³; zero where there is no specimen."""
         pieces = [
-            self.parameters[piece.area] * self.parameters[piece.rest_length]
+            math.prod((self.parameters[name] for name in (*piece.section, piece.rest_length)), start=ca.SX(1))
             for piece in self.cam.specimens
             if piece.name in self.strains
         ]
@@ -172,9 +173,9 @@ class DesignPoint:
                 f"has no specimen behind its cam, so it has no {field.replace('_', ' ')}",
                 next_step="leave this limit out, or declare the rubber with specimen(...)",
             )
-        names = [
-            piece.area if field == "area" else piece.rest_length
+        rows = [
+            piece.section if field == "area" else (piece.rest_length,)
             for piece in self.cam.specimens
             if piece.name in self.strains
         ]
-        return {name: self.parameters[name] for name in names}
+        return {" * ".join(row): math.prod((self.parameters[n] for n in row), start=ca.SX(1)) for row in rows}

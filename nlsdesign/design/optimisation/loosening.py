@@ -252,7 +252,7 @@ def _candidates(search: Search, free: Sequence[str]) -> tuple[str, ...]:
     cam = search.problem.law.cam
     sizes = [cam.pretension]
     for piece in cam.specimens:
-        sizes += [piece.area, piece.rest_length]
+        sizes += [*piece.section, piece.rest_length]
     if cam.anchor_distance is not None and any(name in free for name in contour_names(cam)):
         sizes.append(cam.anchor_distance)
     return tuple(dict.fromkeys(name for name in sizes if name not in free))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...components.core.element import Element
 from ...errors import ConvergenceError
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam, series_spring
@@ -115,7 +116,7 @@ def design_cam(
     ArrangementError
         If the structure does not say which spring is meant, or its cam has no contour.
     """
-    model = flatten(actuator)
+    model = flatten(_with_smooth_cables(actuator))
     names = series_cam(model, spring)
     chosen = tuple(contour_names(names)[:1] if free is None else free)
     defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
@@ -134,8 +135,20 @@ def design_cam(
     if not any(outcome.solved for outcome in outcomes):
         # Whether there is any cam at all is found out with softened limits.
         outcomes.append(search.program.solve(feasible_point(search, chosen)))
-    found = _Found(actuator, search, chosen, outcomes, _best(outcomes))
-    return _finished(_narrowed(found))
+    taken = _best(outcomes)
+    return _finished(_narrowed(_Found(actuator, search, chosen, outcomes, taken, outcomes[taken])))
+
+
+def _with_smooth_cables(actuator: Assembly) -> Assembly:
+    """Return the assembly with every cable that goes slack in its smooth form, which an optimiser can follow.
+
+    Within the range of a design the cable is taut, where the two forms agree; the finished design is measured
+    on the assembly as it is declared.
+    """
+    for path, part in actuator.walk():
+        if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
+            actuator = actuator.with_part(path, part.smooth())
+    return actuator
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +160,7 @@ class _Found:
     free: tuple[str, ...]
     outcomes: Sequence[Solution]
     taken: int
-
-    @property
-    def best(self) -> Solution:
-        return self.outcomes[self.taken]
+    best: Solution
 
     @cached_property
     def predicted_rms(self) -> float:
@@ -202,9 +212,7 @@ def _narrowed(found: _Found) -> _Found:
         outcome = search.program.solve(carried_over(found.search, found.best.point, search))
         if not outcome.solved:
             break
-        outcomes = [*found.outcomes]
-        outcomes[found.taken] = outcome
-        better = _Found(found.actuator, search, found.free, outcomes, found.taken)
+        better = replace(found, search=search, best=outcome)
         if better.check.rms >= found.check.rms:
             break
         found = better

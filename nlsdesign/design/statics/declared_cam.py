@@ -117,6 +117,7 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
             changeover=self.part.changeover,
             anchor_distance=self.part.anchor_distance,
             elements=self.part.elements,
+            cable=self.part.cable,
         )
         return CamFit(cam, error)
 
@@ -166,7 +167,10 @@ class _Anchored(DeclaredCam[AnchoredCam]):
 
         directions = np.linspace(0.0, end, max(points, 1001))
         reached = directions - np.arcsin(support(directions) / anchor)
-        last = _end(float(reached[-1]), last_angle)
+        # The change of sides turns the contour back by its width, so that much more of the angle is covered;
+        # what a fit of the end point is off by is far less than that width.
+        covered = float(reached[-1]) + 1.1 * self.part.changeover.number
+        last = min(_end(covered, last_angle), float(reached[-1]))
         directions = np.linspace(0.0, float(np.interp(last, reached, directions)), points)
         p = support(directions)
         return Contour(directions, p, support(directions, 1), p + support(directions, 2), anchor)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -130,7 +130,7 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     cam = series_cam(model, spring)
     tie = next(each for each in model.springs if cam in each.cams)
     groups = _groups(model, tie, cam, rules.material)
-    others = _beside_the_numbers(cam)
+    others = _beside_the_numbers(model, cam, rules.reading)
     valid = [*groups, *others]
     for name in rules.given:
         if name not in valid:
@@ -149,7 +149,7 @@ def _groups(
     model: FlatModel, tie: SpringNames, cam: CamNames, material: MaterialScatter
 ) -> dict[str, list[Variable]]:
     """Return the numbers of the spring that move together, by name."""
-    inside = set(tie.parameters)
+    inside = set(tie.parameters) - set(_not_of_the_torque(cam))
     rows: dict[str, list[Variable]] = {}
     for variable in model.parameters:
         if variable.name in inside:
@@ -165,9 +165,23 @@ def _groups(
     return rows
 
 
-def _beside_the_numbers(cam: CamNames) -> dict[str, _Assumed]:
-    """Return what deviates without being a number of the model."""
-    return {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": _CABLE}
+def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
+    """Yield the numbers of strength and cable, of which only the diameter does anything to the torque."""
+    for piece in cam.specimens:
+        yield from (name for name in (piece.tensile_strength, piece.elongation_at_break) if name is not None)
+    if cam.cable is not None:
+        yield from (cam.cable.diameter, cam.cable.breaking_force, cam.cable.bend_ratio)
+
+
+def _beside_the_numbers(model: FlatModel, cam: CamNames, reading: SpreadReading) -> dict[str, _Assumed]:
+    """Return what deviates besides the numbers: the edge of the cam, and the cable on it."""
+    cable = _CABLE
+    if cam.cable is not None:
+        diameter = model.variable(cam.cable.diameter)
+        if diameter.spread > 0.0:
+            size = reading.deviation(diameter.spread) * diameter.start / 2.0
+            cable = _Assumed(size, f"declared: spread {100 * diameter.spread:g} %")
+    return {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": cable}
 
 
 def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: SpreadRules) -> list[Cause]:
