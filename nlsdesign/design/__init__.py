@@ -53,6 +53,11 @@ from .statics.contour import Contour, contour_from_curvature, contour_from_lever
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
+from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.monte_carlo import tolerance_analysis
+from .tolerance.tolerance_result import CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect
+from .tolerance.trimming import Trim
 
 __all__ = [
     "AnchorDistance",
@@ -62,6 +67,8 @@ __all__ = [
     "CamFit",
     "CamPart",
     "CamProfile",
+    "Cause",
+    "CauseEffect",
     "Choice",
     "ClampScrew",
     "Contour",
@@ -79,6 +86,7 @@ __all__ = [
     "MachinedCam",
     "MachinedOneSidedCam",
     "MachinedTwoSidedCam",
+    "MaterialScatter",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumStrain",
@@ -87,18 +95,24 @@ __all__ = [
     "MinimumRadiusOfCurvature",
     "MotorAndGear",
     "MotorCycle",
+    "NormalSpread",
     "NumberRange",
     "OddSpring",
+    "OneBatch",
     "OneSidedSpring",
     "OverTravel",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
+    "QuantileEstimate",
     "RestLengthRange",
     "RubberStock",
     "Sensitivity",
+    "SeparateModuli",
     "SmoothContour",
+    "SpreadReading",
+    "SpreadRules",
     "SpringLimits",
     "SpringSymmetry",
     "Stock",
@@ -110,16 +124,21 @@ __all__ = [
     "TaskCycle",
     "TaskGoal",
     "TaskProblem",
+    "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
     "TorqueError",
+    "Trim",
+    "TrimEffect",
     "TwoBranchSpring",
+    "UniformSpread",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
     "curve_for_task",
     "design_cam",
+    "draw_deviations",
     "elastic_law",
     "energy_profile",
     "equilibrium_torque",
@@ -131,6 +150,7 @@ __all__ = [
     "read_task",
     "safe_limits",
     "scan_gear_ratio",
+    "tolerance_analysis",
     "torque_check",
     "torque_sensitivity",
     "walking_task",

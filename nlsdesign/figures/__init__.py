@@ -14,6 +14,7 @@ from .before_after import (
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
+from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
@@ -60,8 +61,10 @@ __all__ = [
     "stability_over_angle",
     "styled",
     "svg_text",
+    "tolerance_bars",
     "torque_against_measured",
     "torque_against_target",
+    "torque_band",
     "torque_curve",
     "torque_loops",
     "workshop_drawing",
