@@ -48,7 +48,7 @@ from .optimisation.limits_of_use import OverTravel
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import design_cam
-from .optimisation.stock import Choice, RubberStock, Stock
+from .optimisation.stock import RubberStock, Stock, StockChoice
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
@@ -69,7 +69,6 @@ __all__ = [
     "CamProfile",
     "Cause",
     "CauseEffect",
-    "Choice",
     "ClampScrew",
     "Contour",
     "DesignSettings",
@@ -116,6 +115,7 @@ __all__ = [
     "SpringLimits",
     "SpringSymmetry",
     "Stock",
+    "StockChoice",
     "TabulatedStiffness",
     "TabulatedTorque",
     "Target",

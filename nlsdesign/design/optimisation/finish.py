@@ -16,12 +16,12 @@ from ...quantity import Quantity, significant
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .checks import torque_check, torque_sensitivity
+from .design_search import Search, carried_over
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
 from .remedies import find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
-from .search import Search, carried_over
 from .valleys import valleys
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ largest torque, from which the rounding of knots is narrowed."""
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SolvedSearch:
     """A search with its outcomes, the one that was taken, and the assembly that follows from it.
 
     Parameters
@@ -114,75 +114,79 @@ class Found:
         return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
 
 
-def narrowed(found: Found) -> Found:
+def narrowed(solved: SolvedSearch) -> SolvedSearch:
     """Return the design on a law whose knots are rounded less, where the rounding shows in the torque.
 
     Parameters
     ----------
-    found
+    solved
         On the law with which the search began.
     """
     for _ in range(_NARROWED):
-        target, rounding = found.search.problem.design.target, found.search.rounding
-        finer = found.search.question.finer(rounding)
-        if finer is None or abs(found.check.rms - found.predicted_rms) <= _PROMISED * target.largest:
+        target, rounding = solved.search.problem.design.target, solved.search.rounding
+        finer = solved.search.question.finer(rounding)
+        if finer is None or abs(solved.check.rms - solved.predicted_rms) <= _PROMISED * target.largest:
             break
-        search = found.search.question.search(found.free, finer)
-        outcome = search.program.solve(carried_over(found.search, found.best.point, search))
+        search = solved.search.question.search(solved.free, finer)
+        outcome = search.program.solve(carried_over(solved.search, solved.best.point, search))
         if not outcome.solved:
             break
-        better = replace(found, search=search, best=outcome)
-        if better.check.rms >= found.check.rms:
+        better = replace(solved, search=search, best=outcome)
+        if better.check.rms >= solved.check.rms:
             break
-        found = better
-    return found
+        solved = better
+    return solved
 
 
-def finished(found: Found) -> CamDesign:
+def finished(solved: SolvedSearch) -> CamDesign:
     """Return the finished design.
 
     Parameters
     ----------
-    found
+    solved
         With its best solution.
     """
-    search, problem, best = found.search, found.search.problem, found.best
-    contour, fit = found.contour_fit
+    search, problem, best = solved.search, solved.search.problem, solved.best
+    contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
     limits = tuple(_state(problem, bound, best.point) for bound in search.bounds)
     return CamDesign(
         target=design.target,
-        changes=tuple(found.changes.items()),
-        actuator=found.changed,
-        check=found.check,
-        predicted_rms=found.predicted_rms,
+        changes=tuple(solved.changes.items()),
+        actuator=solved.changed,
+        check=solved.check,
+        predicted_rms=solved.predicted_rms,
         contour=contour,
         fit_error=0.0 if fit is None else fit.error,
         limits=limits,
         sensitivity=torque_sensitivity(
-            found.model, target=design.target, spring=_spring_of(found.model, problem.law.cam.name)
+            solved.model, target=design.target, spring=_spring_of(solved.model, problem.law.cam.name)
         ),
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
         starts=tuple(
-            StartOutcome(o.solved, o.status, o.iterations, o.cost, found.rms(o)) for o in found.outcomes
+            StartOutcome(o.solved, o.status, o.iterations, o.cost, solved.rms(o)) for o in solved.outcomes
         ),
-        taken=found.taken,
-        valleys=valleys(search, best.point, found.predicted_rms) if settings.look_for_valleys else (),
-        miss=_miss(found, limits),
+        taken=solved.taken,
+        valleys=valleys(search, best.point, solved.predicted_rms) if settings.look_for_valleys else (),
+        miss=_miss(solved, limits),
         remarks=_remarks(search),
     )
 
 
-def _miss(found: Found, limits: Sequence[LimitState]) -> Miss | None:
-    settings, target, check = found.search.question.settings, found.search.problem.design.target, found.check
+def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
+    settings, target, check = (
+        solved.search.question.settings,
+        solved.search.problem.design.target,
+        solved.check,
+    )
     allowed = settings.largest_error * target.largest
     if check.rms <= allowed:
         return None
     binding = [i for i, state in enumerate(limits) if state.active]
     remedies = (
         find_remedies(
-            found.search, found.free, found.best.point, allowed=allowed, error=check.rms, binding=binding
+            solved.search, solved.free, solved.best.point, allowed=allowed, error=check.rms, binding=binding
         )
         if settings.look_for_remedies
         else None
@@ -201,14 +205,16 @@ def _miss(found: Found, limits: Sequence[LimitState]) -> Miss | None:
 
 def _remarks(search: Search) -> tuple[str, ...]:
     cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
-    said = []
+    sentences = []
     if "MaximumCableTension" not in kinds:
-        said.append(
+        sentences.append(
             f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
         )
     if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
-        said.append("no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for")
-    return tuple(said)
+        sentences.append(
+            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
+        )
+    return tuple(sentences)
 
 
 def _curves(problem: DesignProblem, point: Floats) -> DesignCurves:

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from ...processes import parallel_map
 from ...quantity import parse_unit, with_unit
+from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
 from .problem import contour_names
 from .program import Program, Solution
-from .search import Search, carried_over, row_of
 from .starts import starts
 from .variables import DesignVariable, scaled
 

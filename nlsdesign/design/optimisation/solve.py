@@ -14,15 +14,15 @@ from ...processes import parallel_map
 from ..curves.target import Target
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
-from .finish import Found, finished, narrowed
+from .design_search import Question
+from .finish import SolvedSearch, finished, narrowed
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Limit
 from .problem import contour_names
 from .program import Solution
 from .result import Alternative, CamDesign
-from .search import Question
 from .settings import DesignSettings
-from .stock import Choice, combinations
+from .stock import StockChoice, combinations
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
@@ -34,7 +34,7 @@ def design_cam(
     actuator: Assembly,
     *,
     target: Target,
-    free: Sequence[str | Choice] | None = None,
+    free: Sequence[str | StockChoice] | None = None,
     keep: Sequence[Limit] = (),
     spring: str | None = None,
     goals: Sequence[Goal] = GOALS,
@@ -87,7 +87,7 @@ def design_cam(
     ArrangementError
         If the structure does not say which spring is meant, or its cam has no contour.
     """
-    choices = [each for each in free or () if isinstance(each, Choice)]
+    choices = [each for each in free or () if isinstance(each, StockChoice)]
     names = None if free is None else tuple(each for each in free if isinstance(each, str))
     for each in choices:
         if each.chosen in (names or ()):
@@ -98,10 +98,10 @@ def design_cam(
     wanted = _Wanted(target, names, tuple(keep), spring, tuple(goals))
     if not choices:
         return wanted.designed(actuator, settings)
-    found = wanted.chosen(combinations(actuator, choices), settings)
-    known, now = actuator.quantities(), found.actuator.quantities()
+    design = wanted.chosen(combinations(actuator, choices), settings)
+    known, now = actuator.quantities(), design.actuator.quantities()
     stock = [(each.chosen, now[each.chosen]) for each in choices if each.chosen in known]
-    return replace(found, changes=(*stock, *found.changes))
+    return replace(design, changes=(*stock, *design.changes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,24 +133,26 @@ class _Wanted:
         search.require_influence()
         outcomes = search.outcomes()
         if not any(outcome.solved for outcome in outcomes):
-            # Whether there is any cam at all is found out with softened limits.
+            # Whether there is any cam at all is design out with softened limits.
             outcomes.append(search.program.solve(feasible_point(search, free)))
         taken = _best(outcomes)
-        return finished(narrowed(Found(actuator, search, free, outcomes, taken, outcomes[taken])))
+        return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
         hasty = replace(settings, look_for_valleys=False, look_for_remedies=False, progress=_no_word)
 
         def one(number: int) -> tuple[Alternative, NlsError | None]:
-            said, assembly = options[number]
+            label, assembly = options[number]
             try:
-                found = self.designed(assembly, hasty)
+                design = self.designed(assembly, hasty)
             except (InfeasibleError, ConvergenceError) as error:
                 # One thickness that does not do is a line of the table; only if none does is it an error.
-                return Alternative(said, None, None, False, str(error)), error
-            cost = found.starts[found.taken].cost
-            return Alternative(said, cost, found.rms, found.met, "" if found.met else str(found.miss)), None
+                return Alternative(label, None, None, False, str(error)), error
+            cost = design.starts[design.taken].cost
+            return Alternative(
+                label, cost, design.rms, design.met, "" if design.met else str(design.miss)
+            ), None
 
         table: list[Alternative] = []
         errors: list[NlsError] = []

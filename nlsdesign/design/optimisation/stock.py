@@ -17,7 +17,7 @@ _MOST = 1000
 
 
 @dataclass(frozen=True)
-class Choice(ABC):
+class StockChoice(ABC):
     """Base of what a design chooses from a list."""
 
     @property
@@ -42,7 +42,7 @@ class Choice(ABC):
 
 
 @dataclass(frozen=True)
-class Stock(Choice):
+class Stock(StockChoice):
     """Numbers that are in stock, for instance thicknesses of sheets, diameters, numbers of elements.
 
     Parameters
@@ -89,7 +89,7 @@ class Stock(Choice):
 
 
 @dataclass(frozen=True)
-class RubberStock(Choice):
+class RubberStock(StockChoice):
     """Rubbers of the library to choose from.
 
     Parameters
@@ -123,7 +123,7 @@ class RubberStock(Choice):
             yield f"{self.chosen} of {name}", with_rubber(actuator, material(name), piece=self.piece)
 
 
-def combinations(actuator: Assembly, choices: Sequence[Choice]) -> list[tuple[str, Assembly]]:
+def combinations(actuator: Assembly, choices: Sequence[StockChoice]) -> list[tuple[str, Assembly]]:
     """Return every combination of options in words, with its assembly.
 
     Parameters
@@ -138,20 +138,20 @@ def combinations(actuator: Assembly, choices: Sequence[Choice]) -> list[tuple[st
     ValueRangeError
         If there are too many.
     """
-    found = [("", actuator)]
+    combined = [("", actuator)]
     for choice in choices:
-        found = [
-            (", ".join(filter(None, (said, option))), changed)
-            for said, assembly in found
+        combined = [
+            (", ".join(filter(None, (label, option))), changed)
+            for label, assembly in combined
             for option, changed in itertools.islice(choice.options(assembly), _MOST + 1)
         ]
-        if len(found) > _MOST:
+        if len(combined) > _MOST:
             raise ValueRangeError(
                 "free: " + ", ".join(each.chosen for each in choices),
                 f"gives more than {_MOST} combinations",
                 next_step="offer fewer, or free a size without a stock first to see where it wants to be",
             )
-    return found
+    return combined
 
 
 def _require_list(what: str, values: Sequence[object]) -> None:

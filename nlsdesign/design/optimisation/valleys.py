@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...processes import parallel_map
 from ...quantity import parse_unit, with_unit
+from .design_search import Search, row_of
 from .limits import MaximumTorqueError
 from .program import Program, Solution
-from .search import Search, row_of
 from .variables import scaled
 
 Floats = NDArray[np.float64]
@@ -110,8 +110,8 @@ def valleys(search: Search, best: Floats, rms: float) -> tuple[Valley, ...]:
         towards[number // 2] = 1.0 if number % 2 == 0 else -1.0
         return program.solve(best, parameters=towards)
 
-    found = list(parallel_map(end, 2 * len(problem.scalars)))
-    named = [problem.named(outcome.point) if outcome.solved else None for outcome in found]
+    outcomes = list(parallel_map(end, 2 * len(problem.scalars)))
+    named = [problem.named(outcome.point) if outcome.solved else None for outcome in outcomes]
     return tuple(
         _valley(search, variable.name, named[2 * i : 2 * i + 2], values[variable.name], allowed)
         for i, variable in enumerate(problem.scalars)
