@@ -22,7 +22,7 @@ from .problem import DesignProblem
 from .program import Solution
 from .remedies import find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
-from .valleys import valleys
+from .size_ranges import size_ranges
 
 Floats = NDArray[np.float64]
 
@@ -168,7 +168,9 @@ def finished(solved: SolvedSearch) -> CamDesign:
             StartOutcome(o.solved, o.status, o.iterations, o.cost, solved.rms(o)) for o in solved.outcomes
         ),
         taken=solved.taken,
-        valleys=valleys(search, best.point, solved.predicted_rms) if settings.look_for_valleys else (),
+        size_ranges=size_ranges(search, best.point, solved.predicted_rms)
+        if settings.look_for_size_ranges
+        else (),
         miss=_miss(solved, limits),
         remarks=_remarks(search),
     )

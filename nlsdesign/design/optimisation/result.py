@@ -14,7 +14,7 @@ from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from .remedies import Remedies
-from .valleys import Valley
+from .size_ranges import SizeRange
 
 Floats = NDArray[np.float64]
 
@@ -255,7 +255,7 @@ class CamDesign:
         Where the search from each start came to; ``taken`` is the number of the one that was taken.
     taken
         Number of the start.
-    valleys
+    size_ranges
         Ranges of sizes that cost nothing.
     miss
         Why the design is no success; ``None`` if it is one.
@@ -278,7 +278,7 @@ class CamDesign:
     rubber_volume: float
     starts: tuple[StartOutcome, ...]
     taken: int
-    valleys: tuple[Valley, ...] = ()
+    size_ranges: tuple[SizeRange, ...] = ()
     miss: Miss | None = None
     remarks: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
@@ -358,7 +358,10 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         ("radius of curvature", f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
         ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
-        ("flat valleys", "; ".join(str(each) for each in design.valleys if each.wide) or "none"),
+        (
+            "sizes that cost nothing",
+            "; ".join(str(each) for each in design.size_ranges if each.wide) or "none",
+        ),
         ("starts", _starts(design)),
         ("solver", f"{design.starts[design.taken].iterations} iterations{fit}"),
         ("fingerprint", design.fingerprint),
