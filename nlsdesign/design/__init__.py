@@ -44,7 +44,7 @@ from .optimisation.limits import (
     PretensionRange,
     RestLengthRange,
 )
-from .optimisation.limits_of_use import OverTravel
+from .optimisation.limits_of_use import OverTravel, TorqueWithin
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import design_cam
@@ -128,6 +128,7 @@ __all__ = [
     "TorqueBand",
     "TorqueCheck",
     "TorqueError",
+    "TorqueWithin",
     "Trim",
     "TrimEffect",
     "TwoBranchSpring",

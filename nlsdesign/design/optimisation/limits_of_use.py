@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import casadi as ca
+
 from ...errors import ValueRangeError
 from ...quantity import Quantity
 from ..curves.numbers import in_si, plain
+from ..curves.shapes import TorqueBand
 from .design_point import DesignPoint
 from .limits import Bound, Limit, MaximumCableTension, MaximumStrain, MaximumStress
 
@@ -57,3 +60,36 @@ class OverTravel(Limit):
                     unit=bound.unit,
                     scale=bound.scale,
                 )
+
+
+@dataclass(frozen=True)
+class TorqueWithin(Limit):
+    """Torque between a lower and an upper curve at every angle of the contour that the band covers.
+
+    Parameters
+    ----------
+    band
+        The two curves.
+
+    Raises
+    ------
+    ValueRangeError
+        If the band ends before the target does.
+    """
+
+    band: TorqueBand
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield both edges, without angle zero, where a cable through the centre has no torque."""
+        if self.band.last_angle < design.target.last_angle * (1 - 1e-9):
+            raise ValueRangeError(
+                f"TorqueWithin: band up to {self.band.last_angle:.4g} rad",
+                f"ends before the target does, at {design.target.last_angle:.4g} rad",
+                next_step="continue both curves to the last angle of the target",
+            )
+        angles = [design.angles[i] for i in range(1, design.angles.shape[0])]
+        low = ca.vertcat(*[self.band.lower_law(angle) for angle in angles])
+        high = ca.vertcat(*[self.band.upper_law(angle) for angle in angles])
+        torques, scale = design.torques[1:], design.target.largest
+        yield self._bound("torque above band", torques - low, 0.0, upper=False, unit="mN*m", scale=scale)
+        yield self._bound("torque below band", torques - high, 0.0, upper=True, unit="mN*m", scale=scale)
