@@ -38,7 +38,8 @@ def torque_check(model: FlatModel, *, target: Target, spring: str | None = None)
     """
     angles = np.linspace(0.0, target.last_angle, _ANGLES)
     torque = torque_function(model, spring)(angles.reshape(1, -1), model.start(model.parameters))
-    return TorqueCheck(angles, np.array(torque, dtype=float).ravel(), target.torque(angles))
+    values = np.array(torque, dtype=float).ravel()
+    return TorqueCheck(angles, values, target.torque(angles), target.weight(angles))
 
 
 def torque_sensitivity(model: FlatModel, *, target: Target, spring: str | None = None) -> Sensitivity:

@@ -63,11 +63,14 @@ class TorqueCheck:
     ----------
     angles, torques, targets
         Shape (n,), in rad and N·m.
+    weights
+        Of the squared error, shape (n,); all alike for ``None``.
     """
 
     angles: Floats
     torques: Floats
     targets: Floats
+    weights: Floats | None = None
 
     @property
     def errors(self) -> Floats:
@@ -76,8 +79,10 @@ class TorqueCheck:
 
     @property
     def rms(self) -> float:
-        """Root of the mean over the angle of the squared error."""
-        return float(np.sqrt(np.trapezoid(self.errors**2, self.angles) / (self.angles[-1] - self.angles[0])))
+        """Root of the mean over the angle of the squared error, weighted as the target says."""
+        weights = np.ones_like(self.angles) if self.weights is None else self.weights
+        squares = np.trapezoid(weights * self.errors**2, self.angles)
+        return float(np.sqrt(squares / np.trapezoid(weights, self.angles)))
 
     @property
     def largest(self) -> float:
