@@ -116,7 +116,7 @@ def read_job(path: Path | str) -> DesignJob:
     if "target" not in deck.tables:
         raise DeckError(
             file.name, "has no target",
-            next_step='write [target] and below it ExponentialTorque = {maximum = "5 N*m", ...} or file = "..."',
+            next_step='write [target] and below it PowerTorque = {coefficient = ..., ...} or file = "..."',
         )  # fmt: skip
     free = _names(deck, "free")
     stock = tuple(_stock(deck))
@@ -141,7 +141,8 @@ def kinds(base: type) -> dict[str, type]:
     base
         Of targets, limits or goals.
     """
-    result = {}
+    result: dict[str, type] = {}
+    kind: type
     for kind in base.__subclasses__():
         if not getattr(kind, "__abstractmethods__", None):
             result[kind.__name__] = kind
@@ -208,11 +209,11 @@ def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
         if isinstance(inner, type):
             return _built(deck, inner, raw, place)
         if Limit in typing.get_args(hint):
-            return tuple(_of_kinds(deck, place, Limit, raw))  # type: ignore[type-abstract]
+            return tuple(_of_kinds(deck, place, Limit, raw))
         raise DeckError(place, "is a table where a number or text is wanted")
     if isinstance(raw, list):
-        inner = typing.get_args(hint)[0] if typing.get_args(hint) else Any
-        return tuple(_value(deck, inner, item, place) for item in raw)
+        of_items = typing.get_args(hint)[0] if typing.get_args(hint) else Any
+        return tuple(_value(deck, of_items, item, place) for item in raw)
     if isinstance(raw, str) and (Quantity in allowed or float in allowed):
         return _number(raw, place)
     return float(raw) if isinstance(raw, float) else raw
