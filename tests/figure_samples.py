@@ -14,13 +14,16 @@ from nlsdesign.design import (
     MotorAndGear,
     Task,
     TaskCurve,
+    ToleranceResult,
     contour_from_curvature,
     curve_for_task,
+    tolerance_analysis,
 )
 from nlsdesign.model import Variable
 from nlsdesign.observer import ErrorStability
 from nlsdesign.quantity import degrees
 from nlsdesign.simulation import Trace
+from tests import cam_cases
 
 TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0, tolerance=0.05)
 TIME = np.linspace(0.0, 1.0, 4001)
@@ -127,10 +130,17 @@ def task_curve() -> TaskCurve:
     return curve_for_task(task, drive)
 
 
+def made_springs() -> ToleranceResult:
+    """Springs with contact errors and a trim, from few draws."""
+    return tolerance_analysis(cam_cases.actuator(cam_cases.CONCAVE, pretension=2e-3), target=TARGET, draws=40)
+
+
 FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "cam_positions": lambda: figures.cam_positions(motion()),
     "torque_curve": lambda: figures.torque_curve(motion(), at=30),
     "torque_against_target": against_target,
+    "tolerance_bars": lambda: figures.tolerance_bars(made_springs()),
+    "torque_band": lambda: figures.torque_band(made_springs()),
     "torque_against_measured": against_measured,
     "torque_loops": lambda: figures.torque_loops({"25°": (loop(0.1), loop(0.12))}),
     "observability": lambda: figures.observability_over_angle(

@@ -17,6 +17,17 @@ from .curves.task_curve import (
     scan_gear_ratio,
 )
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .drawing.cam_part import CamPart, Hole
+from .drawing.machined_cam import (
+    BoltCircle,
+    ClampScrew,
+    FerruleSeat,
+    MachinedCam,
+    MachinedOneSidedCam,
+    MachinedTwoSidedCam,
+)
+from .optimisation.checks import torque_check, torque_sensitivity
+from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -28,32 +39,53 @@ from .optimisation.limits import (
     MaximumStress,
     MaximumTorqueError,
     MinimumRadiusOfCurvature,
+    NumberRange,
     PositiveStiffness,
     PretensionRange,
     RestLengthRange,
 )
+from .optimisation.limits_of_use import OverTravel, TorqueWithin
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
-from .optimisation.solve import design_cam, torque_check, torque_sensitivity
+from .optimisation.settings import DesignSettings
+from .optimisation.solve import design_cam
+from .optimisation.stock import RubberStock, Stock, StockChoice
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
+from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.monte_carlo import tolerance_analysis
+from .tolerance.tolerance_result import CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect
+from .tolerance.trimming import Trim
 
 __all__ = [
     "AnchorDistance",
     "AreaRange",
+    "BoltCircle",
     "CamDesign",
     "CamFit",
+    "CamPart",
     "CamProfile",
+    "Cause",
+    "CauseEffect",
+    "ClampScrew",
     "Contour",
+    "DesignSettings",
     "ElasticLaw",
     "ExponentialTorque",
+    "FerruleSeat",
     "Goal",
+    "Hole",
     "LeastEnergy",
     "LeastPeakPower",
     "LeastRubber",
     "Limit",
     "LimitState",
+    "MachinedCam",
+    "MachinedOneSidedCam",
+    "MachinedTwoSidedCam",
+    "MaterialScatter",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumStrain",
@@ -62,17 +94,28 @@ __all__ = [
     "MinimumRadiusOfCurvature",
     "MotorAndGear",
     "MotorCycle",
+    "NormalSpread",
+    "NumberRange",
     "OddSpring",
+    "OneBatch",
     "OneSidedSpring",
+    "OverTravel",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
+    "QuantileEstimate",
     "RestLengthRange",
+    "RubberStock",
     "Sensitivity",
+    "SeparateModuli",
     "SmoothContour",
+    "SpreadReading",
+    "SpreadRules",
     "SpringLimits",
     "SpringSymmetry",
+    "Stock",
+    "StockChoice",
     "TabulatedStiffness",
     "TabulatedTorque",
     "Target",
@@ -81,16 +124,22 @@ __all__ = [
     "TaskCycle",
     "TaskGoal",
     "TaskProblem",
+    "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
     "TorqueError",
+    "TorqueWithin",
+    "Trim",
+    "TrimEffect",
     "TwoBranchSpring",
+    "UniformSpread",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
     "curve_for_task",
     "design_cam",
+    "draw_deviations",
     "elastic_law",
     "energy_profile",
     "equilibrium_torque",
@@ -100,7 +149,9 @@ __all__ = [
     "read_band",
     "read_target",
     "read_task",
+    "safe_limits",
     "scan_gear_ratio",
+    "tolerance_analysis",
     "torque_check",
     "torque_sensitivity",
     "walking_task",

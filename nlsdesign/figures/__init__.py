@@ -14,6 +14,7 @@ from .before_after import (
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
+from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
@@ -21,6 +22,7 @@ from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
     "CamMotion",
@@ -29,7 +31,9 @@ __all__ = [
     "ClosedLoopRun",
     "Figure",
     "HeldOut",
+    "InspectionRow",
     "RecordError",
+    "TitleBlock",
     "alternative_text",
     "binned_errors",
     "cam_motion",
@@ -57,9 +61,12 @@ __all__ = [
     "stability_over_angle",
     "styled",
     "svg_text",
+    "tolerance_bars",
     "torque_against_measured",
     "torque_against_target",
+    "torque_band",
     "torque_curve",
     "torque_loops",
+    "workshop_drawing",
     "write_figures",
 ]
