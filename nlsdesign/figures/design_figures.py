@@ -10,7 +10,20 @@ from numpy.typing import NDArray
 from ..design import CamDesign, Contour, LimitState
 from ..design.statics.contour import turn
 from ..quantity import parse_unit, with_unit
-from .style import BLUE, GREEN, GRID, INK, MUTED, ORANGE, SURFACE, VERMILLION, described, panels, styled
+from .style import (
+    BLUE,
+    GREEN,
+    GRID,
+    INK,
+    MUTED,
+    ORANGE,
+    SURFACE,
+    VERMILLION,
+    WIDTH,
+    described,
+    panels,
+    styled,
+)
 
 Floats = NDArray[np.float64]
 
@@ -27,11 +40,19 @@ def design_picture(design: CamDesign) -> Figure:
         Finished.
     """
     last = float(design.contour.angles[-1])
-    figure, axes = panels(1, 2, height=4.0, sharex=True, sharey=True)
+    reach = float(design.contour.radii.max())
+    length, area = next(iter(_pieces(design)), (0.0, 0.0))
+    wide = _end_of_cable(design.contour, reach)[0] + length + float(design.curves.extensions.max()) + 8e-3
+    tall = max(1.2 * reach, 0.6 * float(np.sqrt(area)) + 0.5 * reach)
+    left = -wide if np.isfinite(design.contour.anchor_distance) else -1.3 * reach
+    height = (WIDTH - 0.8) * 2.6 * tall / (wide - left)
+    figure, axes = panels(2, 1, height=2.0 * height + 1.2, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         _draw(panel, design, angle)
-    _dimension_radius(axes[0], design)
-    figure.supxlabel("distance from the centre in mm", fontsize=9)
+        panel.set_xlim(left * _MM, wide * _MM)
+        panel.set_ylim(-1.6 * tall * _MM, 1.0 * tall * _MM)
+    _dimension_radius(axes[0], design, -1.3 * tall * _MM)
+    axes[1].set_xlabel("distance from the centre in mm")
     radius = float(design.contour.radii.max()) * _MM
     return described(
         figure,
@@ -96,8 +117,7 @@ def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
         axes.fill(*(turn(half, angle) * _MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
     arm = float(np.interp(angle, contour.angles, contour.lever_arms))
     contact = _contact(contour, angle)
-    reach = 1.9 * float(contour.radii.max()) if parallel else contour.anchor_distance
-    end = np.array([contact[0] + reach, contact[1]]) if parallel else np.array([reach, 0.0])
+    end = _end_of_cable(contour, float(contour.radii.max())) + (contact * [0.0, 1.0] if parallel else 0.0)
     for side in (1.0,) if parallel else (1.0, -1.0):
         line = np.vstack([contact, end]) * side * _MM
         axes.plot(*line.T, color=BLUE.light, linewidth=1.6)
@@ -116,6 +136,12 @@ def _draw(axes: Axes, design: CamDesign, angle: float) -> None:
     )
     axes.set_aspect("equal")
     axes.grid(visible=False)
+
+
+def _end_of_cable(contour: Contour, reach: float) -> Floats:
+    """Return where the drawn cable ends: at its anchor, or a little outside the cam where it is parallel."""
+    near = np.isfinite(contour.anchor_distance) and contour.anchor_distance < 5.0 * reach
+    return np.array([contour.anchor_distance if near else 1.9 * reach, 0.0])
 
 
 def _halves(contour: Contour, parallel: bool) -> list[Floats]:
@@ -171,20 +197,26 @@ def _rubber_words(design: CamDesign) -> str:
     return f"{length * _MM:.1f} mm long and {area * _MM**2:.0f} mm² thick"
 
 
-def _dimension_radius(axes: Axes, design: CamDesign) -> None:
-    """Dimension the largest radius of the cam and the distance of the anchor."""
-    contour = design.contour
-    radius, below = float(contour.radii.max()) * _MM, -1.18 * float(contour.radii.max()) * _MM
-    _dimension(axes, -radius, radius, below, f"Ø {2 * radius:.1f}")
-    if np.isfinite(contour.anchor_distance) and contour.anchor_distance < 1.0:
-        anchor = contour.anchor_distance * _MM
-        _dimension(axes, 0.0, anchor, 1.6 * below, f"{anchor:.1f}")
+def _dimension_radius(axes: Axes, design: CamDesign, y: float) -> None:
+    """Dimension the largest radius of the cam, the distance of the anchor and the unstretched rubber."""
+    contour, radius = design.contour, float(design.contour.radii.max()) * _MM
+    anchor = float(_end_of_cable(contour, radius / _MM)[0]) * _MM
+    _dimension(axes, 0.0, radius, y, f"R {radius:.1f}")
+    if contour.anchor_distance * _MM == anchor:
+        _dimension(axes, 0.0, -anchor, y, f"anchor {anchor:.1f}")
+    pieces = _pieces(design)
+    if pieces:
+        length, area = pieces[0]
+        axes.annotate(
+            f"rubber, unstretched {length * _MM:.1f} mm, {area * _MM**2:.1f} mm² (drawn square)",
+            (anchor + 4.0, y), fontsize=7.5, color=INK.light,
+        )  # fmt: skip
 
 
 def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> None:
-    axes.annotate(
-        "", (left, y), (right, y), arrowprops={"arrowstyle": "<->", "color": MUTED.light, "linewidth": 0.8}
-    )
+    axes.plot([left, right], [y, y], color=MUTED.light, linewidth=0.8)
+    for end in (left, right):
+        axes.plot([end, end], [y - 0.6, y + 0.6], color=MUTED.light, linewidth=0.8)
     axes.annotate(
         text, ((left + right) / 2, y), (0, 2), textcoords="offset points", ha="center", fontsize=7.5,
         color=INK.light,
