@@ -26,7 +26,8 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
-from .jobs.job_file import DesignJob, read_job
+from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.task_target import TaskTarget
 from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
@@ -126,6 +127,7 @@ __all__ = [
     "TaskCycle",
     "TaskGoal",
     "TaskProblem",
+    "TaskTarget",
     "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
@@ -146,6 +148,7 @@ __all__ = [
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "job_of",
     "motor_and_gear",
     "motor_cycle",
     "read_band",

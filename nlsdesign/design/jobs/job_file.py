@@ -13,15 +13,18 @@ from typing import Any, TypeVar
 from ...deck import Deck, read_deck
 from ...errors import DeckError, NlsError, UnitError, unknown_name
 from ...quantity import Quantity, quantity
+from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
 from ..curves.target_files import read_target
+from ..curves.task_curve import TaskGoal
 from ..optimisation.goals import Goal
 from ..optimisation.limits import Limit
 from ..optimisation.settings import DesignSettings
 from ..optimisation.solve import GOALS
 from ..optimisation.stock import RubberStock, Stock, StockChoice
+from .task_target import TaskTarget
 
-Asked = TypeVar("Asked", Target, Limit, Goal)
+Asked = TypeVar("Asked")
 
 _TABLES = ("spring", "free", "target", "limits", "goals", "stock", "search", "tolerance", "drawing")
 _SEARCH = ("starts", "seed", "largest_error")
@@ -36,7 +39,7 @@ class DesignJob:
     path
         File that it was read from.
     target
-        Torque curve.
+        Torque curve, or the task that it follows from.
     free
         Names and stocks; ``None`` for the contour alone.
     keep
@@ -52,7 +55,7 @@ class DesignJob:
     """
 
     path: Path
-    target: Target
+    target: Target | TaskTarget
     free: tuple[str | StockChoice, ...] | None
     keep: tuple[Limit, ...]
     goals: tuple[Goal, ...]
@@ -63,11 +66,7 @@ class DesignJob:
 
 
 def read_job(path: Path | str) -> DesignJob:
-    """Read a design file.
-
-    Each limit and goal is a line ``Name = {field = "number unit"}`` under ``[limits]`` or ``[goals]``, with
-    the names and fields of the Python objects; the target is one such line under ``[target]``, or
-    ``file = "curve.csv"`` (beside the design file). Bare numbers are in SI.
+    """Read a design file; see :func:`job_of` for what stands in it.
 
     Parameters
     ----------
@@ -76,8 +75,37 @@ def read_job(path: Path | str) -> DesignJob:
 
     Raises
     ------
+    NlsError
+        As for :func:`job_of`, or if the file cannot be read.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DeckError(
+            str(file), f"cannot be read: {error}", next_step="give a design file in TOML, UTF-8"
+        ) from None
+    return job_of(text, file)
+
+
+def job_of(text: str, file: Path) -> DesignJob:
+    """Read what is asked of a design.
+
+    Each limit and goal is a line ``Name = {field = "number unit"}`` under ``[limits]`` or ``[goals]``, with
+    the names and fields of the Python objects; the target is one such line under ``[target]``, or
+    ``file = "curve.csv"`` (beside the design file). Bare numbers are in SI.
+
+    Parameters
+    ----------
+    text
+        TOML.
+    file
+        Where it came from, for messages and for the files that it names.
+
+    Raises
+    ------
     DeckError
-        If the file cannot be read, or a table is of the wrong kind; file, line and column are named.
+        If a table is of the wrong kind; file, line and column are named.
     UnknownNameError
         If there is no such table, limit, goal, target or field, with the nearest that exists.
     NlsError
@@ -91,6 +119,8 @@ def read_job(path: Path | str) -> DesignJob:
 
         [target]
         ExponentialTorque = {maximum = "5 N*m", angle = "53 deg", shape = 1.0}
+        # or: file = "curve.csv"
+        # or: TaskTarget = {joint = "ankle", body_mass = "75 kg", scale = 0.05, gear_ratio = 80.0}
 
         [limits]
         MaximumCamRadius = {radius = "20 mm"}
@@ -103,13 +133,7 @@ def read_job(path: Path | str) -> DesignJob:
         starts = 20
         largest_error = "1 %"
     """
-    file = Path(path)
-    try:
-        deck = read_deck(file.read_text(encoding="utf-8-sig"), file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise DeckError(
-            str(file), f"cannot be read: {error}", next_step="give a design file in TOML, UTF-8"
-        ) from None
+    deck = read_deck(text, file)
     for key in deck.tables:
         if key not in _TABLES:
             raise unknown_name(deck.place(key), key, _TABLES)
@@ -150,16 +174,19 @@ def kinds(base: type) -> dict[str, type]:
     return dict(sorted(result.items()))
 
 
-def _target(deck: Deck) -> Target:
+def _target(deck: Deck) -> Target | TaskTarget:
     table = _table(deck, "target")
     if len(table) != 1:
         raise DeckError(
             deck.place("target"), f"has {len(table)} entries, a design has one target",
-            next_step=f'keep one of: file = "...", {", ".join(kinds(Target))}',
+            next_step=f'keep one of: file = "...", TaskTarget, {", ".join(kinds(Target))}',
         )  # fmt: skip
     ((name, given),) = table.items()
     if name == "file":
         return read_target(deck.path.parent / str(given))
+    if name == "TaskTarget":
+        task: TaskTarget = _built(deck, TaskTarget, given, deck.place("target.TaskTarget"))
+        return task
     (target,) = _objects(deck, "target", Target)  # type: ignore[type-abstract]
     return target
 
@@ -210,6 +237,11 @@ def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
             return _built(deck, inner, raw, place)
         if Limit in typing.get_args(hint):
             return tuple(_of_kinds(deck, place, Limit, raw))
+        base = next(
+            (each for each in allowed if isinstance(each, type) and each in (TaskGoal, SpringSymmetry)), None
+        )
+        if base is not None:
+            return next(iter(_of_kinds(deck, place, base, raw)))
         raise DeckError(place, "is a table where a number or text is wanted")
     if isinstance(raw, list):
         of_items = typing.get_args(hint)[0] if typing.get_args(hint) else Any
