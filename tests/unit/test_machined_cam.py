@@ -201,7 +201,8 @@ def test_step_holds_the_solids_in_millimetres(tmp_path: Path, contour: Contour) 
     for text_of in entities.values():
         if circle := re.fullmatch(rf"CIRCLE\('',#(\d+),{number}\)", text_of):
             place = re.match(r"AXIS2_PLACEMENT3D\('',#(\d+)", entities[circle[1]])
-            assert place is not None
+            if place is None:  # a circle in the plane of a face's own parameters
+                continue
             centre = re.findall(number, entities[place[1]].partition("(")[2].partition("(")[2])
             circles.append([float(item) for item in (*centre, circle[2])])
     rows = np.array(circles)
