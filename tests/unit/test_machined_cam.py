@@ -200,7 +200,7 @@ def test_step_holds_the_solids_in_millimetres(tmp_path: Path, contour: Contour) 
     circles = []
     for text_of in entities.values():
         if circle := re.fullmatch(rf"CIRCLE\('',#(\d+),{number}\)", text_of):
-            place = re.match(r"AXIS2_PLACEMENT3D\('',#(\d+)", entities[circle[1]])
+            place = re.match(r"AXIS2_PLACEMENT_3D\('',#(\d+)", entities[circle[1]])
             if place is None:  # a circle in the plane of a face's own parameters
                 continue
             centre = re.findall(number, entities[place[1]].partition("(")[2].partition("(")[2])
