@@ -25,12 +25,15 @@ from .components import Assembly as Assembly
 from .components import Encoder as Encoder
 from .components import Inertia as Inertia
 from .components import assembly as assembly
+from .components import material as material
 from .components import parallel as parallel
+from .components import rubber_of as rubber_of
 from .components import series as series
 from .components import specimen as specimen
 from .components import standard_linear_solid as standard_linear_solid
 from .components import through as through
 from .components import tie as tie
+from .components import with_rubber as with_rubber
 from .components.assembly.deck_writer import declare as declare
 from .components.assembly.deck_writer import write_deck as write_deck
 from .control import ClosedLoop as ClosedLoop

@@ -50,6 +50,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
+    "design.optimisation.solve": ("components.core.element",),
+    "design.optimisation.stock": ("components.assembly.other_rubber", "components.materials.library"),
     "discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),
     "design.statics": ("components.transmission",),

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from .assembly.deck_reader import component_classes
 from .assembly.named_parts import Assembly, assembly
+from .assembly.other_rubber import with_rubber
 from .assembly.renamed import renamed
 from .assembly.smooth_form import smoothed
 from .core.contacts import Regularised, Rounded, Sharp
@@ -11,14 +12,16 @@ from .core.dampers import Dashpot, ViscousMaterial
 from .core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .core.element import Element, Parallel, parallel
 from .core.part import Part
+from .core.part_numbers import NotDeclared
 from .core.series import Series, series
-from .core.springs import LinearElastic, Spring, StrainStiffening
+from .core.springs import FittedRange, LinearElastic, Spring, StrainStiffening
 from .core.tie import Tie, tie
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
+from .materials.material_law import MaterialLaw, law_of, material_laws, rubber_of
 from .materials.named_networks import (
     burgers,
     generalised_maxwell,
@@ -30,7 +33,7 @@ from .materials.permanent_set import Following, PermanentSet, Rising
 from .materials.rate_independent import SlidingFillers
 from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
 from .materials.smooth_hysteresis import BoucWen
-from .materials.specimen import Specimen, specimen
+from .materials.specimen import Area, Specimen, Strength, Strip, specimen
 from .materials.springpot import Springpot
 from .materials.stress_softening import DamageByMotion, LargestMotion, OgdenRoxburgh, StressSoftening
 from .materials.time_shift import ArrheniusShift, WlfShift
@@ -64,7 +67,7 @@ from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
 from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
 from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
-from .transmission.cam import Cam, Pulley, TwoSidedCam, control_values
+from .transmission.cam import Cable, Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
 from .transmission.cam_error import CamWithProfileError
 from .transmission.cam_shapes import AnchoredCam, OneSidedCam
@@ -77,6 +80,7 @@ __all__ = [
     "ROTATION",
     "TRANSLATION",
     "AnchoredCam",
+    "Area",
     "ArrheniusShift",
     "ArrudaBoyce",
     "Assembly",
@@ -85,6 +89,7 @@ __all__ = [
     "Body",
     "BoucWen",
     "Buckling",
+    "Cable",
     "Cam",
     "CamWithProfileError",
     "CapstanFriction",
@@ -111,6 +116,7 @@ __all__ = [
     "Encoder",
     "EndStop",
     "ExtendedTube",
+    "FittedRange",
     "Fixed",
     "FlowingChains",
     "Following",
@@ -139,7 +145,9 @@ __all__ = [
     "Mass",
     "MassOnArm",
     "Material",
+    "MaterialLaw",
     "NeoHooke",
+    "NotDeclared",
     "Ogden",
     "OgdenRoxburgh",
     "OneSidedCam",
@@ -170,9 +178,11 @@ __all__ = [
     "Spring",
     "Springpot",
     "StrainStiffening",
+    "Strength",
     "StressSoftening",
     "StretchyCable",
     "StribeckFriction",
+    "Strip",
     "Tachometer",
     "Through",
     "Tie",
@@ -198,17 +208,21 @@ __all__ = [
     "control_values",
     "generalised_maxwell",
     "kelvin_voigt",
+    "law_of",
     "material",
+    "material_laws",
     "materials",
     "maxwell",
     "parallel",
     "pull_only",
+    "rubber_of",
     "series",
     "smoothed",
     "specimen",
     "standard_linear_solid",
     "through",
     "tie",
+    "with_rubber",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take any misspelt name for a part

@@ -24,9 +24,11 @@ from ..symbolic import Expression, depends
 from .equation_builder import EquationBuilder, PartScope
 from .flat import FlatModel, Variable
 from .gear_train import balance_train, train_motions, trains
+from .owners import Owners
 from .readings import readings_of
+from .spring_structure import springs_of
 from .stiction import Laws, natural_modes, switch_laws, switching
-from .structure import Owners, moving_bodies, springs_of
+from .structure import moving_bodies
 
 
 def flatten(

@@ -5,19 +5,19 @@ Consumers ask here which variable is the speed of a body or the lever arm of a c
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
 from ..components.core.element import MATERIAL, Domain, Element
-from ..components.core.part import Part, walk
 from ..components.core.tie import Tie
-from ..components.materials.specimen import Specimen
 from ..components.mechanics.bodies import Body, Free, GearedMotor, Inertia, Mass
 from ..components.mechanics.motor import ElectricMotor
-from ..components.transmission.cam_drive import Through
 from .gear_train import trains
+from .owners import Owners, declared_by
 from .readings import ReadingNames
+from .spring_structure import CamNames as CamNames
+from .spring_structure import SpringNames as SpringNames
 
 
 @dataclass(frozen=True)
@@ -91,108 +91,6 @@ class MovingBody:
         return self.inertia is None
 
 
-@dataclass(frozen=True)
-class SpecimenNames:
-    """The names around one piece of material.
-
-    Parameters
-    ----------
-    name
-        Path of the piece.
-    area, rest_length
-        Parameters.
-    strain, force
-        Signals.
-    """
-
-    name: str
-    area: str
-    rest_length: str
-    strain: str
-    force: str
-
-
-@dataclass(frozen=True)
-class CamNames:
-    """The names around one cam and what stands behind it.
-
-    Parameters
-    ----------
-    name
-        Path of the cam.
-    drive
-        Path of the part that holds cam and element.
-    angle, torque, lever_arm
-        Signals: angle and torque of the drive, lever arm at that angle.
-    element
-        Path of what is stretched.
-    extension, force
-        Signals of what is stretched.
-    pretension, elements
-        Parameters: extension at angle zero, number of equal elements.
-    control_values
-        Parameters that shape the lever arm; none for a wheel.
-    anchor_distance, last_angle
-        Parameters: distance of the anchor from the centre, where the contour ends; ``None`` for a cam
-        without.
-    numbers
-        Parameters of the drive and the element that are single numbers.
-    states
-        Inner states of the element.
-    specimens
-        The pieces of material in it.
-    """
-
-    name: str
-    drive: str
-    angle: str
-    torque: str
-    lever_arm: str
-    element: str
-    extension: str
-    force: str
-    pretension: str
-    elements: str
-    control_values: tuple[str, ...]
-    anchor_distance: str | None
-    last_angle: str | None
-    numbers: tuple[str, ...]
-    states: tuple[str, ...]
-    specimens: tuple[SpecimenNames, ...]
-
-
-@dataclass(frozen=True)
-class SpringNames:
-    """A tie that restores: what lies between two bodies and is elastic.
-
-    Parameters
-    ----------
-    name
-        Path of the tie.
-    domain
-        Of its motion and effort.
-    motion, effort
-        Signals.
-    between
-        Names of the bodies at its ends, one or two.
-    cams
-        The cams in it, in written order.
-    parameters
-        All numbers in it.
-    states
-        All states in it.
-    """
-
-    name: str
-    domain: Domain
-    motion: str
-    effort: str
-    between: tuple[str, ...]
-    cams: tuple[CamNames, ...]
-    parameters: tuple[str, ...] = ()
-    states: tuple[str, ...] = ()
-
-
 def body_moved_by(bodies: Sequence[MovingBody], motion: str) -> MovingBody | None:
     """Return the body that has this motion, ``None`` if there is none.
 
@@ -233,36 +131,6 @@ def top_part(name: str) -> str:
     return name.partition(".")[0]
 
 
-@dataclass(frozen=True)
-class Owners:
-    """Which part declared a variable: path of the part by name of the variable, in order of declaration.
-
-    Parameters
-    ----------
-    parameters, states, inputs, signals
-        Of the whole model.
-    """
-
-    parameters: Mapping[str, str]
-    states: Mapping[str, str]
-    inputs: Mapping[str, str]
-    signals: Mapping[str, str]
-
-    def keeping(self, states: Collection[str], inputs: Collection[str]) -> Owners:
-        """Return a copy with these states and inputs only.
-
-        Parameters
-        ----------
-        states, inputs
-            Names.
-        """
-        return replace(
-            self,
-            states={name: path for name, path in self.states.items() if name in states},
-            inputs={name: path for name, path in self.inputs.items() if name in inputs},
-        )
-
-
 def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
     """Return the bodies that have a motion of their own, in written order.
 
@@ -284,7 +152,7 @@ def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
         if not isinstance(part, Free):
             bodies.append(MovingBody(name, part.domain, motion, rate, None, ()))
             continue
-        drives = tuple(_declared_by([name], owners.inputs))
+        drives = tuple(declared_by([name], owners.inputs))
         inertia = f"{name}.{'train_inertia' if name in geared else part.inertia_name}"
         motor = _motor(name, part, drives) if isinstance(part, GearedMotor | ElectricMotor) else None
         commands, goals = _commands(assembly, (name, *geared.get(name, ())))
@@ -311,100 +179,6 @@ def _motor(name: str, part: GearedMotor | ElectricMotor, drives: Iterable[str]) 
         current_limit=f"{name}.current_limit",
         gear_ratio=f"{name}.gear_ratio" if isinstance(part, GearedMotor) else None,
     )
-
-
-def _declared_by(paths: Collection[str], owned: Mapping[str, str]) -> Iterator[str]:
-    return (name for name, path in owned.items() if path in paths)
-
-
-def springs_of(assembly: Assembly, owners: Owners) -> tuple[SpringNames, ...]:
-    """Return the ties that restore, in written order.
-
-    Parameters
-    ----------
-    assembly
-        As declared.
-    owners
-        Of the variables of its model.
-    """
-    springs = []
-    for name, part in assembly.parts:
-        if not isinstance(part, Tie) or not part.element.restores:
-            continue
-        inside, domain = [path for path, _ in walk(part, name)], part.element.domain
-        drives = [(path, p) for path, p in walk(part.element, name) if isinstance(p, Through)]
-        springs.append(
-            SpringNames(
-                name=name,
-                domain=domain,
-                motion=f"{name}.{domain.motion}",
-                effort=f"{name}.{domain.effort}",
-                between=part.between,
-                cams=tuple(_cam(path, drive, owners) for path, drive in drives),
-                parameters=tuple(_declared_by(inside, owners.parameters)),
-                states=tuple(_declared_by(inside, owners.states)),
-            )
-        )
-    return tuple(springs)
-
-
-def _cam(path: str, part: Through, owners: Owners) -> CamNames:
-    (own, behind), cam = part.behind, f"{path}.cam"
-    element, inner, of_cam = f"{path}.{own}", behind.domain, part.cam.parameters()
-    pieces = dict(walk(behind, element))
-    return CamNames(
-        name=cam,
-        drive=path,
-        angle=f"{path}.{part.domain.motion}",
-        torque=f"{path}.{part.domain.effort}",
-        lever_arm=f"{cam}.lever_arm_now",
-        element=element,
-        extension=f"{element}.{inner.motion}",
-        force=f"{element}.{inner.effort}",
-        pretension=f"{path}.pretension",
-        elements=f"{cam}.elements",
-        control_values=tuple(number_names(cam, part.cam, "lever_arm")) if "lever_arm" in of_cam else (),
-        anchor_distance=f"{cam}.anchor_distance" if "anchor_distance" in of_cam else None,
-        last_angle=f"{cam}.last_angle" if "last_angle" in of_cam else None,
-        numbers=tuple(_single_numbers({path: part, **pieces})),
-        states=tuple(_declared_by(pieces, owners.states)),
-        specimens=tuple(_specimen(name, p) for name, p in pieces.items() if isinstance(p, Specimen)),
-    )
-
-
-def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:
-    for path, part in parts.items():
-        for field, given in part.parameters().items():
-            if not isinstance(given.value, tuple):
-                yield from number_names(path, part, field)
-
-
-def _specimen(path: str, part: Specimen) -> SpecimenNames:
-    return SpecimenNames(
-        name=path,
-        area=f"{path}.area",
-        rest_length=f"{path}.rest_length",
-        strain=f"{path}.strain",
-        force=f"{path}.{part.domain.effort}",
-    )
-
-
-def number_names(path: str, part: Part, field: str) -> list[str]:
-    """Return the names that one field of a part has in the model: one, or one for each item of a row.
-
-    Parameters
-    ----------
-    path
-        Of the part.
-    part
-        Holds the field.
-    field
-        Name of the field.
-    """
-    given, name = part.parameters()[field], f"{path}.{field}"
-    if not isinstance(given.value, tuple):
-        return [name]
-    return [f"{name}[{number}]" for number in range(1, len(given.values) + 1)]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from nlsdesign.components import (
     ROTATION,
     TRANSLATION,
+    Area,
     Backlash,
     Buckling,
+    Cable,
     CoulombFriction,
     CurrentSensor,
     Dashpot,
@@ -32,8 +34,10 @@ from nlsdesign.components import (
     Specimen,
     Spring,
     StrainStiffening,
+    Strength,
     StretchyCable,
     StribeckFriction,
+    Strip,
     Through,
     TorqueRipple,
     Turned,
@@ -52,6 +56,8 @@ SPRING, STEEL, HOUSING = (
 RUBBER = LinearElastic(modulus=0.9e6)
 MODULI, KNOTS = (0.92e6, 0.58e6), (0.0, 0.085)
 FORCE = "spring.rubber.force"
+ROW = (0.0, 2e-3, 5e-3, 8e-3, 11e-3, 14e-3, 15e-3)
+CABLE = Cable(cable_diameter=9e-4, cable_breaking_force=1285.0, cable_bend_ratio=5.0)
 
 _PARTS: tuple[Part, ...] = (
     Backlash(members=(("cam", HOUSING),), gap=0.01, contact=Rounded(width=5e-4)),
@@ -72,13 +78,20 @@ _PARTS: tuple[Part, ...] = (
     LoadFriction(members=(("gear", HOUSING),), ratio=0.05, contact=Regularised(creep_speed=0.02)),
     Mass(mass=0.4),
     Pulley(radius=0.01),
+    Pulley(radius=0.01, cable=CABLE),
     Buckling(members=(("rubber", SPRING),), share=0.95),
     PullOnly(members=(("rubber", SPRING),)),
     QuadraticDrag(drag=1e-4),
     Slack(members=(("rubber", SPRING),), length=1e-3, contact=Rounded(width=1e-5)),
     SlidingFillers(modulus=0.5e6, yield_stress=4e4),
     StrainStiffening(modulus=MODULI, knots=KNOTS, contact=Rounded(width=0.01)),
-    Specimen(members=(("still", RUBBER),), area=1e-4, rest_length=0.0125),
+    Specimen(members=(("still", RUBBER),), section=Area(1e-4), rest_length=0.0125),
+    Specimen(
+        members=(("still", RUBBER),),
+        section=Strip(width=0.03, thickness=3.4e-3),
+        rest_length=0.0125,
+        strength=Strength(tensile_strength=5.17e6, elongation_at_break=5.0),
+    ),
     SPRING,
     StrainStiffening(modulus=MODULI, knots=KNOTS),
     StretchyCable(stiffness=9e5, members=(("rubber", SPRING),)),
@@ -90,7 +103,8 @@ _PARTS: tuple[Part, ...] = (
     Dashpot(damping=1e-3, domain=ROTATION),
     HOUSING,
     Turned(members=(("cam", HOUSING),), offset=0.02),
-    TwoSidedCam(lever_arm=(0.0, 2e-3, 5e-3, 8e-3, 11e-3, 14e-3, 15e-3), last_angle=0.925),
+    TwoSidedCam(lever_arm=ROW, last_angle=0.925),
+    TwoSidedCam(lever_arm=ROW, last_angle=0.925, cable=CABLE),
     ViscousMaterial(viscosity=31e3),
     parallel(a=SPRING, b=Dashpot(damping=12.0)),
     series(a=SPRING, b=Dashpot(damping=12.0)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nlsdesign.components import (
     AnchoredCam,
+    Cable,
     CapstanFriction,
     CurrentDrivenMotor,
     CurrentSensor,
@@ -24,6 +25,7 @@ from nlsdesign.components import (
 )
 
 ROW = (0.009, 0.0105, 0.0128, 0.0147, 0.0158, 0.0161, 0.0155, 0.0142)
+CABLE = Cable(cable_diameter=1.2e-3, cable_breaking_force=989.0, cable_bend_ratio=10.0)
 WINDING = {
     "inertia": 1.4e-5,
     "torque_constant": 0.0302,
@@ -44,7 +46,9 @@ EXAMPLES: tuple[Part, ...] = (
     CurrentDrivenMotor(**WINDING),
     VoltageDrivenMotor(**WINDING, inductance=8.2e-5),
     OneSidedCam(lever_arm=ROW, last_angle=1.2, onset=0.02),
+    OneSidedCam(lever_arm=ROW, last_angle=1.2, onset=0.02, cable=CABLE),
     AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035),
+    AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035, cable=CABLE),
     CapstanFriction(
         members=(("rubber", Spring(stiffness=2500.0)),), guide=Guide(friction=0.15, wrap_angle=1.57)
     ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nlsdesign.components import (
     TRANSLATION,
+    Cable,
     CamWithProfileError,
     ClockDrift,
     CommandCompression,
@@ -41,6 +42,12 @@ _PARTS: tuple[Part, ...] = (
         last_angle=0.98,
         changeover=1e-3,
         error=(0.0, 4e-4, 9e-4, -2e-4, 1e-4),
+    ),
+    CamWithProfileError(
+        lever_arm=(0.016, 0.014, 0.013, 0.013, 0.014, 0.015),
+        last_angle=0.98,
+        error=(0.0, 4e-4, 9e-4, -2e-4, 1e-4),
+        cable=Cable(cable_diameter=9e-4, cable_breaking_force=1285.0, cable_bend_ratio=5.0),
     ),
 )
 EXAMPLES: tuple[Part, ...] = _PARTS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from nlsdesign.components import ArrudaBoyce, Part
+from nlsdesign.components import ArrudaBoyce, FittedRange, Part
 from tests.literature.published import KILOGRAM_FORCE_PER_SQUARE_CENTIMETRE, TRELOAR_TENSION
 from tests.physics.table import Row
 from tests.stretched import pulled, stress_at
@@ -16,7 +16,10 @@ from tests.stretched import pulled, stress_at
 MODULUS, LINKS = 0.27e6, 26.5
 """Arruda and Boyce 1993 for Treloar's rubber."""
 LAW = ArrudaBoyce(shear_modulus=MODULUS, links=LINKS)
-EXAMPLES: tuple[Part, ...] = (LAW,)
+EXAMPLES: tuple[Part, ...] = (
+    LAW,
+    ArrudaBoyce(shear_modulus=MODULUS, links=LINKS, data=FittedRange(fitted_strain=3.0)),
+)
 ROWS = (
     Row(
         ArrudaBoyce,

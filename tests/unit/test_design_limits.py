@@ -25,8 +25,9 @@ from nlsdesign.design import (
     RestLengthRange,
     design_cam,
 )
-from nlsdesign.design.optimisation.conflict import row_of
+from nlsdesign.design.optimisation.design_search import row_of
 from nlsdesign.design.optimisation.problem import design_problem
+from nlsdesign.design.optimisation.starts import Start
 from nlsdesign.errors import ArrangementError, UnitError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.quantity import quantity
@@ -78,17 +79,16 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
     problem = design_problem(
         flatten(machine), machine["spring.cam"], target=TARGET, free=RUBBER, spring="spring"
     )
+    start = problem.at(Start(0.5, 0.3, {}))
     first, *rest = limit.bounds(problem.design)
     assert str(first) == f"{type(limit).__name__}: {text}"
     assert len(rest) == (1 if hasattr(limit, "maximum") else 0)
     # The row is the distance from the bound in units of its scale; a slack of 1 gives way by one scale.
     row = row_of(first)
     assert (row.lower, row.upper) == ((-np.inf, 0.0) if first.upper else (0.0, np.inf))
-    values = problem.evaluate(first.expression, problem.starts[0])
-    assert problem.evaluate(row.expression, problem.starts[0]) == pytest.approx(
-        (values - first.value) / first.scale
-    )
-    softened = problem.evaluate(row_of(first, 1.0).expression, problem.starts[0])
+    values = problem.evaluate(first.expression, start)
+    assert problem.evaluate(row.expression, start) == pytest.approx((values - first.value) / first.scale)
+    softened = problem.evaluate(row_of(first, 1.0).expression, start)
     shift = -1.0 if first.upper else 1.0
     assert softened == pytest.approx((values - first.value) / first.scale + shift)
 

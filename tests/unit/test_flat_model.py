@@ -107,7 +107,7 @@ def test_every_vector_stands_in_written_order() -> None:
     assert [v.name for v in model.parameters] == [
         *("motor.inertia", "motor.gear_ratio", "motor.torque_constant", "motor.current_limit"),
         *("spring.pretension", "spring.cam.elements", "spring.cam.radius"),
-        *("spring.rubber.area", "spring.rubber.rest_length"),
+        *("spring.rubber.rest_length", "spring.rubber.area"),
         *("spring.rubber.stiff.modulus[1]", "spring.rubber.stiff.modulus[2]"),
         *("spring.rubber.stiff.knots[1]", "spring.rubber.stiff.knots[2]"),
         *("spring.rubber.relaxing.dashpot.viscosity", "spring.rubber.relaxing.spring.modulus"),

@@ -14,6 +14,7 @@ import pytest
 from nlsdesign.components import (
     ROTATION,
     TRANSLATION,
+    Area,
     Assembly,
     Dashpot,
     Driven,
@@ -164,7 +165,7 @@ def test_a_slip_of_units_is_recognised_only_where_it_fits(
 def test_parts_cannot_be_changed_in_place() -> None:
     first = machine()
     with pytest.raises(dataclasses.FrozenInstanceError):
-        first["spring.rubber"].area = 3.0  # type: ignore[attr-defined]
+        first["spring.rubber"].section = Area(3.0)  # type: ignore[attr-defined]
     with pytest.raises(dataclasses.FrozenInstanceError):
         first.name = "other"  # type: ignore[misc]
     with pytest.raises(TypeError):
@@ -188,8 +189,8 @@ def test_names_are_paths_in_written_order() -> None:
         "spring.pretension",
         "spring.cam.elements",
         "spring.cam.radius",
-        "spring.rubber.area",
         "spring.rubber.rest_length",
+        "spring.rubber.area",
         "spring.rubber.stiff.modulus",
         "spring.rubber.stiff.knots",
         "spring.rubber.relaxing.spring.modulus",
@@ -230,7 +231,7 @@ def test_paths_that_do_not_exist(path: str) -> None:
 
 def test_functions_on_a_bare_part_agree_with_the_assembly() -> None:
     assert quantities(rubber())["stiff.modulus"].values == (1e6, 2e6, 3e6)
-    assert with_values(rubber(), {"area": 2e-4}) == dataclasses.replace(rubber(), area=2e-4)
+    assert with_values(rubber(), {"area": 2e-4}) == dataclasses.replace(rubber(), section=Area(2e-4))
 
 
 # --- what is refused ------------------------------------------------------------------------------
@@ -243,7 +244,7 @@ REFUSED = {
     "a name with a dot": lambda: parallel(**{"a.b": Spring(stiffness=1)}),
     "a name with a bracket": lambda: assembly("a", **{"p[1]": Driven(domain=TRANSLATION)}),
     "a member called like a number": lambda: Specimen(
-        area=1e-4, rest_length=0.1, members=(("area", LinearElastic(modulus=1e6)),)
+        section=Area(1e-4), rest_length=0.1, members=(("area", LinearElastic(modulus=1e6)),)
     ),
     "a member called like a key of a deck": lambda: parallel(between=Spring(stiffness=1)),
     "a part called like the head of a deck": lambda: assembly("a", deck=Driven(domain=TRANSLATION)),

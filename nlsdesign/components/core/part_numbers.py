@@ -15,6 +15,9 @@ from .domain import Domain
 Given: TypeAlias = Quantity | float | tuple[float, ...] | list[float]
 """What may be given for a number: a quantity, or bare number(s) in SI."""
 
+_SHOWN = 4
+"""How many numbers of a row a message shows."""
+
 PerDomain: TypeAlias = float | Mapping[Domain, float]
 """One number, or one for each domain."""
 
@@ -94,7 +97,20 @@ class ParameterInfo:
                 continue
             if same_dimension(unit, self.unit) and self.minimum <= number * factor <= self.maximum:
                 return f"was '{unit}' meant? {with_unit(f'{number:g}', unit)} is in the range"
-        return None
+        return self._unconverted(given)
+
+    def _unconverted(self, given: Quantity) -> str | None:
+        """Return the next step where numbers in the shown unit were taken for numbers in SI."""
+        factor = parse_unit(given.unit).factor
+        if factor == 1.0 or not all(self.minimum <= v * factor <= self.maximum for v in given.values):
+            return None
+        numbers = [f"{v:g}" for v in given.values[:_SHOWN]] + ["..."] * (len(given.values) > _SHOWN)
+        row = ", ".join(numbers)
+        text = f"({row})" if isinstance(given.value, tuple) else row
+        return (
+            f'was {with_unit(text, given.unit)} meant? write quantity({text}, "{given.unit}"); '
+            f"Quantity takes its number in SI and is only shown in '{given.unit}'"
+        )
 
 
 @dataclass(frozen=True)
@@ -210,6 +226,11 @@ class Reading:
             raise ArrangementError(type(self).__name__, f"acts on {pairs}", next_step=self.placing)
         infos = {name: template.within(domain) for name, template in templates(type(self)).items()}
         return dataclasses.replace(self, **{n: i.checked(n, getattr(self, n)) for n, i in infos.items()})
+
+
+@dataclass(frozen=True)
+class NotDeclared(Reading):
+    """Numbers that a part can have and this one has not; what asks for them says so."""
 
 
 def read_as(*kinds: type[Reading], default: Reading | None = None) -> Any:

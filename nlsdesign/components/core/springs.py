@@ -15,7 +15,7 @@ from ...symbolic import Expression, positive_part
 from .contacts import WithCorners
 from .domain import MATERIAL, ROTATION, TRANSLATION, Domain
 from .element import UNBOUNDED, Element, Range, Scope
-from .part_numbers import one_of, parameter
+from .part_numbers import NotDeclared, Reading, one_of, parameter, read_as
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +34,41 @@ class Elastic(Element):
     def restores(self) -> bool:
         """True: it pulls back."""
         return True
+
+
+@dataclass(frozen=True)
+class FittedRange(Reading):
+    """How far the data went that a law was fitted to; beyond, it is not stated to hold.
+
+    Examples
+    --------
+    >>> FittedRange(fitted_strain=5.0).fitted_strain
+    5.0
+    """
+
+    fitted_strain: Quantity = parameter(
+        "1", "largest strain of the data that the law was fitted to", minimum=0.01, maximum=20.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedLaw(Elastic):
+    """Base of the laws of a material whose constants come from a measured curve."""
+
+    data: Reading = read_as(NotDeclared, FittedRange, default=NotDeclared())
+
+    @property
+    def range_of_form(self) -> Range:
+        """Least and greatest strain for which a law of this form may be fitted at all."""
+        return UNBOUNDED
+
+    @property
+    def valid(self) -> Range:
+        """Range of the form, and no further than the data."""
+        low, high = self.range_of_form
+        if isinstance(self.data, FittedRange):
+            return low, min(high, self.data.fitted_strain.number)
+        return low, high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +119,7 @@ class LinearElastic(Hooke):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StrainStiffening(WithCorners, Elastic):
+class StrainStiffening(WithCorners, FittedLaw):
     """Equilibrium law of the paper: σ = Σ kᵢ·(⟨ε − εᵢ⟩ − ⟨−εᵢ⟩), one modulus more from each knot εᵢ on.
 
     With a sharp contact it is piecewise linear, ⟨v⟩ = max(v, 0), valid for ε ≥ 0; the slope jumps at each
@@ -109,7 +144,7 @@ class StrainStiffening(WithCorners, Elastic):
         check_knots(self.modulus, self.knots)
 
     @property
-    def valid(self) -> Range:
+    def range_of_form(self) -> Range:
         """Tension where the contact is sharp: in compression the law then gives no stress at all."""
         return UNBOUNDED if self.is_smooth else (0.0, math.inf)
 

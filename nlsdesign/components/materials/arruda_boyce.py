@@ -34,7 +34,7 @@ class ArrudaBoyce(Hyperelastic):
     links: Quantity = parameter("1", "links N of a chain", minimum=3.0, maximum=1e6)
 
     @property
-    def valid(self) -> Range:
+    def range_of_form(self) -> Range:
         """Strain from √(I₁/3) = 0.6·√N in compression to the same in tension."""
         roots = np.roots([1.0, 0.0, -3.0 * max(0.36 * self.links.number, 1.01), 2.0]).real
         low, high = sorted(root for root in roots if root > 0.0)

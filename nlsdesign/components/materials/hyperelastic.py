@@ -20,14 +20,14 @@ from ...quantity import Quantity
 from ...symbolic import Expression, symbol
 from ..core.element import MATERIAL, Domain, Range, Scope
 from ..core.part import parameter
-from ..core.springs import Elastic
+from ..core.springs import FittedLaw
 
 _SHARE_OF_LIMIT = 0.9
 """Part of the way to the end of the chains that still counts as the range of the extended tube."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hyperelastic(Elastic):
+class Hyperelastic(FittedLaw):
     """Base of the laws that are given by their strain energy."""
 
     domain: ClassVar[Domain] = MATERIAL
@@ -67,7 +67,7 @@ class NeoHooke(Hyperelastic):
     shear_modulus: Quantity = parameter("Pa", "shear modulus μ", minimum=1.0, maximum=1e12)
 
     @property
-    def valid(self) -> Range:
+    def range_of_form(self) -> Range:
         """Strain of −0.4 to 0.4."""
         return (-0.4, 0.4)
 
@@ -94,7 +94,7 @@ class Yeoh(Hyperelastic):
     c3: Quantity = parameter("Pa", "coefficient of the cube", minimum=-1e12, maximum=1e12)
 
     @property
-    def valid(self) -> Range:
+    def range_of_form(self) -> Range:
         """Strain of −0.5 to 5."""
         return (-0.5, 5.0)
 
@@ -126,7 +126,7 @@ class Ogden(Hyperelastic):
         _check_ogden(self.moduli.values, self.exponents.values)
 
     @property
-    def valid(self) -> Range:
+    def range_of_form(self) -> Range:
         """Strain of −0.6 to 6."""
         return (-0.6, 6.0)
 
@@ -162,7 +162,7 @@ class ExtendedTube(Hyperelastic):
     )
 
     @property
-    def valid(self) -> Range:
+    def range_of_form(self) -> Range:
         """Strain of −0.6, or of what is nearer, to where I₁ − 3 is 90 % of its end."""
         most = _SHARE_OF_LIMIT / self.end.number**2
         roots = np.roots([1.0, 0.0, -(3.0 + most), 2.0]).real

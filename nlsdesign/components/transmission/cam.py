@@ -18,6 +18,29 @@ from ...quantity import Quantity
 from ...symbolic import Expression, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import Part, parameter
+from ..core.part_numbers import NotDeclared, Reading, read_as
+
+
+@dataclass(frozen=True)
+class Cable(Reading):
+    """The cable of a cam and what it bears; it does not enter the law. Source: definition (of these terms).
+
+    Examples
+    --------
+    >>> Cable(cable_diameter=9e-4, cable_breaking_force=1285.0, cable_bend_ratio=5.0).cable_bend_ratio
+    5.0
+    """
+
+    cable_diameter: Quantity = parameter("m", "diameter of the cable", minimum=1e-5, maximum=0.05)
+    cable_breaking_force: Quantity = parameter(
+        "N", "force at which the cable breaks", minimum=0.1, maximum=1e7
+    )
+    cable_bend_ratio: Quantity = parameter(
+        "1",
+        "least diameter of a bend of the cable over the diameter of the cable",
+        minimum=0.5,
+        maximum=200.0,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +54,7 @@ class Cam(Part):
         maximum=100.0,
         default=1.0,
     )
+    cable: Reading = read_as(NotDeclared, Cable, default=NotDeclared())
 
     @abstractmethod
     def extension(self, scope: Scope, angle: Expression) -> Expression:

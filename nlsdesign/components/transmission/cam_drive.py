@@ -41,7 +41,7 @@ class Through(Element):
     cam: Cam
     behind: tuple[str, Element]
     pretension: Quantity = parameter(
-        "m", "extension of the element at angle zero", minimum=0.0, maximum=1.0, default=0.0
+        "m", "extension of the element at angle zero", minimum=0.0, maximum=0.5, default=0.0
     )
 
     def __post_init__(self) -> None:

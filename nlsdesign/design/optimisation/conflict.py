@@ -1,136 +1,113 @@
-"""Why no design keeps all limits: which of them are in conflict, and by how much each would have to give."""
+"""Why no design keeps all limits: which are in conflict, how much each would have to give, what to free."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, InfeasibleError
+from .design_search import Search
 from .limits import Bound
-from .problem import DesignProblem
-from .program import Program, Rows
+from .loosening import FEASIBLE, Freed, Give, Loosened
+from .program import PROVED_INFEASIBLE
 
 Floats = NDArray[np.float64]
 
-_FEASIBLE = 1e-6
-"""Relative give below which limits count as kept."""
 _INVOLVED = 1e-3
 """Price, in give of the whole per give of this limit, from which a limit counts as part of the conflict."""
-_MOST = 1e3
 
 
-def row_of(bound: Bound, slack: ca.SX | float = 0.0) -> Rows:
-    """Return a bound as rows of a program, softened by a slack.
-
-    Parameters
-    ----------
-    bound
-        What must hold.
-    slack
-        Relative give, a symbol or zero.
-    """
-    distance = (bound.expression - bound.value) / bound.scale
-    return Rows(distance - slack, -ca.inf, 0.0) if bound.upper else Rows(distance + slack, 0.0, ca.inf)
-
-
-@dataclass(frozen=True)
-class Give:
-    """How far one bound would have to move for all others to be kept.
-
-    Parameters
-    ----------
-    bound
-        The bound.
-    amount
-        In SI, positive.
-    """
-
-    bound: Bound
-    amount: float
-
-    def __str__(self) -> str:
-        moved = self.bound.value + (self.amount if self.bound.upper else -self.amount)
-        amount, end = self.bound.shown(self.amount), self.bound.shown(moved)
-        return f"{self.bound} would have to give by {amount} (to {end})"
-
-
-def feasible_point(problem: DesignProblem, bounds: Sequence[Bound], progress: Callable[[], None]) -> Floats:
+def feasible_point(search: Search, free: Sequence[str]) -> Floats:
     """Return unknowns that keep all limits, or say why there are none.
 
     Every limit gets a slack, and the sum of the slacks, each relative to the size of its limit, is made as
-    small as possible. Where it does not vanish, each limit that has a price is then relaxed alone.
+    small as possible. Where it does not vanish, each limit that has a price is relaxed alone, and each number
+    that is held is freed alone.
 
     Parameters
     ----------
-    problem
-        Unknowns and geometry.
-    bounds
-        All limits.
-    progress
-        Called after each solution.
+    search
+        Whose starts all failed.
+    free
+        What may change in it.
 
     Raises
     ------
     InfeasibleError
-        With the names of the limits in conflict and how much each would have to give, in its own unit.
+        With the names of the limits in conflict, how much each would have to give, in its own unit, and which
+        number to free.
     ConvergenceError
         If the solver finds no answer.
     """
-    program, count = _softened(problem, bounds), len(problem.variables)
-    starts = [np.append(start, np.ones(len(bounds))) for start in problem.starts[:2]]
-    solved = [outcome for outcome in program.solve(*starts, progress=progress) if outcome.solved]
-    if not solved:
+    loose = Loosened(search, free, largest_error=None, best=None)
+    every = range(len(loose.bounds))
+    best = loose.least((), every)
+    if not best.solved:
         raise ConvergenceError(
             "design: search for a cam within the limits", "IPOPT found neither a cam nor a proof against it",
             next_step="leave out limits one by one, or start from a deck that is closer to the target",
         )  # fmt: skip
-    best = min(solved, key=lambda outcome: outcome.cost)
-    if best.cost <= _FEASIBLE * len(bounds):
-        return best.point[:count]
-    prices = best.prices[len(problem.structure) :]
+    if best.cost <= FEASIBLE * len(loose.bounds):
+        return search.problem.completed(loose.open.problem.chosen(best.point))
+    prices = best.prices[len(loose.open.problem.structure) :]
     involved = [i for i, price in enumerate(prices) if price > _INVOLVED]
-    together = [Give(bounds[i], float(best.point[count + i]) * bounds[i].scale) for i in involved]
-    alone, hopeless = [], []
-    for i in involved:
-        only = program.upper.copy()
-        only[count:] = np.where(np.arange(len(bounds)) == i, _MOST, 0.0)
-        start = np.append(best.point[:count], np.where(np.arange(len(bounds)) == i, 1.0, 0.0))
-        (outcome,) = program.solve(start, upper=only, progress=progress)
-        if outcome.solved:
-            alone.append(Give(bounds[i], outcome.cost * bounds[i].scale))
-        elif outcome.status == "Infeasible_Problem_Detected":
-            hopeless.append(bounds[i].limit)
-    raise _conflict([bounds[i] for i in involved], alone, hopeless, together)
-
-
-def _softened(problem: DesignProblem, bounds: Sequence[Bound]) -> Program:
-    """Return the program that makes the sum of the slacks of all bounds small, and nothing else."""
-    slacks = ca.SX.sym("slack", len(bounds))
-    rows = [row_of(bound, slacks[i]) for i, bound in enumerate(bounds)]
-    program = Program(
-        problem.vector,
-        np.array([u.lower for u in problem.variables]),
-        np.array([u.upper for u in problem.variables]),
-        ca.sum1(slacks),
-        (*problem.structure, *rows),
+    start = best.point[: loose.count]
+    alone = loose.several([((), [i]) for i in involved], start)
+    names = loose.several([([name], every) for name in loose.candidates], start)
+    gives = [loose.give(i, outcome) for i, outcome in zip(involved, alone, strict=True) if outcome.solved]
+    failed = {loose.bounds[i].limit: outcome for i, outcome in zip(involved, alone, strict=True)}
+    failed = {limit: outcome for limit, outcome in failed.items() if not outcome.solved}
+    undecided = [limit for limit, outcome in failed.items() if outcome.status != PROVED_INFEASIBLE]
+    hopeless = [limit for limit in failed if limit not in undecided]
+    cures = [
+        loose.freed([name], outcome)
+        for name, outcome in zip(loose.candidates, names, strict=True)
+        if outcome.solved and outcome.cost <= FEASIBLE * len(loose.bounds)
+    ]
+    together = [give for give in (loose.give(i, best) for i in involved) if give.amount > 0.0]
+    raise InfeasibleError(
+        "limits " + ", ".join(names_of(loose.bounds[i] for i in involved)),
+        "contradict each other" if len(involved) > 1 else "cannot be kept with what is free",
+        next_step="; ".join(_advice(gives, together, cures=cures, hopeless=hopeless, undecided=undecided)),
     )
-    return program.with_unknowns(slacks, 0.0, _MOST)
 
 
-def _conflict(
-    involved: Sequence[Bound], alone: Sequence[Give], hopeless: Sequence[str], together: Sequence[Give]
-) -> InfeasibleError:
-    names = list(dict.fromkeys(bound.limit for bound in involved))
-    if alone:
-        advice = "one of these is enough: " + "; or ".join(str(give) for give in alone)
-        if hopeless:
-            advice += "; no give of " + " or ".join(hopeless) + " alone is enough"
-    else:
-        needed = [give for give in together if give.amount > _FEASIBLE * give.bound.scale]
-        advice = "no single one is enough; together: " + "; and ".join(str(give) for give in needed)
-    rule = "contradict each other" if len(names) > 1 else "cannot be kept with what is free"
-    return InfeasibleError("limits " + ", ".join(names), rule, next_step=advice)
+def names_of(bounds: Iterable[Bound]) -> list[str]:
+    """Return the names of the limits of some bounds, each once.
+
+    Parameters
+    ----------
+    bounds
+        In any order.
+    """
+    return list(dict.fromkeys(bound.limit for bound in bounds))
+
+
+def _advice(
+    alone: Sequence[Give],
+    together: Sequence[Give],
+    *,
+    cures: Sequence[Freed],
+    hopeless: Sequence[str],
+    undecided: Sequence[str],
+) -> list[str]:
+    sensible = [give for give in alone if give.sensible]
+    no_use = [*hopeless, *names_of(give.bound for give in alone if not give.sensible)]
+    sentences = []
+    if sensible:
+        sentences.append("one of these is enough: " + "; or ".join(str(give) for give in sensible))
+    elif together and all(give.sensible for give in together):
+        needed = [give for give in together if give.amount > FEASIBLE * give.bound.scale]
+        sentences.append("no single one is enough; together: " + "; and ".join(str(give) for give in needed))
+    if cures:
+        sentences.append("enough without any give: " + "; or ".join(str(cure) for cure in cures))
+    if no_use and sentences:
+        sentences.append("no give of " + " or ".join(no_use) + " alone is enough, or none that makes sense")
+    if undecided:
+        listed = " or ".join(undecided)
+        sentences.append(f"whether a give of {listed} alone is enough the solver could not decide")
+    if not (sensible or cures):
+        sentences.append("ask for a smaller torque or angle, more elements or another rubber")
+    return sentences

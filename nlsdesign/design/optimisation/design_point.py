@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import casadi as ca
 
@@ -34,6 +35,15 @@ def anchor_of(cam: CamNames) -> str:
     return cam.anchor_distance
 
 
+class Stretched(NamedTuple):
+    """One element stretched: force, stiffness, and strain and nominal stress of each piece of rubber."""
+
+    force: Expression
+    stiffness: Expression
+    strains: Expression
+    stresses: Expression
+
+
 @dataclass(frozen=True, eq=False)
 class DesignPoint:
     """A cam with its rubber at nodes over the angle; columns of shape (n,), all in SI.
@@ -60,6 +70,10 @@ class DesignPoint:
         N·h·F minus target.
     parameters
         All parameters of the flat model by name; symbols where they are free.
+    element
+        What one element does at an extension in m.
+    shown_units
+        Unit in which each parameter is shown.
     """
 
     cam: CamNames
@@ -77,11 +91,50 @@ class DesignPoint:
     stresses: Mapping[str, Expression]
     torque_errors: Expression
     parameters: Mapping[str, Expression]
+    element: Callable[[Expression], Stretched]
+    shown_units: Mapping[str, str]
 
     @property
     def elements(self) -> Expression:
         """Number of elements that share the torque."""
         return self.parameters[self.cam.elements]
+
+    @property
+    def torques(self) -> Expression:
+        """Torque N·h·F in N·m."""
+        return self.elements * self.lever_arms * self.forces
+
+    def turned_beyond(self, angle: float) -> DesignPoint:
+        """Return the design at one angle beyond the end of its contour, with the last lever arm held.
+
+        Parameters
+        ----------
+        angle
+            Beyond the last angle of the target, in rad.
+
+        Returns
+        -------
+        DesignPoint
+            With columns of shape (1,); directions, slopes and torque errors are those of the last node.
+        """
+        arm = self.lever_arms[-1]
+        extension = self.extensions[-1] + arm * angle
+        at = self.element(extension)
+        return replace(
+            self,
+            angles=self.angles[-1] + angle,
+            directions=self.directions[-1] + angle,
+            lever_arms=arm,
+            lever_arm_slopes=ca.SX(0),
+            radii_of_curvature=arm,
+            radii=self.radii[-1],
+            extensions=extension,
+            forces=at.force,
+            stiffnesses=at.stiffness,
+            strains={path: at.strains[i] for i, path in enumerate(self.strains)},
+            stresses={path: at.stresses[i] for i, path in enumerate(self.stresses)},
+            torque_errors=self.torque_errors[-1],
+        )
 
     @property
     def tangent_stiffness(self) -> Expression:
@@ -90,9 +143,23 @@ class DesignPoint:
 
     @property
     def mean_square_error(self) -> Expression:
-        """Mean over the angle of the squared torque error in (N·m)², by the trapezoidal rule."""
-        squared, steps = self.torque_errors**2, self.angles[1:] - self.angles[:-1]
-        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / self.target.last_angle
+        """Mean of the squared torque error in (N·m)², weighted as the target says, by trapezoids."""
+        rows = range(self.angles.shape[0])
+        weights = ca.vertcat(*[self.target.weight_law(self.angles[i]) for i in rows])
+        steps = self.angles[1:] - self.angles[:-1]
+        squared = weights * self.torque_errors**2
+        whole = ca.dot((weights[1:] + weights[:-1]) / 2, steps)
+        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / whole
+
+    @property
+    def rubber_volume(self) -> Expression:
+        """Volume of all rubber behind the cam in m³; zero where there is no specimen."""
+        pieces = [
+            math.prod((self.parameters[name] for name in (*piece.section, piece.rest_length)), start=ca.SX(1))
+            for piece in self.cam.specimens
+            if piece.name in self.strains
+        ]
+        return self.elements * sum(pieces, start=ca.SX(0))
 
     def of_rubber(self, field: Literal["area", "rest_length"]) -> dict[str, Expression]:
         """Return a parameter of each piece of rubber behind the cam by full name.
@@ -113,9 +180,9 @@ class DesignPoint:
                 f"has no specimen behind its cam, so it has no {field.replace('_', ' ')}",
                 next_step="leave this limit out, or declare the rubber with specimen(...)",
             )
-        names = [
-            piece.area if field == "area" else piece.rest_length
+        rows = [
+            piece.section if field == "area" else (piece.rest_length,)
             for piece in self.cam.specimens
             if piece.name in self.strains
         ]
-        return {name: self.parameters[name] for name in names}
+        return {" * ".join(row): math.prod((self.parameters[n] for n in row), start=ca.SX(1)) for row in rows}

@@ -81,10 +81,5 @@ class LeastRubber(Goal):
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return weight · volume / typical volume."""
-        if not design.strains:
-            return ca.SX(0)
-        areas = list(design.of_rubber("area").values())
-        lengths = list(design.of_rubber("rest_length").values())
-        volume = design.elements * sum((a * x for a, x in zip(areas, lengths, strict=True)), start=ca.SX(0))
         needed = float(design.target.energy(design.target.last_angle)) / self.energy_density
-        return self.weight * volume / needed
+        return self.weight * design.rubber_volume / needed

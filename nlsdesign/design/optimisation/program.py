@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,11 +11,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...processes import parallel_map
 from ...symbolic import Expression
 
 Floats = NDArray[np.float64]
 
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+PROVED_INFEASIBLE = "Infeasible_Problem_Detected"
+"""IPOPT's status where it has found that no point near keeps all rows."""
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "error_on_fail": False,
@@ -24,7 +27,6 @@ _OPTIONS: dict[str, Any] = {
     "ipopt.sb": "yes",
     "ipopt.tol": 1e-9,
     "ipopt.acceptable_tol": 1e-7,
-    "ipopt.max_iter": 300,
     # Otherwise a bound may be missed by 1e-8, which a pretension of zero would notice.
     "ipopt.honor_original_bounds": "yes",
 }
@@ -81,6 +83,10 @@ class Program:
         Scalar.
     rows
         Constraints.
+    parameters
+        Symbols that get numbers at each solution; none for ``None``.
+    iterations
+        At which the solver gives up.
     """
 
     unknowns: Expression
@@ -88,6 +94,8 @@ class Program:
     upper: Floats
     cost: Expression
     rows: tuple[Rows, ...]
+    parameters: Expression | None = None
+    iterations: int = 300
 
     def with_unknowns(self, symbols: Expression, lower: float, upper: float) -> Program:
         """Return a copy with more unknowns at the end, all between the same bounds.
@@ -108,34 +116,55 @@ class Program:
         )
 
     def solve(
-        self, *starts: Floats, upper: Floats | None = None, progress: Callable[[], None] = lambda: None
-    ) -> list[Solution]:
-        """Solve from each starting point.
+        self,
+        start: Floats,
+        *,
+        lower: Floats | None = None,
+        upper: Floats | None = None,
+        parameters: Floats | None = None,
+    ) -> Solution:
+        """Solve from a starting point.
 
         Parameters
         ----------
-        *starts
+        start
             Shape (n,).
-        upper
-            Other upper bounds of the unknowns, shape (n,).
-        progress
-            Called after each.
-
-        Returns
-        -------
-        list of Solution
-            In the order of the starting points.
+        lower, upper
+            Other bounds of the unknowns, shape (n,); an unknown is held where they are equal.
+        parameters
+            Numbers for the parameters of the program, if it has any.
         """
         sizes = [r.expression.shape[0] for r in self.rows]
-        bounds = {
-            "lbx": self.lower,
-            "ubx": self.upper if upper is None else upper,
-            "lbg": np.repeat([r.lower for r in self.rows], sizes),
-            "ubg": np.repeat([r.upper for r in self.rows], sizes),
-        }
+        answer = self._solver(
+            x0=start,
+            p=[] if parameters is None else parameters,
+            lbx=self.lower if lower is None else lower,
+            ubx=self.upper if upper is None else upper,
+            lbg=np.repeat([r.lower for r in self.rows], sizes),
+            ubg=np.repeat([r.upper for r in self.rows], sizes),
+        )
+        return self._outcome(answer, sizes)
+
+    def prepare(self) -> None:
+        """Make the derivatives once, before the work is shared out to other processes."""
+        _ = self._solver
+
+    def solve_all(
+        self, starts: Sequence[Floats], progress: Callable[[], None] = lambda: None
+    ) -> list[Solution]:
+        """Solve from several starting points side by side on the cores; the order is kept.
+
+        Parameters
+        ----------
+        starts
+            Shape (n,) each.
+        progress
+            Called after each.
+        """
         outcomes = []
-        for start in starts:
-            outcomes.append(self._outcome(self._solver(x0=start, **bounds), sizes))
+        self.prepare()
+        for outcome in parallel_map(lambda number: self.solve(starts[number]), len(starts)):
+            outcomes.append(outcome)
             progress()
         return outcomes
 
@@ -146,7 +175,9 @@ class Program:
             "f": self.cost,
             "g": ca.vertcat(*[r.expression for r in self.rows]),
         }
-        return ca.nlpsol("design", "ipopt", problem, _OPTIONS)
+        if self.parameters is not None:
+            problem["p"] = self.parameters
+        return ca.nlpsol("design", "ipopt", problem, {"ipopt.max_iter": self.iterations, **_OPTIONS})
 
     def _outcome(self, answer: dict[str, ca.DM], sizes: list[int]) -> Solution:
         stats = self._solver.stats()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from ...quantity import Quantity, parse_unit, with_unit
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
+from .remedies import Remedies
+from .size_ranges import SizeRange
 
 Floats = NDArray[np.float64]
 
@@ -60,11 +63,14 @@ class TorqueCheck:
     ----------
     angles, torques, targets
         Shape (n,), in rad and N·m.
+    weights
+        Of the squared error, shape (n,); all alike for ``None``.
     """
 
     angles: Floats
     torques: Floats
     targets: Floats
+    weights: Floats | None = None
 
     @property
     def errors(self) -> Floats:
@@ -73,8 +79,10 @@ class TorqueCheck:
 
     @property
     def rms(self) -> float:
-        """Root of the mean over the angle of the squared error."""
-        return float(np.sqrt(np.trapezoid(self.errors**2, self.angles) / (self.angles[-1] - self.angles[0])))
+        """Root of the mean over the angle of the squared error, weighted as the target says."""
+        weights = np.ones_like(self.angles) if self.weights is None else self.weights
+        squares = np.trapezoid(weights * self.errors**2, self.angles)
+        return float(np.sqrt(squares / np.trapezoid(weights, self.angles)))
 
     @property
     def largest(self) -> float:
@@ -109,8 +117,120 @@ class Sensitivity:
 
 
 @dataclass(frozen=True, eq=False)
+class DesignCurves:
+    """What cam and rubber do over the angle, as the optimiser sees it; columns of shape (n,), in SI.
+
+    Parameters
+    ----------
+    angles, lever_arms, radii_of_curvature, radii, torques, stiffnesses
+        Of the cam; the stiffness is the slope of the torque.
+    extensions, forces
+        Of one element with its cable.
+    strains, stresses
+        Of each piece of rubber by path.
+    """
+
+    angles: Floats
+    lever_arms: Floats
+    radii_of_curvature: Floats
+    radii: Floats
+    torques: Floats
+    stiffnesses: Floats
+    extensions: Floats
+    forces: Floats
+    strains: Mapping[str, Floats]
+    stresses: Mapping[str, Floats]
+
+    @property
+    def energy(self) -> float:
+        """Energy in J that the spring takes up from angle zero to the last angle."""
+        return float(np.trapezoid(self.torques, self.angles))
+
+
+@dataclass(frozen=True)
+class StartOutcome:
+    """Where the search from one start came to.
+
+    Parameters
+    ----------
+    solved, status
+        Whether the solver says that it is a solution, and its words.
+    iterations
+        It took.
+    cost, rms
+        Sum of the goals, and torque error in N·m.
+    """
+
+    solved: bool
+    status: str
+    iterations: int
+    cost: float
+    rms: float
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What became of one combination of a stock.
+
+    Parameters
+    ----------
+    choice
+        In words.
+    cost, rms
+        Sum of the goals and torque error in N·m; ``None`` where there is no design.
+    met
+        Whether it meets the target.
+    reason
+        Why not.
+    """
+
+    choice: str
+    cost: float | None
+    rms: float | None
+    met: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Miss:
+    """Why a design is not a success.
+
+    Parameters
+    ----------
+    error
+        Rms torque error relative to the largest torque.
+    allowed
+        What it may be.
+    worst_angle, worst_error
+        Where the torque is furthest from the target, in rad, and by how much there, in N·m.
+    binding
+        Limits that the design sits on.
+    remedies
+        What would help; ``None`` where it was not looked for.
+    advice
+        The same as sentences.
+    """
+
+    error: float
+    allowed: float
+    worst_angle: float
+    worst_error: float
+    binding: tuple[str, ...]
+    remedies: Remedies | None
+    advice: tuple[str, ...]
+
+    def __str__(self) -> str:
+        held = f"held by {', '.join(self.binding)}" if self.binding else "no limit binds"
+        return (
+            f"MISSES ITS TARGET: {100 * self.error:.3g} % rms of the largest torque, "
+            f"{100 * self.allowed:g} % allowed; worst at {np.degrees(self.worst_angle):.3g}°: "
+            f"{1e3 * self.worst_error:+.3g} mN·m; {held}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class CamDesign:
-    """A finished design; immutable.
+    """A finished design; immutable. Whether it meets its target says ``met``.
 
     Parameters
     ----------
@@ -132,8 +252,22 @@ class CamDesign:
         State of every limit.
     sensitivity
         Torque error over the spread of the moduli.
-    iterations
-        Of the solution taken.
+    curves
+        What cam and rubber do over the angle.
+    rubber_volume
+        Of all elements in m³.
+    starts
+        Where the search from each start came to; ``taken`` is the number of the one that was taken.
+    taken
+        Number of the start.
+    size_ranges
+        Ranges of sizes that cost nothing.
+    miss
+        Why the design is no success; ``None`` if it is one.
+    remarks
+        What a designer should know besides.
+    alternatives
+        All combinations of the stock that was offered.
     """
 
     target: Target
@@ -145,7 +279,19 @@ class CamDesign:
     fit_error: float
     limits: tuple[LimitState, ...]
     sensitivity: Sensitivity
-    iterations: int
+    curves: DesignCurves
+    rubber_volume: float
+    starts: tuple[StartOutcome, ...]
+    taken: int
+    size_ranges: tuple[SizeRange, ...] = ()
+    miss: Miss | None = None
+    remarks: tuple[str, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+
+    @property
+    def met(self) -> bool:
+        """Whether the torque error is within what is allowed."""
+        return self.miss is None
 
     @property
     def values(self) -> dict[str, Quantity]:
@@ -177,37 +323,80 @@ class CamDesign:
 
     def rows(self) -> list[tuple[str, str]]:
         """Return a table of what was found: pairs of text."""
-        rho, millis = self.contour.radii_of_curvature, 1e3
-        rows = [("target", f"{type(self.target).__name__}, {self.target.largest:.4g} N·m at {self._end}")]
-        rows += [(name, _brief(value)) for name, value in self.changes]
-        rows += [
-            (
-                "torque error",
-                f"{millis * self.rms:.3g} mN·m rms, {millis * self.check.largest:.3g} mN·m at most",
-            ),
-            ("over the spread", str(self.sensitivity)),
-            ("radius of curvature", f"{millis * rho.min():.3g} to {millis * rho.max():.3g} mm"),
-            ("cam radius", f"{millis * self.contour.radii.max():.4g} mm"),
-            ("lever arm", f"up to {millis * self.contour.lever_arms.max():.4g} mm"),
-            ("solver", f"{self.iterations} iterations{self._contour_error}"),
-            ("fingerprint", self.fingerprint),
-        ]
-        share = self.within_tolerance
-        return rows if share is None else [*rows, ("within tolerance", f"{100 * share:.3g} % of the angles")]
-
-    @property
-    def _contour_error(self) -> str:
-        return f", contour held to {1e6 * self.fit_error:.2g} µm" if self.fit_error > 0.0 else ""
-
-    @property
-    def _end(self) -> str:
-        return f"{np.degrees(self.target.last_angle):.4g} deg"
+        return result_rows(self)
 
     def __str__(self) -> str:
         rows = self.rows()
         width = max(len(name) for name, _ in rows)
         lines = ["cam design", *(f"  {name:<{width}}  {text}" for name, text in rows)]
         return "\n".join([*lines, "  limits", *(f"    {state}" for state in self.limits)])
+
+
+def result_rows(design: CamDesign) -> list[tuple[str, str]]:
+    """Return what a design prints: pairs of text.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    """
+    target, check, curves, rho = design.target, design.check, design.curves, design.contour.radii_of_curvature
+    share, largest = 100.0 / target.largest, check.largest
+    end = f"{np.degrees(target.last_angle):.4g} deg"
+    fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""
+    rows = [("verdict", "meets its target" if design.miss is None else str(design.miss))]
+    if design.miss is not None:
+        rows += [("what would help", sentence) for sentence in design.miss.advice]
+    rows += [("target", f"{type(target).__name__}, {target.largest:.4g} N·m at {end}")]
+    rows += [(name, _brief(value)) for name, value in design.changes]
+    rows += [
+        (
+            "torque error",
+            f"{1e3 * check.rms:.3g} mN·m rms ({share * check.rms:.2g} %), {1e3 * largest:.3g} mN·m at most",
+        ),
+        ("over the spread", str(design.sensitivity)),
+        ("cable force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each cable"),
+        *((f"strain of {path}", f"up to {100 * row.max():.4g} %") for path, row in curves.strains.items()),
+        *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
+        ("energy stored", f"{curves.energy:.4g} J"),
+        *([("rubber", f"{1e6 * design.rubber_volume:.4g} cm³")] if design.rubber_volume > 0.0 else []),
+        ("radius of curvature", f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"),
+        ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
+        ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
+        (
+            "sizes that cost nothing",
+            "; ".join(str(each) for each in design.size_ranges if each.wide) or "none",
+        ),
+        ("starts", _starts(design)),
+        ("solver", f"{design.starts[design.taken].iterations} iterations{fit}"),
+        ("fingerprint", design.fingerprint),
+    ]
+    rows += [("stock", _alternative(design, each)) for each in design.alternatives]
+    rows += [("remark", remark) for remark in design.remarks]
+    inside = design.within_tolerance
+    return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
+
+
+def _starts(design: CamDesign) -> str:
+    solved = [s for s in design.starts if s.solved]
+    text = f"{len(solved)} of {len(design.starts)} came to a solution"
+    best = design.starts[design.taken]
+    others = sorted((s for i, s in enumerate(design.starts) if s.solved and i != design.taken), key=_cost)
+    if not others:
+        return text + "; no second one to compare with"
+    ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
+    return text + f"; the next best has {ratio:.4g} times the cost, {1e3 * others[0].rms:.3g} mN·m rms"
+
+
+def _alternative(design: CamDesign, each: Alternative) -> str:
+    if each.rms is None:
+        return f"{each.choice}: no design, {each.reason}"
+    share = 100.0 * each.rms / design.target.largest
+    return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}" + ("" if each.met else ", a miss")
+
+
+def _cost(outcome: StartOutcome) -> float:
+    return outcome.cost
 
 
 def _brief(value: Quantity) -> str:

@@ -197,6 +197,7 @@ def contour_from_curvature(
     *,
     first_slope: float,
     anchor_distance: float,
+    first_lever_arm: float = 0.0,
     refine: int = 8,
 ) -> Contour:
     """Return the contour of a radius of curvature that is linear between nodes; p'' + p = ρ solved exactly.
@@ -208,14 +209,16 @@ def contour_from_curvature(
     radii_of_curvature
         ρ at the nodes, shape (n,), in m.
     first_slope
-        p'(0): where the cable leaves the cam at angle zero, in m. p(0) is zero.
+        p'(0): where the cable leaves the cam at angle zero, in m.
     anchor_distance
-        D in m; infinite for a parallel cable.
+        D in m; infinite for a cable that stays parallel.
+    first_lever_arm
+        p(0) in m; zero for a cable through the centre.
     refine
         Points per interval.
     """
     phi, rho = np.asarray(nodes, dtype=float), np.asarray(radii_of_curvature, dtype=float)
-    value, slope = 0.0, first_slope
+    value, slope = first_lever_arm, first_slope
     rows = [(phi[0], value, slope, rho[0])]
     for left, right, start, end in zip(phi[:-1], phi[1:], rho[:-1], rho[1:], strict=True):
         growth = (end - start) / (right - left)

@@ -1,30 +1,234 @@
-"""From a lever arm to a declared cam, and from a declared cam to its contour."""
+"""From a lever arm or contour to a declared cam, and from a declared cam to its contour."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from ...components.transmission.cam import TwoSidedCam
+from ...components.transmission.cam import Cam, TwoSidedCam
+from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
 from ...errors import ArrangementError, ValueRangeError
 from ...quantity import Quantity, significant
 from .contour import Contour, contour_from_lever_arm
 
 Floats = NDArray[np.float64]
+Made = TypeVar("Made", bound=Cam)
 
 _SAMPLES_PER_VALUE = 12
+_JUMP = 1e-6
+"""First lever arm, relative to the largest, from which it counts as a jump."""
+_SOURCE = "designed: fitted to a lever arm over the angle"
 
 
-def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int = 241) -> Contour:
-    """Return the contour of a declared cam, without the change of sides near angle zero.
+@dataclass(frozen=True)
+class CamFit:
+    """A declared cam and how well it holds the lever arm that it was made for.
 
     Parameters
     ----------
     cam
-        A :class:`~nlsdesign.components.TwoSidedCam`; its lever arm and anchor distance are used.
+        The cam.
+    error
+        Largest deviation of its lever arm in m, outside the change of sides or the onset.
+    changed
+        Names of the numbers of the cam that the fit has set.
+    """
+
+    cam: Cam
+    error: float
+    changed: tuple[str, ...] = ("lever_arm", "last_angle")
+
+    def changes(self) -> dict[str, Quantity]:
+        """Return the numbers that the fit has changed, by their names in the cam."""
+        return {name: getattr(self.cam, name) for name in self.changed}
+
+
+@dataclass(frozen=True)
+class DeclaredCam(ABC, Generic[Made]):
+    """A cam of an assembly as the design sees it.
+
+    Parameters
+    ----------
+    part
+        The cam.
+    """
+
+    part: Made
+
+    @property
+    @abstractmethod
+    def through_centre(self) -> bool:
+        """Whether the cable passes through the centre, so that the lever arm is zero at angle zero."""
+
+    @abstractmethod
+    def contour(self, last_angle: float | None, points: int) -> Contour:
+        """Return the contour, without the change of sides or the onset near angle zero.
+
+        Parameters
+        ----------
+        last_angle
+            In rad; the end of the cam's table for ``None``.
+        points
+            Number of points.
+        """
+
+    @abstractmethod
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+        """Return a cam like this one with a given lever arm.
+
+        Parameters
+        ----------
+        angles, lever_arms
+            Shape (n,); angles ascend from zero.
+        count
+            Number of control values.
+        """
+
+
+@dataclass(frozen=True)
+class _TwoSided(DeclaredCam[TwoSidedCam]):
+    @property
+    def through_centre(self) -> bool:
+        return True
+
+    def contour(self, last_angle: float | None, points: int) -> Contour:
+        angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
+        # Beyond the change of sides the cable lies on the contour with the lever arm H(θ − w).
+        arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.changeover.number)
+        return contour_from_lever_arm(angles, arms, anchor_distance=self.part.anchor_distance.number)
+
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+        # The control values are fitted to h(θ) through the law of the cam, which changes sides over the
+        # angle w, so that the change costs nothing where h starts at zero. A jump is rounded over w.
+        width = self.part.changeover.number
+        dense, wanted = _dense(angles, lever_arms, count)
+        root = np.hypot(dense, width)
+        basis = spline_basis(dense**2 / (root + width), angles[-1], count) * (dense / root)[:, None]
+        values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
+        error = _largest(basis @ values - wanted, dense > 20.0 * width)
+        cam = TwoSidedCam(
+            lever_arm=self.part.lever_arm.with_value(significant(values), _SOURCE),
+            last_angle=self.part.last_angle.with_value(float(angles[-1]), _SOURCE),
+            changeover=self.part.changeover,
+            anchor_distance=self.part.anchor_distance,
+            elements=self.part.elements,
+            cable=self.part.cable,
+        )
+        return CamFit(cam, error)
+
+
+@dataclass(frozen=True)
+class _OneSided(DeclaredCam[OneSidedCam]):
+    @property
+    def through_centre(self) -> bool:
+        return False
+
+    def contour(self, last_angle: float | None, points: int) -> Contour:
+        angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
+        # Beyond the onset the cable lies on the contour with the lever arm H(θ − w/2).
+        arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.onset.number / 2)
+        return contour_from_lever_arm(angles, arms, anchor_distance=np.inf)
+
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+        width = self.part.onset.number
+        dense, wanted = _dense(angles, lever_arms, count)
+        r = np.clip(dense / width, 0.0, 1.0)
+        taken = width * r**3 * (1.0 - r / 2.0) + np.maximum(dense - width, 0.0)
+        basis = spline_basis(taken, angles[-1], count) * (r * r * (3.0 - 2.0 * r))[:, None]
+        values = _solved(basis, wanted, dense >= (width if _jumps(wanted) else 0.0))
+        error = _largest(basis @ values - wanted, dense > 2.0 * width)
+        cam = replace(
+            self.part,
+            lever_arm=self.part.lever_arm.with_value(significant(values), _SOURCE),
+            last_angle=self.part.last_angle.with_value(float(angles[-1]), _SOURCE),
+        )
+        return CamFit(cam, error)
+
+
+@dataclass(frozen=True)
+class _Anchored(DeclaredCam[AnchoredCam]):
+    @property
+    def through_centre(self) -> bool:
+        return True
+
+    def contour(self, last_angle: float | None, points: int) -> Contour:
+        end, anchor = self.part.last_direction.number, self.part.anchor_distance.number
+        values = np.array(self.part.support.values)
+        step = end / (len(values) - 3)
+
+        def support(at: Floats, order: int = 0) -> Floats:
+            basis: Floats = _basis_derivative(at, end, len(values), order) @ values / step**order
+            return basis
+
+        directions = np.linspace(0.0, end, max(points, 1001))
+        reached = directions - np.arcsin(support(directions) / anchor)
+        # The change of sides turns the contour back by its width, so that much more of the angle is covered;
+        # what a fit of the end point is off by is far less than that width.
+        covered = float(reached[-1]) + 1.1 * self.part.changeover.number
+        last = min(_end(covered, last_angle), float(reached[-1]))
+        directions = np.linspace(0.0, float(np.interp(last, reached, directions)), points)
+        p = support(directions)
+        return Contour(directions, p, support(directions, 1), p + support(directions, 2), anchor)
+
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+        width, anchor = self.part.changeover.number, self.part.anchor_distance.number
+        dense, wanted = _dense(angles, lever_arms, count)
+        root = np.hypot(dense, width)
+        # The law is h = p(φ)·θ/√(θ² + w²) at φ − asin(p(φ)/D) = √(θ² + w²) − w.
+        slope = np.where(dense > 0.0, dense / root, 1.0)
+        directions = dense**2 / (root + width) + np.arcsin(np.clip(wanted / slope / anchor, -1.0, 1.0))
+        end = float(directions[-1])
+        basis = spline_basis(directions, end, count) * slope[:, None]
+        values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
+        error = _largest(basis @ values - wanted, dense > 20.0 * width)
+        cam = replace(
+            self.part,
+            support=self.part.support.with_value(significant(values), _SOURCE),
+            last_direction=self.part.last_direction.with_value(end, _SOURCE),
+        )
+        return CamFit(cam, error, ("support", "last_direction"))
+
+
+def declared_cam(
+    part: object,
+) -> DeclaredCam[TwoSidedCam] | DeclaredCam[OneSidedCam] | DeclaredCam[AnchoredCam]:
+    """Return a cam of an assembly as the design sees it.
+
+    Parameters
+    ----------
+    part
+        Any part.
+
+    Raises
+    ------
+    ArrangementError
+        If it has no contour.
+    """
+    if isinstance(part, TwoSidedCam):
+        return _TwoSided(part)
+    if isinstance(part, OneSidedCam):
+        return _OneSided(part)
+    if isinstance(part, AnchoredCam):
+        return _Anchored(part)
+    raise ArrangementError(
+        f"a {type(part).__name__}", "has no contour",
+        next_step="declare the spring with a TwoSidedCam, a OneSidedCam or an AnchoredCam",
+    )  # fmt: skip
+
+
+def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int = 241) -> Contour:
+    """Return the contour of a declared cam, without the change of sides or the onset near angle zero.
+
+    Parameters
+    ----------
+    cam
+        A :class:`~nlsdesign.components.TwoSidedCam`, :class:`~nlsdesign.components.OneSidedCam` or
+        :class:`~nlsdesign.components.AnchoredCam`.
     last_angle
         In rad; the end of the cam's table if it is left out.
     points
@@ -37,51 +241,14 @@ def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int 
     ValueRangeError
         If the contour ends before the last angle.
     """
-    cam = two_sided(cam)
-    end = cam.last_angle.number
-    last = end if last_angle is None else last_angle
-    if last > end * (1 + 1e-9):
-        raise ValueRangeError(
-            f"last_angle = {end:g} rad of the cam", f"the contour ends before the wanted {last:g} rad",
-            next_step="free the contour, or ask for a target with a smaller angle",
-        )  # fmt: skip
-    angles = np.linspace(0.0, last, points)
-    values = np.array(cam.lever_arm.values)
-    # Beyond the change of sides the cable lies on the contour with the lever arm H(θ − w); near zero the
-    # contour goes on as the cubic that H is there.
-    first = np.linspace(0.0, cam.step, 4)
-    start = np.polynomial.Polynomial.fit(first, _spline_basis(first, end, len(values)) @ values, 3)
-    beyond = angles - cam.changeover.number
-    arms = np.where(beyond < 0.0, start(beyond), _spline_basis(beyond, end, len(values)) @ values)
-    return contour_from_lever_arm(angles, arms, anchor_distance=cam.anchor_distance.number)
-
-
-@dataclass(frozen=True)
-class CamFit:
-    """A declared cam and how well it holds the lever arm that it was made for.
-
-    Parameters
-    ----------
-    cam
-        The cam.
-    error
-        Largest deviation of its lever arm in m, outside the change of sides.
-    """
-
-    cam: TwoSidedCam
-    error: float
-
-    def changes(self) -> dict[str, Quantity]:
-        """Return the numbers that the fit has changed, by their names in the cam."""
-        return {"lever_arm": self.cam.lever_arm, "last_angle": self.cam.last_angle}
+    return declared_cam(cam).contour(last_angle, points)
 
 
 def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, count: int = 48) -> CamFit:
-    """Return a two-sided cam with a given lever arm.
+    """Return a cam with a given lever arm.
 
-    The law of :class:`~nlsdesign.components.TwoSidedCam` changes sides over the angle w; the control values
-    are fitted to h(θ) through that law, so that the change costs nothing where h starts at zero. A jump of
-    h at zero is rounded over w.
+    The control values are fitted to h(θ) through the law of the cam, with its change of sides or onset. A
+    jump of h at zero is rounded over the width of those.
 
     Parameters
     ----------
@@ -90,8 +257,7 @@ def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, 
     lever_arms
         h, shape (n,), in m.
     like
-        A :class:`~nlsdesign.components.TwoSidedCam`; its number of elements, change of sides and anchor
-        distance are kept.
+        A cam as for :func:`contour_of_cam`; all but its contour is kept.
     count
         Number of control values.
 
@@ -100,56 +266,75 @@ def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, 
     ValueRangeError
         If the table does not ascend from zero.
     ArrangementError
-        If ``like`` is no two-sided cam.
+        If ``like`` has no contour.
     """
-    like = two_sided(like)
+    made = declared_cam(like)
     theta, arm = np.asarray(angles, dtype=float), np.asarray(lever_arms, dtype=float)
     if theta[0] != 0.0 or np.any(np.diff(theta) <= 0.0) or theta.shape != arm.shape:
         raise ValueRangeError("cam table", "angles must ascend from zero, one lever arm for each")
-    width = like.changeover.number
-    dense = np.linspace(0.0, theta[-1], max(_SAMPLES_PER_VALUE * count, len(theta)))
-    wanted = make_interp_spline(theta, arm, k=3)(dense)
-    root = np.hypot(dense, width)
-    basis = _spline_basis(dense**2 / (root + width), theta[-1], count) * (dense / root)[:, None]
-    # Where the lever arm jumps at zero, the change of sides is none of the contour's business.
-    jumps = abs(wanted[0]) > 1e-6 * float(np.max(np.abs(wanted)))
-    used = dense >= 10.0 * width if jumps else np.ones(len(dense), dtype=bool)
-    values, *_ = np.linalg.lstsq(basis[used], wanted[used], rcond=None)
-    beyond = dense > 20.0 * width
-    error = float(np.max(np.abs(basis @ values - wanted)[beyond], initial=0.0))
-    source = "designed: fitted to a lever arm over the angle"
-    cam = TwoSidedCam(
-        lever_arm=like.lever_arm.with_value(significant(values), source),
-        last_angle=like.last_angle.with_value(float(theta[-1]), source),
-        changeover=like.changeover,
-        anchor_distance=like.anchor_distance,
-        elements=like.elements,
-    )
-    return CamFit(cam, error)
+    return made.fitted(theta, arm, count)
 
 
-def two_sided(part: object) -> TwoSidedCam:
-    """Return a part if it is a two-sided cam.
+def spline_basis(at: Floats, last: float, count: int) -> Floats:
+    """Return the values of all uniform cubic B-splines of a cam, shape (n, count).
 
     Parameters
     ----------
-    part
-        Any part.
-
-    Raises
-    ------
-    ArrangementError
-        If it has no contour.
+    at
+        Angles, shape (n,).
+    last
+        End of the table.
+    count
+        Number of control values.
     """
-    if not isinstance(part, TwoSidedCam):
-        raise ArrangementError(
-            f"a {type(part).__name__}", "has no contour", next_step="declare the spring with a TwoSidedCam"
-        )
-    return part
+    return _basis_derivative(at, last, count, 0)
 
 
-def _spline_basis(at: Floats, last: float, count: int) -> Floats:
-    """Return the values of all uniform cubic B-splines of a cam at some angles, shape (n, count)."""
-    distance = np.abs((at / last * (count - 3))[:, None] - (np.arange(count) - 1)[None, :])
-    result: Floats = (np.clip(2 - distance, 0, None) ** 3 - 4 * np.clip(1 - distance, 0, None) ** 3) / 6
+def _basis_derivative(at: Floats, last: float, count: int, order: int) -> Floats:
+    """Return a derivative, 0 to 2, of all B-splines with respect to the angle in steps of the knots."""
+    offset = (at / last * (count - 3))[:, None] - (np.arange(count) - 1)[None, :]
+    outer, inner, sign = np.clip(2 - abs(offset), 0, None), np.clip(1 - abs(offset), 0, None), np.sign(offset)
+    values = (
+        (outer**3 - 4 * inner**3) / 6,
+        -sign * (outer**2 - 4 * inner**2) / 2,
+        outer - 4 * inner,
+    )
+    return np.asarray(values[order], dtype=float)
+
+
+def _end(end: float, wanted: float | None) -> float:
+    if wanted is None:
+        return end
+    if wanted > end * (1 + 1e-9):
+        raise ValueRangeError(
+            f"last_angle = {end:g} rad of the cam", f"the contour ends before the wanted {wanted:g} rad",
+            next_step="free the contour, or ask for a target with a smaller angle",
+        )  # fmt: skip
+    return wanted
+
+
+def _lever_arms(row: Quantity, last: Quantity, at: Floats) -> Floats:
+    """Return a spline, continued below zero as the cubic that it is there."""
+    end, values = last.number, np.array(row.values)
+    first = np.linspace(0.0, end / (len(values) - 3), 4)
+    start = np.polynomial.Polynomial.fit(first, spline_basis(first, end, len(values)) @ values, 3)
+    result: Floats = np.where(at < 0.0, start(at), spline_basis(at, end, len(values)) @ values)
     return result
+
+
+def _dense(angles: Floats, lever_arms: Floats, count: int) -> tuple[Floats, Floats]:
+    dense = np.linspace(0.0, angles[-1], max(_SAMPLES_PER_VALUE * count, len(angles)))
+    return dense, make_interp_spline(angles, lever_arms, k=3)(dense)
+
+
+def _jumps(wanted: Floats) -> bool:
+    return bool(abs(wanted[0]) > _JUMP * np.max(np.abs(wanted)))
+
+
+def _solved(basis: Floats, wanted: Floats, used: NDArray[np.bool_]) -> Floats:
+    values, *_ = np.linalg.lstsq(basis[used], wanted[used], rcond=None)
+    return np.asarray(values, dtype=float)
+
+
+def _largest(errors: Floats, where: NDArray[np.bool_]) -> float:
+    return float(np.max(np.abs(errors)[where], initial=0.0))

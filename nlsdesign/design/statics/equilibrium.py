@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -150,7 +151,9 @@ def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
 
     force = cut(cam.force)
     strains = [cut(piece.strain) for piece in cam.specimens]
-    stresses = [cut(piece.force) / parameters[place[piece.area]] for piece in cam.specimens]
+    sections = [[parameters[place[name]] for name in piece.section] for piece in cam.specimens]
+    pieces = zip(cam.specimens, sections, strict=True)
+    stresses = [cut(piece.force) / math.prod(section) for piece, section in pieces]
     results = [force, ca.jacobian(force, extension), ca.vertcat(*strains), ca.vertcat(*stresses)]
     function = ca.Function("law", [extension, parameters], [ca.SX(e) for e in results])
     if not np.isfinite(float(function(1e-3, model.start(model.parameters))[0])):
@@ -247,23 +250,26 @@ def _at_rest(
     symbols = model.symbols()
     names = [v.name for v in model.signals]
     movable = ca.vertcat(symbols.state, symbols.input)
-    handle = _handle(symbols.signal[names.index(motion)], movable, motion)
+    handle, slope = _handle(symbols.signal[names.index(motion)], movable, motion)
     inner = [i for i, v in enumerate(model.states) if v.name in states]
-    angle = movable[handle]
+    angle = ca.SX.sym("angle")
     others = ca.vertcat(*[movable[i] for i in range(movable.shape[0]) if i not in (handle, *inner)])
     both = ca.vertcat(symbols.signal, symbols.derivative)
-    both = ca.substitute(both, others, ca.SX.zeros(others.shape))
+    old, new = ca.vertcat(others, movable[handle]), ca.vertcat(ca.SX.zeros(others.shape), angle / slope)
+    both = ca.substitute(both, old, new)
     at_rest = ca.vertcat(*[symbols.state[i] for i in inner])
     rates = ca.vertcat(*[both[len(names) + i] for i in inner])
     signals = ca.substitute(both[: len(names)], at_rest, _resting_states(ca.SX(rates), ca.SX(at_rest)))
     return dict(zip(names, ca.vertsplit(signals), strict=True)), angle, symbols.parameter
 
 
-def _handle(angle: Expression, movable: Expression, motion: str) -> int:
-    slopes = ca.jacobian(angle, movable)
-    for i in range(movable.shape[0]):
-        if ca.is_equal(slopes[i], ca.SX(1)):
-            return i
+def _handle(angle: Expression, movable: Expression, motion: str) -> tuple[int, Expression]:
+    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio)."""
+    slopes = ca.SX(ca.jacobian(angle, movable))
+    places = [i for i in range(movable.shape[0]) if not slopes[i].is_zero()]
+    places.sort(key=lambda i: not ca.is_equal(slopes[i], ca.SX(1)))
+    if places and not depends(slopes[places[0]], movable):
+        return places[0], slopes[places[0]]
     raise ArrangementError(
         f"'{motion}'", "is neither a state nor an input of the model",
         next_step="tie the spring between one body that moves and one that rests",

@@ -157,7 +157,7 @@ def _heating_by_loss(assembly: Assembly, path: str) -> Iterator[Edit]:
     """Yield heat of what the laws of a piece lose, which softens all of them or the equilibrium alone."""
     piece = assembly.element(path)
     assert isinstance(piece, Specimen)
-    volume = piece.area.number * piece.rest_length.number
+    volume = piece.cross_section.square_metres * piece.rest_length.number
     free = free_inside(piece, "heating")
     members = tuple((n, assembly.element(f"{path}.{n}")) for n in piece.children())
     where = f"{path}.{free}"

@@ -40,7 +40,7 @@ def _stress(assembly: Assembly, path: str) -> tuple[float, str, str]:
     """
     piece = assembly.element(path)
     assert isinstance(piece, Specimen)
-    return 1.0 / piece.area.number, f"{path}.force", f"{path}.force / {path}.strain"
+    return 1.0 / piece.cross_section.square_metres, f"{path}.force", f"{path}.force / {path}.strain"
 
 
 def specimens(assembly: Assembly, *, without: str = "") -> list[str]:

@@ -1,0 +1,59 @@
+"""An assembly with another rubber in it."""
+
+from __future__ import annotations
+
+from ...errors import ArrangementError, unknown_name
+from ..core.tie import Tie
+from ..materials.library import Material
+from ..materials.material_law import law_of
+from ..materials.specimen import Specimen
+from .named_parts import Assembly
+
+
+def with_rubber(
+    actuator: Assembly, material: Material, *, piece: str | None = None, using: str | None = None
+) -> Assembly:
+    """Return a copy whose rubber is one of the library: other laws and strength, the same sizes.
+
+    Parameters
+    ----------
+    actuator
+        With a piece of rubber.
+    material
+        Of the library, for instance ``material("Dragon_Skin_30")``.
+    piece
+        Path of the piece, for instance ``"spring.rubber"``; not needed where there is but one.
+    using
+        As for :func:`~nlsdesign.components.law_of`.
+
+    Raises
+    ------
+    ArrangementError
+        If the assembly has no piece of rubber, or several and none is named, or if nothing that is known of
+        the rubber gives an elastic law.
+    UnknownNameError
+        If there is no such piece.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import material
+    >>> from nlsdesign.components.assembly.deck_writer import declare
+    >>> from nlsdesign.deck import load_deck
+    >>> published = declare(load_deck("austin2015_as_printed"))
+    >>> softer = with_rubber(published, material("Dragon_Skin_30"))
+    >>> [quantity.source[:24] for name, quantity in softer.quantities().items() if name.endswith("modulus")]
+    ['fitted to Dragon_Skin_30']
+    """
+    inner = ((path, part.element if isinstance(part, Tie) else part) for path, part in actuator.walk())
+    pieces = {path: part for path, part in inner if isinstance(part, Specimen)}
+    if piece is not None and piece not in pieces:
+        raise unknown_name("piece of rubber", piece, pieces)
+    if piece is None and len(pieces) != 1:
+        raise ArrangementError(
+            f"assembly '{actuator.name}'",
+            f"has {len(pieces)} pieces of rubber" if pieces else "has no piece of rubber",
+            next_step=f"say piece='...', one of: {', '.join(pieces)}" if pieces
+            else "declare one with specimen(...)",
+        )  # fmt: skip
+    path = piece or next(iter(pieces))
+    return actuator.with_part(path, law_of(material, using=using).in_place_of(pieces[path]))

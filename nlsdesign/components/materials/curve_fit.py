@@ -1,0 +1,181 @@
+"""A law fitted to a measured curve of stress over strain; the form that follows the curve best is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from ...errors import ValueRangeError
+from ...quantity import Quantity, significant
+from ..core.contacts import Rounded
+from ..core.springs import FittedLaw, FittedRange, StrainStiffening
+from .hyperelastic import Ogden, Yeoh
+
+Floats = NDArray[np.float64]
+
+_EXPONENTS = (
+    *(-8.0, -6.0, -5.0, -4.0, -3.0, -2.5, -2.0),
+    *(1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 16.0),
+)
+"""Exponents that Ogden's law is put together from: each alone gives a stress that never falls."""
+_MOST = 3
+"""Most pairs of Ogden's law, and most moduli of a piecewise law."""
+_DIGITS = 6
+"""Significant digits of fitted constants."""
+_ROUNDING = 0.3
+"""Width of the rounded knots over the least distance of measured strains."""
+_DENSE = 400
+"""Points between zero and the last strain at which a cubic has to rise."""
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A law and how far it is from the curve that it was fitted to.
+
+    Parameters
+    ----------
+    law
+        With the range of the curve.
+    rms_error, worst_error
+        Of the stress, relative to the measured one, over the points.
+    """
+
+    law: FittedLaw
+    rms_error: float
+    worst_error: float
+
+
+def fit_curve(strains: Sequence[float], stresses: Sequence[float], *, like: Quantity) -> CurveFit:
+    """Return the law that follows a measured curve best: least squares of the relative error of the stress.
+
+    Tried are Yeoh's cubic, Ogden's law and moduli that engage at rounded knots, with at most one constant for
+    each point and three pairs or moduli. Each is linear in its constants once its exponents or knots are
+    chosen, so the least of all choices is found, without a start. A law whose stress falls within the range
+    is not taken. The law is stated to hold up to the last strain. Sources: Yeoh 1993; Ogden 1972; Austin et
+    al. 2015, eq. (1); Lawson and Hanson 1974 (least squares with constants that are not negative).
+
+    Parameters
+    ----------
+    strains
+        Nominal, ascending from above zero, shape (n,), n ≥ 2.
+    stresses
+        Nominal, in Pa, positive, shape (n,).
+    like
+        Gives the constants their source and their spread.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are fewer than two points, or they do not ascend from zero.
+    """
+    strain, stress = np.asarray(strains, dtype=float), np.asarray(stresses, dtype=float)
+    if len(strain) < 2 or len(strain) != len(stress) or np.any(np.diff(strain, prepend=0.0) <= 0.0):
+        raise ValueRangeError(
+            f"curve with {len(strain)} strains and {len(stress)} stresses",
+            "a curve has two points at least, one stress for each strain, and strains that ascend from zero",
+        )
+    if np.any(stress <= 0.0):
+        raise ValueRangeError("curve with stresses of zero or less", "rubber in tension has positive stress")
+    forms = (_yeoh(strain, stress, like), _ogden(strain, stress, like), _engaging(strain, stress, like))
+    fits = [_judged(law, values / stress - 1.0) for form in forms for law, values in form]
+    # To a tenth of a per mille, so that what is alike stays in the order above on every processor.
+    return min(fits, key=lambda fit: round(fit.rms_error, 4))
+
+
+def _judged(law: FittedLaw, errors: Floats) -> CurveFit:
+    return CurveFit(law, float(np.sqrt(np.mean(errors**2))), float(np.max(np.abs(errors))))
+
+
+def _yeoh(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[FittedLaw, Floats]]:
+    if len(strain) < _MOST:
+        return
+    columns = _yeoh_columns(strain)
+    solution, *_ = np.linalg.lstsq(columns / stress[:, None], np.ones(len(stress)), rcond=None)
+    constants = _short(np.asarray(solution, dtype=float))
+    rising = np.diff(_yeoh_columns(np.linspace(0.0, strain[-1], _DENSE)) @ constants)
+    if constants[0] > 0.0 and np.all(rising > 0.0):
+        c1, c2, c3 = (_constant((float(c),), "Pa", like, row=False) for c in constants)
+        yield Yeoh(c1=c1, c2=c2, c3=c3, data=_range(strain, like)), columns @ constants
+
+
+def _yeoh_columns(strain: Floats) -> Floats:
+    stretch = 1.0 + strain
+    first, slope = stretch**2 + 2.0 / stretch - 3.0, 2.0 * stretch - 2.0 / stretch**2
+    return np.stack([slope, 2.0 * first * slope, 3.0 * first**2 * slope], axis=1)
+
+
+def _ogden(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[FittedLaw, Floats]]:
+    stretch, exponents = 1.0 + strain[:, None], np.array(_EXPONENTS)
+    columns = np.sign(exponents) * (stretch ** (exponents - 1.0) - stretch ** (-exponents / 2.0 - 1.0))
+    chosen, sizes = _fewest(columns, stress, first=())
+    moduli = sizes * np.sign(exponents[chosen])
+    law = Ogden(
+        moduli=_constant(tuple(map(float, moduli)), "Pa", like),
+        exponents=_constant(tuple(map(float, exponents[chosen])), "1", like, spread=0.0),
+        data=_range(strain, like),
+    )
+    yield law, columns[:, chosen] @ sizes
+
+
+def _engaging(strain: Floats, stress: Floats, like: Quantity) -> Iterator[tuple[FittedLaw, Floats]]:
+    width = significant([_ROUNDING * float(np.min(np.diff(strain)))], 2)[0]
+    knots = np.array([0.0, *strain[:-1]])
+    rounded = _positive(strain[:, None] - knots, width) - _positive(-knots, width)
+    columns = np.where(knots == 0.0, strain[:, None], rounded)
+    chosen, sizes = _fewest(columns, stress, first=(0,))
+    law = StrainStiffening(
+        modulus=_constant(tuple(map(float, sizes)), "Pa", like),
+        knots=_constant(tuple(map(float, knots[chosen])), "1", like, spread=0.0),
+        contact=Rounded(Quantity(width, "1", "assumed: a share of the distance of the measured strains")),
+        data=_range(strain, like),
+    )
+    yield law, columns[:, chosen] @ sizes
+
+
+def _positive(value: Floats, width: float) -> Floats:
+    softened: Floats = width * np.logaddexp(0.0, value / width)
+    return softened
+
+
+def _fewest(columns: Floats, stress: Floats, *, first: tuple[int, ...]) -> tuple[list[int], Floats]:
+    """Return the columns that follow a curve best with sizes that are not negative, and the sizes.
+
+    Parameters
+    ----------
+    columns
+        Shape (n, m).
+    stress
+        Shape (n,).
+    first
+        Columns that are always there.
+    """
+    count = max(1, min(_MOST, len(stress) // 2))
+    relative, ones = columns / stress[:, None], np.ones(len(stress))
+    rest = [i for i in range(columns.shape[1]) if i not in first]
+    choices = [[*first, *more] for more in combinations(rest, max(0, count - len(first)))]
+    chosen = min(choices, key=lambda choice: round(float(nnls(relative[:, choice], ones)[1]), 9))
+    sizes, _ = nnls(relative[:, chosen], ones)
+    kept = [(i, size) for i, size in zip(chosen, _short(sizes), strict=True) if size > 0.0]
+    return [i for i, _ in kept], np.array([size for _, size in kept])
+
+
+def _short(constants: Floats) -> Floats:
+    """Return constants rounded each by itself: a small one can act at a large power."""
+    return np.array([significant([constant], _DIGITS)[0] for constant in constants])
+
+
+def _constant(
+    values: tuple[float, ...], unit: str, like: Quantity, *, row: bool = True, spread: float | None = None
+) -> Quantity:
+    return Quantity(
+        values if row else values[0], unit, like.source, like.spread if spread is None else spread
+    )
+
+
+def _range(strain: Floats, like: Quantity) -> FittedRange:
+    return FittedRange(Quantity(float(strain[-1]), "1", like.source))

@@ -1,0 +1,75 @@
+"""Limits that hold unless the designer says otherwise: they follow from the declared cable and rubber."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ...model import FlatModel
+from ...model.roles import series_cam
+from .limits import (
+    Limit,
+    MaximumCableTension,
+    MaximumStrain,
+    MaximumStress,
+    MinimumRadiusOfCurvature,
+)
+
+CABLE_FACTOR = 5.0
+"""Breaking force over largest tension: the working coefficient of ropes in Directive 2006/42/EC, annex I,
+4.1.2.4, for lifting accessories; nothing better is known for the rope of an actuator."""
+STRESS_FACTOR = 3.0
+"""Assumed: strength of rubber scatters by 15 % from sample to sample (Schepelmann, Geberth, Geyer 2014) and
+falls by about a half over many cycles."""
+STRAIN_FACTOR = 3.0
+"""Assumed, for the same reason as the factor of stress."""
+
+
+def safe_limits(model: FlatModel, spring: str | None = None) -> tuple[Limit, ...]:
+    """Return the limits that follow from what is declared of cable and rubber.
+
+    Parameters
+    ----------
+    model
+        Flat model of the actuator.
+    spring
+        Path of the cam spring; decided from the structure if it is left out.
+
+    Returns
+    -------
+    tuple of Limit
+        Empty where neither strength nor cable is declared.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not say which spring is meant.
+    """
+    return tuple(_declared(model, spring))
+
+
+def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
+    cam, values = series_cam(model, spring), model.values
+    if cam.cable is not None:
+        radius = values[cam.cable.diameter] * values[cam.cable.bend_ratio] / 2.0
+        yield MinimumRadiusOfCurvature(radius)
+        yield MaximumCableTension(values[cam.cable.breaking_force] / CABLE_FACTOR)
+    strengths = [values[p.tensile_strength] for p in cam.specimens if p.tensile_strength is not None]
+    if strengths:
+        yield MaximumStress(min(strengths), safety_factor=STRESS_FACTOR)
+    elongations = [values[p.elongation_at_break] for p in cam.specimens if p.elongation_at_break is not None]
+    if elongations:
+        yield MaximumStrain(min(elongations) / STRAIN_FACTOR)
+
+
+def with_defaults(keep: Sequence[Limit], defaults: Sequence[Limit]) -> tuple[Limit, ...]:
+    """Return the limits asked for, and those defaults of whose kind none was asked for.
+
+    Parameters
+    ----------
+    keep
+        Asked for.
+    defaults
+        Otherwise.
+    """
+    kinds = {type(limit) for limit in keep}
+    return (*keep, *(limit for limit in defaults if type(limit) not in kinds))

@@ -1,0 +1,203 @@
+"""One design problem with its limits and goals, solved from several starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ValueRangeError
+from ...model import FlatModel
+from ...symbolic import Expression
+from ..curves.target import Target
+from ..statics.equilibrium import elastic_law
+from ..statics.rounding import has_corners
+from .goals import Goal
+from .limits import Bound, Limit
+from .problem import DesignProblem, design_problem, movable_numbers
+from .program import Program, Rows, Solution
+from .settings import DesignSettings
+from .starts import starts
+
+Floats = NDArray[np.float64]
+
+_ROUNDING = 0.003
+"""Width over which the knots of a rubber's law are rounded at first, relative to its stretch."""
+_FINER = 0.1
+"""By what the rounding is narrowed where the sharp law does not keep what the rounded one promised."""
+_NO_INFLUENCE = 1e-12
+"""Change of any goal or limit, each relative to its scale, per change of a number by its own size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked for, apart from what is free.
+
+    Parameters
+    ----------
+    model
+        Flat model of the actuator.
+    cam
+        Its declared cam.
+    drive
+        Path of the part that holds the cam.
+    target
+        Torque curve.
+    keep
+        All limits, defaults included.
+    goals
+        What is made small, as a sum.
+    settings
+        How the search is carried out.
+    """
+
+    model: FlatModel
+    cam: object
+    drive: str
+    target: Target
+    keep: tuple[Limit, ...]
+    goals: tuple[Goal, ...]
+    settings: DesignSettings
+
+    def search(self, free: Sequence[str], rounding: float | None = None) -> Search:
+        """Return the search in which these numbers may change.
+
+        Parameters
+        ----------
+        free
+            Full names.
+        rounding
+            Width of rounded knots relative to the stretch; by itself if it is left out.
+        """
+        if rounding is None:
+            rounding = _ROUNDING if self._has_knots else 0.0
+        problem = design_problem(
+            self.model, self.cam, target=self.target, free=free, spring=self.drive, rounding=rounding
+        )
+        return Search(self, problem, rounding)
+
+    @cached_property
+    def _has_knots(self) -> bool:
+        return has_corners(elastic_law(self.model, self.drive).function)
+
+    def finer(self, rounding: float) -> float | None:
+        """Return a narrower rounding to go on with, or None where knots are not rounded.
+
+        Parameters
+        ----------
+        rounding
+            So far.
+        """
+        return _FINER * rounding if rounding > 0.0 else None
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A design problem as a program.
+
+    Parameters
+    ----------
+    question
+        What is asked for.
+    problem
+        Variables and geometry.
+    rounding
+        Width over which knots were rounded.
+    """
+
+    question: Question
+    problem: DesignProblem
+    rounding: float
+
+    @cached_property
+    def bounds(self) -> tuple[Bound, ...]:
+        """All limits."""
+        return tuple(bound for limit in self.question.keep for bound in limit.bounds(self.problem.design))
+
+    @cached_property
+    def cost(self) -> Expression:
+        """Sum of the goals."""
+        return sum((goal.cost(self.problem.design) for goal in self.question.goals), start=ca.SX(0))
+
+    @cached_property
+    def program(self) -> Program:
+        """The nonlinear program."""
+        problem = self.problem
+        return Program(
+            problem.vector,
+            np.array([v.lower for v in problem.variables]),
+            np.array([v.upper for v in problem.variables]),
+            self.cost,
+            (*problem.structure, *(row_of(bound) for bound in self.bounds)),
+        )
+
+    def outcomes(self) -> list[Solution]:
+        """Return the solution from each start of the settings."""
+        settings = self.question.settings
+        sizes = [v.name for v in self.problem.scalars if v.name != self.problem.law.cam.pretension]
+        points = [self.problem.at(start) for start in starts(settings.starts, settings.seed, sizes)]
+        return self.program.solve_all(points, settings.progress)
+
+    def require_influence(self) -> None:
+        """Refuse numbers that change neither a goal nor a limit.
+
+        Raises
+        ------
+        ValueRangeError
+            With the names of those numbers.
+        """
+        problem = self.problem
+        if not problem.scalars:
+            return
+        rows = [*problem.structure, *(row_of(bound) for bound in self.bounds)]
+        effects = ca.vertcat(self.cost, *[row.expression for row in rows])
+        symbols = ca.vertcat(*[v.symbol for v in problem.scalars])
+        slopes = ca.Function("slopes", [problem.vector], [ca.jacobian(effects, symbols)])
+        largest = np.zeros(len(problem.scalars))
+        for start in starts(3, 0, []):
+            sizes = np.abs(np.array(slopes(problem.at(start)), dtype=float))
+            largest = np.maximum(largest, np.nan_to_num(sizes, nan=1.0, posinf=1.0).max(axis=0))
+        idle = [v.name for v, size in zip(problem.scalars, largest, strict=True) if size < _NO_INFLUENCE]
+        if idle:
+            movable = movable_numbers(self.question.model, problem.law.cam)
+            behind = f"{problem.law.cam.drive}."
+            others = [name for name in movable if name not in idle and name.startswith(behind)]
+            raise ValueRangeError(
+                "free: " + ", ".join(f"'{name}'" for name in idle),
+                "changes neither a goal nor a limit of this design, so any value of it would do",
+                next_step="leave it out, or ask for a goal or limit that depends on it; what may change: "
+                + ", ".join(others),
+            )
+
+
+def row_of(bound: Bound, slack: Expression | float = 0.0) -> Rows:
+    """Return a bound as rows of a program, softened by a slack.
+
+    Parameters
+    ----------
+    bound
+        What must hold.
+    slack
+        Relative give, a symbol or zero.
+    """
+    distance = (bound.expression - bound.value) / bound.scale
+    return Rows(distance - slack, -ca.inf, 0.0) if bound.upper else Rows(distance + slack, 0.0, ca.inf)
+
+
+def carried_over(source: Search, point: Floats, into: Search) -> Floats:
+    """Return a point of one search as a start of another with other numbers free.
+
+    Parameters
+    ----------
+    source
+        Where the point was found.
+    point
+        Shape (variables,), scaled.
+    into
+        With the same contour.
+    """
+    return into.problem.completed(source.problem.chosen(point))

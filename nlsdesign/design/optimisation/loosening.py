@@ -1,0 +1,257 @@
+"""What would have to give: a limit, by how much, or a number that is held, for a design to exist.
+
+One program answers all such questions. Every number that a designer could free is a variable of it, every
+limit has a slack relative to its size, and the torque error is one more limit. A question is which numbers
+may move and which slacks may open; the rest is held by the bounds of the variables. What is made small is the
+sum of the slacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...processes import parallel_map
+from ...quantity import parse_unit, with_unit
+from .design_search import Search, carried_over, row_of
+from .limits import Bound, MaximumTorqueError
+from .problem import contour_names
+from .program import Program, Solution
+from .starts import starts
+from .variables import DesignVariable, scaled
+
+Floats = NDArray[np.float64]
+
+FEASIBLE = 1e-6
+"""Relative give below which a limit counts as kept."""
+_MOST = 1e3
+_MOST_RAISED = 10.0
+"""Beyond this factor a give is no advice but another design."""
+_MOST_STRAIN = 5.0
+"""Nominal strain at which soft rubbers break: the tensile curve of PMC-770 ends there (Schepelmann 2014)."""
+_RANGE = 4.0
+"""By what factor a size that is freed may leave its present value, either way."""
+
+
+@dataclass(frozen=True)
+class Give:
+    """How far one limit would have to move for all others to be kept.
+
+    Parameters
+    ----------
+    bound
+        The limit.
+    amount
+        In SI, positive.
+    """
+
+    bound: Bound
+    amount: float
+
+    @property
+    def moved(self) -> float:
+        """Where the limit would have to be, in SI."""
+        return self.bound.value + (self.amount if self.bound.upper else -self.amount)
+
+    @property
+    def sensible(self) -> bool:
+        """Whether a designer could consider it: within ten times, and within what rubber can stretch."""
+        if self.bound.value == 0.0 or (self.bound.unit == "1" and self.moved > _MOST_STRAIN):
+            return False
+        ratio = self.moved / self.bound.value
+        return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED
+
+    def __str__(self) -> str:
+        amount, end = self.bound.shown(self.amount), self.bound.shown(self.moved)
+        return f"{self.bound} would have to give by {amount} (to {end})"
+
+
+@dataclass(frozen=True)
+class Freed:
+    """Numbers that are held now, and where they go when they are freed.
+
+    Parameters
+    ----------
+    names
+        Full names.
+    values
+        In SI.
+    units
+        In which each is shown.
+    error
+        Rms torque error in N·m that is then left; ``None`` where it was not asked.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    units: tuple[str, ...]
+    error: float | None = None
+
+    def __str__(self) -> str:
+        shown = [
+            f"{name} (to {with_unit(f'{value / parse_unit(unit).factor:.4g}', unit)})"
+            for name, value, unit in zip(self.names, self.values, self.units, strict=True)
+        ]
+        return "free " + " and ".join(shown)
+
+
+class Loosened:
+    """The program of all that could give.
+
+    Parameters
+    ----------
+    search
+        The search that failed or missed.
+    free
+        What was free in it.
+    largest_error
+        Rms torque error in N·m that is asked for; ``None`` if the error does not matter.
+    best
+        Where the search came to.
+    """
+
+    def __init__(
+        self, search: Search, free: Sequence[str], *, largest_error: float | None, best: Floats | None
+    ) -> None:
+        self.free, self.candidates = tuple(free), _candidates(search, free)
+        self.open = search.question.search([*free, *self.candidates], search.rounding)
+        bounds = self.open.bounds
+        if largest_error is not None:
+            bounds += tuple(MaximumTorqueError(largest_error).bounds(self.open.problem.design))
+        self.bounds, self.error = bounds, None if largest_error is None else len(bounds) - 1
+        self.count = len(self.open.problem.variables)
+        pretension = [self.open.problem.at(start) for start in starts(2, 0, [])]
+        self.starts = pretension if best is None else [carried_over(search, best, self.open)]
+
+    @cached_property
+    def program(self) -> Program:
+        """The program; its unknowns are those of the open search, then the slacks."""
+        problem, slacks = self.open.problem, ca.SX.sym("slack", len(self.bounds))
+        rows = [row_of(bound, slacks[i]) for i, bound in enumerate(self.bounds)]
+        program = Program(
+            problem.vector,
+            np.array([u.lower for u in problem.variables]),
+            np.array([u.upper for u in problem.variables]),
+            ca.sum1(slacks),
+            (*problem.structure, *rows),
+        )
+        return program.with_unknowns(slacks, 0.0, _MOST)
+
+    def least(self, names: Sequence[str], slacks: Sequence[int], start: Floats | None = None) -> Solution:
+        """Return where the sum of some slacks is least; the solution says whether it is one.
+
+        Parameters
+        ----------
+        names
+            Candidates that may move; the others stay as declared.
+        slacks
+            Indices of the limits that may give.
+        start
+            Where to begin; the starts of the whole if it is left out.
+        """
+        lower, upper = self._box(names)
+        allowed = np.isin(np.arange(len(self.bounds)), slacks)
+        upper[self.count :] = np.where(allowed, _MOST, 0.0)
+        outcomes: list[Solution] = []
+        for point in self.starts if start is None else [start]:
+            begin = np.append(np.clip(point, lower[: self.count], upper[: self.count]), allowed.astype(float))
+            outcomes.append(self.program.solve(begin, lower=lower, upper=upper))
+            if outcomes[-1].solved and outcomes[-1].cost <= FEASIBLE:
+                break
+        return min(outcomes, key=lambda outcome: (not outcome.solved, outcome.cost))
+
+    def several(
+        self, questions: Sequence[tuple[Sequence[str], Sequence[int]]], start: Floats | None = None
+    ) -> list[Solution]:
+        """Return the answers to several questions, side by side on the cores.
+
+        Parameters
+        ----------
+        questions
+            Names and slacks as for :meth:`least`.
+        start
+            As for :meth:`least`.
+        """
+        self.program.prepare()
+        return list(parallel_map(lambda k: self.least(*questions[k], start), len(questions)))
+
+    def designed(self, names: Sequence[str], outcome: Solution) -> Freed:
+        """Return freed numbers at the best design with them, found from a solution of :meth:`least`.
+
+        Parameters
+        ----------
+        names
+            Of candidates.
+        outcome
+            With them freed; where no better design is found from there, its own values count.
+        """
+        lower, upper = self._box(names)
+        point = outcome.point[: self.count]
+        better = self.open.program.solve(point, lower=lower[: self.count], upper=upper[: self.count])
+        freed = self.freed(names, better if better.solved else outcome)
+        return freed if better.solved and freed.error is not None else self.freed(names, outcome)
+
+    def freed(self, names: Sequence[str], outcome: Solution) -> Freed:
+        """Return freed numbers with their values at a solution.
+
+        Parameters
+        ----------
+        names
+            Of candidates.
+        outcome
+            Of :meth:`least`.
+        """
+        values = self.open.problem.named(outcome.point[: self.count])
+        shown = tuple(self.open.problem.design.shown_units[name] for name in names)
+        error = None
+        if self.error is not None:
+            mean_square = self.open.problem.design.mean_square_error
+            error = float(np.sqrt(self.open.problem.evaluate(mean_square, outcome.point[: self.count])[0]))
+        return Freed(tuple(names), tuple(values[name] for name in names), shown, error)
+
+    def give(self, index: int, outcome: Solution) -> Give:
+        """Return how far a limit gives at a solution.
+
+        Parameters
+        ----------
+        index
+            Of the limit.
+        outcome
+            Of :meth:`least`.
+        """
+        return Give(self.bounds[index], float(outcome.point[self.count + index]) * self.bounds[index].scale)
+
+    def _box(self, names: Sequence[str]) -> tuple[Floats, Floats]:
+        """Return the bounds of all unknowns with these candidates freed and the others held."""
+        lower, upper = self.program.lower.copy(), self.program.upper.copy()
+        for i, variable in enumerate(self.open.problem.variables):
+            if variable.name in self.candidates:
+                lower[i], upper[i] = (
+                    self._range(variable) if variable.name in names else (variable.start, variable.start)
+                )
+        return lower, upper
+
+    def _range(self, variable: DesignVariable) -> tuple[float, float]:
+        """Return the scaled range of a freed number, within a factor of its present value."""
+        model, cam = self.open.question.model, self.open.problem.law.cam
+        now = model.variable(variable.name).start
+        if variable.name == cam.pretension:
+            lengths = [model.values[piece.rest_length] for piece in cam.specimens]
+            return scaled(variable, 0.0), scaled(variable, max([now, *lengths]))
+        return scaled(variable, now / _RANGE), scaled(variable, now * _RANGE)
+
+
+def _candidates(search: Search, free: Sequence[str]) -> tuple[str, ...]:
+    """Return the names that a designer could free besides: sizes, not the material."""
+    cam = search.problem.law.cam
+    sizes = [cam.pretension]
+    for piece in cam.specimens:
+        sizes += [*piece.section, piece.rest_length]
+    if cam.anchor_distance is not None and any(name in free for name in contour_names(cam)):
+        sizes.append(cam.anchor_distance)
+    return tuple(dict.fromkeys(name for name in sizes if name not in free))

@@ -1,0 +1,63 @@
+"""How the search for a design is carried out, and what counts as a miss."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ...errors import ValueRangeError
+from ..curves.numbers import in_si
+from .limits import Limit
+
+
+def _quiet() -> None:
+    """Report no progress."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignSettings:
+    """How the search is carried out, and what counts as a miss.
+
+    Parameters
+    ----------
+    starts
+        Number of starting points; the first four are always the same.
+    seed
+        Of the starting points after the fourth.
+    largest_error
+        Rms torque error, relative to the largest torque of the target, above which a design misses it.
+    defaults
+        Limits that hold unless one of the same kind is asked for; ``None`` for those that follow from the
+        declared cable and rubber, see :func:`safe_limits`. Empty for none.
+    look_for_size_ranges
+        Whether the ranges of sizes that cost nothing are looked for, which takes as long as the design again.
+    look_for_remedies
+        Whether it is found out, at a miss, what to free.
+    progress
+        Called after each starting point, or after each combination of a stock.
+
+    Raises
+    ------
+    ValueRangeError
+        If a number lies outside its range.
+
+    Examples
+    --------
+    >>> DesignSettings(starts=20, seed=3).largest_error
+    0.01
+    """
+
+    starts: int = 4
+    seed: int = 1
+    largest_error: float = 0.01
+    defaults: Sequence[Limit] | None = None
+    look_for_size_ranges: bool = True
+    look_for_remedies: bool = True
+    progress: Callable[[], None] = _quiet
+
+    def __post_init__(self) -> None:
+        in_si("largest_error", self.largest_error, "1", minimum=1e-6, maximum=1.0)
+        if self.starts < 1:
+            raise ValueRangeError(
+                f"starts = {self.starts}", "a search needs a starting point", next_step="take 4"
+            )

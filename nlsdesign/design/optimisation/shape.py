@@ -1,0 +1,171 @@
+"""The contour in symbols: radius of curvature over the cable's direction, linear between nodes.
+
+Between two nodes p'' + p = ρ has the exact solution
+
+    p = a + b·t + (p₀ − a)·cos t + (p'₀ − b)·sin t,        ρ = a + b·t,
+
+so that ρ ≥ 0 gives a convex contour by construction. The extension follows from the length of the cable:
+δ = ∫ρ dφ − (p' − p'(0)), for a finite anchor with √(D² − p²) − √(D² − p²(0)) added.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ...model import FlatModel
+from ...symbolic import Expression
+from ..statics.declared_cam import contour_of_cam
+from ..statics.equilibrium import cam_function
+from .program import Rows
+from .variables import DesignVariable
+
+INTERVALS = 40
+"""Intervals of the contour; the number moves the results by less than their last digit shown."""
+
+_LARGEST_RADIUS = 0.5
+"""Largest radius of curvature and first slope in m."""
+_LEAST_CLEARANCE = 0.02
+"""Free length of the cable and clearance between cam and anchor, relative to the anchor distance."""
+
+
+class Shape(NamedTuple):
+    """Columns over the nodes of a contour, and what must hold for it to be one."""
+
+    directions: Expression
+    angles: Expression
+    lever_arms: Expression
+    slopes: Expression
+    radii_of_curvature: Expression
+    extensions: Expression
+    lever_arm_slopes: Expression
+    rows: tuple[Rows, ...]
+
+
+class ContourVariables(NamedTuple):
+    """The variables that shape a contour; the last is the last direction, or the first lever arm.
+
+    Where the cable passes through the centre the first lever arm is zero and the last direction follows from
+    the anchor; where it stays parallel the last direction is the last angle and the first lever arm is free.
+    """
+
+    radii_of_curvature: tuple[DesignVariable, ...]
+    first_slope: DesignVariable
+    last: DesignVariable
+
+    def all(self) -> list[DesignVariable]:
+        """Return them in the order of the vector."""
+        return [*self.radii_of_curvature, self.first_slope, self.last]
+
+
+class _Support(NamedTuple):
+    """Columns of p, p' and ∫ρ over the nodes."""
+
+    values: Expression
+    slopes: Expression
+    arcs: Expression
+    directions: Expression
+
+
+def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
+    """Return the contour of a cam through whose centre the cable passes to an anchor.
+
+    Parameters
+    ----------
+    anchor
+        Distance of the anchor in m.
+    last_angle
+        Cam angle at the end in rad.
+    size
+        Typical length of the contour in m.
+    """
+    turned = ca.SX.sym("last_direction")
+    last = DesignVariable(
+        "last_direction", turned, turned, last_angle, last_angle + np.pi / 2, last_angle + 0.6
+    )
+    variables = ContourVariables(_radii(size), _length("first_slope", size, start=0.5), last)
+    p, slope, arcs, directions = _support(variables, ca.SX(0), last.value)
+    root = ca.sqrt(anchor**2 - p**2)
+    angles = directions - ca.asin(p / anchor)
+    # √(D² − p²) − D without cancellation
+    extensions = arcs - (slope - slope[0]) - p**2 / (anchor + root)
+    rows = (
+        Rows(angles[-1] - last_angle, 0.0, 0.0),
+        Rows((root - slope) / anchor, _LEAST_CLEARANCE, ca.inf),
+        Rows((p**2 + slope**2) / anchor**2, -ca.inf, (1.0 - _LEAST_CLEARANCE) ** 2),
+    )
+    rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
+    return variables, Shape(
+        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows
+    )
+
+
+def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
+    """Return the contour of a cam whose cable leaves to one side and stays parallel: φ = θ, h = p.
+
+    Parameters
+    ----------
+    last_angle
+        Cam angle at the end in rad.
+    size
+        Typical length of the contour in m.
+    """
+    slope = _length("first_slope", size, start=0.3)._replace(lower=-_LARGEST_RADIUS / size)
+    arm = _length("first_lever_arm", size, start=0.5)
+    variables = ContourVariables(_radii(size), slope, arm)
+    p, slopes, arcs, directions = _support(variables, arm.value, ca.SX(last_angle))
+    rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
+    rows = (Rows(p / size, 0.0, ca.inf),)
+    return variables, Shape(directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows)
+
+
+def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
+    """Return the shape of a declared cam that stays as it is.
+
+    Parameters
+    ----------
+    model
+        Flat model.
+    cam
+        The declared cam.
+    last_angle
+        Cam angle at the end in rad.
+    spring
+        Path of the part that holds the cam.
+    """
+    contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
+    _, extensions = cam_function(model, spring)(contour.angles.reshape(1, -1), model.start(model.parameters))
+    # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
+    root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
+    return Shape(
+        ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
+        ca.SX(contour.radii_of_curvature), ca.SX(extensions).T,
+        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (),
+    )  # fmt: skip
+
+
+def _radii(size: float) -> tuple[DesignVariable, ...]:
+    return tuple(_length(f"radius_of_curvature[{i}]", size, start=0.7) for i in range(INTERVALS + 1))
+
+
+def _length(name: str, size: float, *, start: float) -> DesignVariable:
+    symbol = ca.SX.sym(name)
+    return DesignVariable(name, symbol, size * symbol, 0.0, _LARGEST_RADIUS / size, start)
+
+
+def _support(variables: ContourVariables, first: Expression, last: Expression) -> _Support:
+    rho = [u.value for u in variables.radii_of_curvature]
+    step = last / INTERVALS
+    cosine, sine = ca.cos(step), ca.sin(step)
+    values, slopes, arcs = [first], [variables.first_slope.value], [ca.SX(0)]
+    for left, right in itertools.pairwise(rho):
+        growth = (right - left) / step
+        off, tilt = values[-1] - left, slopes[-1] - growth
+        values.append(right + off * cosine + tilt * sine)
+        slopes.append(growth - off * sine + tilt * cosine)
+        arcs.append(arcs[-1] + step * (left + right) / 2)
+    directions = step * ca.SX(np.arange(INTERVALS + 1))
+    return _Support(ca.vertcat(*values), ca.vertcat(*slopes), ca.vertcat(*arcs), directions)
