@@ -125,7 +125,7 @@ def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_cur
     assert stated <= 1e-3
     *_, file = write_drawings(tmp_path, sharp(anchor), machined=MachinedTwoSidedCam(cable_radius=CABLE))
     edge = max(polylines_of(file.read_text(encoding="utf-8"), "EDGE"), key=lambda item: -item[:, 1].mean())
-    drawn = offset_points(edge, 0.0, step=2e-4)
+    drawn = offset_points(edge, 0.0, step=4e-5)
     # dx = ρ·t·dφ from the mouth at 7 mm, less the radius of the cable along the normal.
     phi = np.linspace(0.0, 1.3, 40001)
     rho = np.interp(phi, np.linspace(0.0, 1.3, 9), [4.0, 1.0, 9.0, 12.0, 2.0, 6.0, 6.0, 3.0, 8.0])
@@ -134,8 +134,8 @@ def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_cur
     )
     wanted = (place - 0.25 * np.column_stack([np.sin(phi), np.cos(phi)]))[::200]
     away = [np.min(np.hypot(*(drawn - point).T)) for point in wanted]
-    # Drawn points are up to 2.5 µm apart, so the nearest of them may be 1.3 µm further along.
-    assert max(np.sqrt(np.maximum(np.square(away) - 1.3e-3**2, 0.0))) < 1.05 * stated
+    # Drawn points are up to 0.5 µm apart, so the nearest of them may lie 0.25 µm further along.
+    assert max(np.sqrt(np.maximum(np.square(away) - 0.25e-3**2, 0.0))) < 1.05 * stated
 
 
 @pytest.mark.parametrize("name", CASES)
