@@ -26,6 +26,7 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
+from .jobs.job_file import DesignJob, read_job
 from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
@@ -71,6 +72,7 @@ __all__ = [
     "CauseEffect",
     "ClampScrew",
     "Contour",
+    "DesignJob",
     "DesignSettings",
     "ElasticLaw",
     "ExponentialTorque",
@@ -147,6 +149,7 @@ __all__ = [
     "motor_and_gear",
     "motor_cycle",
     "read_band",
+    "read_job",
     "read_target",
     "read_task",
     "safe_limits",
