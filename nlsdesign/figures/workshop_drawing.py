@@ -222,7 +222,7 @@ def _edge_ends(page: Sheet, view: _View) -> None:
     near = np.argmin(np.hypot(*(view.outlines[0] - part.centre_line[-1]).T))
     place = view.at(view.outlines[0][near])
     right = place[0] > view.at((view.low + view.high) / 2)[0]
-    bends = [(place[0] + 7.0, place[1] - 9.0), (place[0] + 7.0, bottom - 16.0)]
+    bends = [(place[0] + 5.0, bottom - 17.0), (place[0] + 5.0, bottom - 24.0)]
     if not right:
         bends = [(left - 2.0, bottom - 23.0), (left - 2.0, bottom - 15.0)]
     last, beyond = (math.degrees(part.number(name)) for name in ("last_angle", "over_travel"))

@@ -263,6 +263,10 @@ REFUSED: dict[str, tuple[type[NlsError], str, Making]] = {
         ValueRangeError, r"cable radius 3 mm: the cable is thicker than the sharpest radius.*2\.6 mm",
         lambda two, one: MachinedTwoSidedCam(cable_radius=mm(3)).part(two),
     ),
+    "corner": (
+        ValueRangeError, r"radius of 0\.01 mm at its sharpest: is a corner within its tolerance of 0\.02",
+        lambda two, one: MachinedTwoSidedCam(cable_radius=mm(2.59), channel_clearance=0.0).part(two),
+    ),
     "unit": (
         ValueRangeError, r"was 'mm' meant", lambda two, one: MachinedTwoSidedCam(cable_radius=0.25),
     ),

@@ -6,6 +6,7 @@ import math
 import re
 import xml.etree.ElementTree as ET
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,21 @@ TITLE = figures.TitleBlock(
 ROWS = [figures.InspectionRow(degrees(a), 0.05 * a, 2e-4 * a, 20.0 + a) for a in (0.0, 20.0, 40.0, 53.0)]
 
 
+def long() -> CamPart:
+    """As wide at 5:1 as there is room for the view."""
+    bare = contour_from_curvature(
+        [0.0, 0.5, 1.0, 1.5], [14e-3, 12e-3, 8e-3, 2e-3], first_slope=2e-3, anchor_distance=math.inf
+    )
+    # The same curve 4 mm higher.
+    contour = replace(
+        bare,
+        lever_arms=bare.lever_arms + 4e-3 * np.cos(bare.directions),
+        slopes=bare.slopes - 4e-3 * np.sin(bare.directions),
+    )
+    seat = FerruleSeat(diameter=1.5e-3)
+    return MachinedOneSidedCam(cable_radius=CABLE, lead_in=8e-3, cable_end=seat).part(contour)
+
+
 def two_sided(*, groove: bool = False) -> CamPart:
     nodes = np.linspace(0.0, 1.35, 8)
     radii = 1e-3 * np.array([2.6, 4.0, 9.0, 12.6, 12.0, 8.0, 6.0, 5.0])
@@ -60,6 +76,7 @@ PARTS = {
     "groove": two_sided(groove=True),
     "one-sided": one_sided(),
     "wound": one_sided(3.5),
+    "long": long(),
 }
 
 
@@ -109,6 +126,7 @@ def test_the_page_says_what_the_workshop_needs(name: str, tmp_path: Path) -> Non
         "two-sided": ["0.5 at the mouth", "0.6 inside", "4 × Ø1.6 through, on Ø13"],
         "groove": ["Ø3 hub bore, base only", "2 × Ø1 for the clamp", "1.5"],
         "one-sided": ["Ø4 hub bore", "Lead-in"],
+        "long": ["Ferrule seat *", "5:1, A4, mm"],
         "wound": ["contact at 200.5°,", "then run-out 10°"],
     }
     for line in wanted_here[name]:
