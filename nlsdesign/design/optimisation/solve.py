@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
-from ...components.core.element import Element
 from ...errors import ConvergenceError
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam, series_spring
@@ -21,6 +20,7 @@ from ..curves.target import Target
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from ..statics.equilibrium import torque_function
+from ..statics.smooth_cables import with_smooth_cables
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
@@ -116,7 +116,8 @@ def design_cam(
     ArrangementError
         If the structure does not say which spring is meant, or its cam has no contour.
     """
-    model = flatten(_with_smooth_cables(actuator))
+    # The finished design is measured on the assembly as it is declared.
+    model = flatten(with_smooth_cables(actuator))
     names = series_cam(model, spring)
     chosen = tuple(contour_names(names)[:1] if free is None else free)
     defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
@@ -137,18 +138,6 @@ def design_cam(
         outcomes.append(search.program.solve(feasible_point(search, chosen)))
     taken = _best(outcomes)
     return _finished(_narrowed(_Found(actuator, search, chosen, outcomes, taken, outcomes[taken])))
-
-
-def _with_smooth_cables(actuator: Assembly) -> Assembly:
-    """Return the assembly with every cable that goes slack in its smooth form, which an optimiser can follow.
-
-    Within the range of a design the cable is taut, where the two forms agree; the finished design is measured
-    on the assembly as it is declared.
-    """
-    for path, part in actuator.walk():
-        if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
-            actuator = actuator.with_part(path, part.smooth())
-    return actuator
 
 
 @dataclass(frozen=True, eq=False)
