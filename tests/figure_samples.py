@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -10,8 +11,12 @@ from nlsdesign import figures
 from nlsdesign.analysis import Chart
 from nlsdesign.design import (
     ExponentialTorque,
+    MotorAndGear,
+    Task,
+    TaskCurve,
     ToleranceResult,
     contour_from_curvature,
+    curve_for_task,
     tolerance_analysis,
 )
 from nlsdesign.model import Variable
@@ -114,6 +119,17 @@ def against_measured() -> figures.Figure:
     )
 
 
+@functools.cache
+def task_curve() -> TaskCurve:
+    """A joint that swings like a pendulum with a second harmonic in its torque."""
+    phase = np.linspace(0.0, 2 * np.pi, 101)
+    task = Task(
+        time=phase / 6.0, angle=0.4 * np.sin(phase), torque=-4.0 * np.sin(phase) + 0.8 * np.cos(3 * phase)
+    )
+    drive = MotorAndGear(inertia=1.4e-5, torque_constant=0.03, resistance=0.3, gear_ratio=80.0)
+    return curve_for_task(task, drive)
+
+
 def made_springs() -> ToleranceResult:
     """Springs with contact errors and a trim, from few draws."""
     return tolerance_analysis(cam_cases.actuator(cam_cases.CONCAVE, pretension=2e-3), target=TARGET, draws=40)
@@ -145,5 +161,7 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         unit="N*m",
         name="block load",
     ),
+    "motor_over_task": lambda: figures.motor_over_task(task_curve()),
+    "curve_of_task": lambda: figures.curve_of_task(task_curve()),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
 }

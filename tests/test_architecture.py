@@ -51,6 +51,7 @@ ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
     "design.statics.smooth_cables": ("components.core.element",),
+    "design.optimisation.stock": ("components.assembly.other_rubber", "components.materials.library"),
     "discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),
     "design.statics": ("components.transmission",),

@@ -20,7 +20,9 @@ from .over_angle import observability_over_angle, observer_stability, stability_
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
+from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
     "CamMotion",
@@ -29,7 +31,9 @@ __all__ = [
     "ClosedLoopRun",
     "Figure",
     "HeldOut",
+    "InspectionRow",
     "RecordError",
+    "TitleBlock",
     "alternative_text",
     "binned_errors",
     "cam_motion",
@@ -40,6 +44,7 @@ __all__ = [
     "closed_loop",
     "closed_loop_of",
     "compact",
+    "curve_of_task",
     "curves",
     "described",
     "gap_bars",
@@ -47,6 +52,7 @@ __all__ = [
     "inline_svg",
     "loop_area",
     "metric_note",
+    "motor_over_task",
     "observability_over_angle",
     "observer_error",
     "observer_stability",
@@ -61,5 +67,6 @@ __all__ = [
     "torque_band",
     "torque_curve",
     "torque_loops",
+    "workshop_drawing",
     "write_figures",
 ]

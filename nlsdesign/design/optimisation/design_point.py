@@ -72,6 +72,8 @@ class DesignPoint:
         All parameters of the flat model by name; symbols where they are free.
     element
         What one element does at an extension in m.
+    shown_units
+        Unit in which each parameter is shown.
     """
 
     cam: CamNames
@@ -90,6 +92,7 @@ class DesignPoint:
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
+    shown_units: Mapping[str, str]
 
     @property
     def elements(self) -> Expression:
@@ -140,9 +143,13 @@ class DesignPoint:
 
     @property
     def mean_square_error(self) -> Expression:
-        """Mean over the angle of the squared torque error in (N·m)², by the trapezoidal rule."""
-        squared, steps = self.torque_errors**2, self.angles[1:] - self.angles[:-1]
-        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / self.target.last_angle
+        """Mean of the squared torque error in (N·m)², weighted as the target says, by trapezoids."""
+        rows = range(self.angles.shape[0])
+        weights = ca.vertcat(*[self.target.weight_law(self.angles[i]) for i in rows])
+        steps = self.angles[1:] - self.angles[:-1]
+        squared = weights * self.torque_errors**2
+        whole = ca.dot((weights[1:] + weights[:-1]) / 2, steps)
+        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / whole
 
     @property
     def rubber_volume(self) -> Expression:

@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
+_SHOWN = {"m": "mm", "m^2": "mm^2"}
 _NEAREST_START = 0.45
 """Largest lever arm of a start, relative to the distance of the anchor."""
 
@@ -309,4 +310,5 @@ def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str,
         torque_errors=parameters[cam.elements] * shape.lever_arms * forces - wanted,
         parameters=parameters,
         element=element,
+        shown_units={v.name: _SHOWN.get(v.unit, v.unit) for v in law.parameters},
     )

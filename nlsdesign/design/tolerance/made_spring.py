@@ -41,6 +41,8 @@ class MadeSpring:
         θ in rad, ascending from zero, shape (n,).
     targets
         Torque that is asked for, shape (n,), in N·m.
+    importance
+        Weight of the error that the target gives each angle, shape (n,).
     contour
         The made cam.
     force
@@ -57,6 +59,7 @@ class MadeSpring:
     causes: tuple[Cause, ...]
     angles: Floats
     targets: Floats
+    importance: Floats
     contour: MadeCam
     force: ca.Function = field(repr=False)
     moved: tuple[str, ...]
@@ -75,11 +78,10 @@ class MadeSpring:
 
     @cached_property
     def weights(self) -> Floats:
-        """Weights of the columns in the mean over angle and stroke; their sum is 1."""
+        """Weights of the columns in the mean over angle and stroke, as the target says; their sum is 1."""
         steps = np.diff(self.angles)
-        weights = (np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / (
-            2 * (self.angles[-1] - self.angles[0])
-        )
+        weights = self.importance * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+        weights = weights / np.sum(weights)
         result: Floats = np.tile(weights / 2, 2) if self.rubs else weights
         return result
 
@@ -260,6 +262,7 @@ def made_spring(
         causes=tuple(causes),
         angles=grid,
         targets=target.torque(grid),
+        importance=target.weight(grid),
         contour=made_cam(law, cam_function(model, spring), grid, causes),
         force=ca.Function("force", [stretch, numbers], [force]),
         moved=moved,
