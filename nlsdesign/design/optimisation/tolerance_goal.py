@@ -2,7 +2,7 @@
 
 To first order the error of a made spring over the angle is e + Σ sⱼ·xⱼ with independent xⱼ of variance 1, the
 error e of the design and the sensitivities sⱼ of :mod:`..tolerance.made_cam`. A trim takes the part along its
-tangent t off all of them. The mean square of what is left is a quadratic form in x,
+tangent t off all sⱼ, but not off e: a design must not lean on it. The mean square of what is left is
 
     Q = e·e + 2 bᵀx + xᵀGx,    bⱼ = e·sⱼ,    Gⱼₖ = sⱼ·sₖ,
 
@@ -93,14 +93,14 @@ class ToleranceQuantile(Goal):
         trims = (design.cam.pretension,) if self.trims is None else self.trims
         tangents = [sensitivities.tangent(name) for name in trims]
         least = _LEAST * design.target.largest**2
-        table = ca.horzcat(design.torque_errors, *[row for row in rows if not row.is_zero()])
-        weights, left = _weights(design), table
+        weights, errors = _weights(design), design.torque_errors
+        left = ca.horzcat(*[row for row in rows if not row.is_zero()])
         for tangent in _orthogonal(tangents, weights):
             along = (weights * tangent).T @ left / (ca.dot(weights, tangent**2) + least)
             left = left - tangent @ along
-        products = left.T @ (ca.diag(weights) @ left)
-        cross, gram = products[0, 1:], products[1:, 1:]
-        mean = products[0, 0] + ca.trace(gram)
+        weighed = ca.diag(weights) @ left
+        cross, gram = errors.T @ weighed, left.T @ weighed
+        mean = ca.dot(weights, errors**2) + ca.trace(gram)
         peaked = self.rules.reading.fourth_moment - 3.0
         variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + peaked * ca.sumsqr(ca.diag(gram))
         return _quantile(mean, variance + least**2, float(ndtri(self.share)))
