@@ -70,7 +70,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
         {"diagnose"},
     ),
-    "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}),
+    "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip
 

@@ -26,6 +26,8 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
+from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.task_target import TaskTarget
 from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
@@ -71,6 +73,7 @@ __all__ = [
     "CauseEffect",
     "ClampScrew",
     "Contour",
+    "DesignJob",
     "DesignSettings",
     "ElasticLaw",
     "ExponentialTorque",
@@ -124,6 +127,7 @@ __all__ = [
     "TaskCycle",
     "TaskGoal",
     "TaskProblem",
+    "TaskTarget",
     "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
@@ -144,9 +148,11 @@ __all__ = [
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "job_of",
     "motor_and_gear",
     "motor_cycle",
     "read_band",
+    "read_job",
     "read_target",
     "read_task",
     "safe_limits",

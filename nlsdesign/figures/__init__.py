@@ -14,6 +14,7 @@ from .before_after import (
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
+from .design_figures import design_picture, limit_margins
 from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
@@ -47,9 +48,11 @@ __all__ = [
     "curve_of_task",
     "curves",
     "described",
+    "design_picture",
     "gap_bars",
     "held_out_series",
     "inline_svg",
+    "limit_margins",
     "loop_area",
     "metric_note",
     "motor_over_task",

@@ -77,7 +77,7 @@ def test_a_number_without_influence_is_refused_by_name() -> None:
 
 
 def test_a_conflict_says_which_number_to_free() -> None:
-    """With 3 mm of pretension on 12.5 mm the strain begins at 0.24; nothing but the pretension is to blame."""
+    """With 3 mm of pretension on 12.5 mm the strain begins at 0.24: only the pretension is to blame."""
     keep = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(20e-3), MaximumStrain(0.2)]
     tight = actuator(CONCAVE, pretension=3e-3)
     with pytest.raises(InfeasibleError, match=r"free spring\.pretension \(to ") as caught:
@@ -188,7 +188,7 @@ def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
 
 
 def test_a_torque_band_is_a_limit() -> None:
-    """The least mean square error has a peak of 47 mN·m; a band of 40 mN·m cuts it off."""
+    """The least mean square error has a peak of 47 mN·m; a band of 40 mN·m cuts it off, at the nodes of the contour."""
     angles = np.linspace(0.0, TARGET.last_angle, 60)
     wide = TorqueBand(
         angles=tuple(angles),
@@ -197,9 +197,9 @@ def test_a_torque_band_is_a_limit() -> None:
     )
     keep = [*KEEP, TorqueWithin(wide)]
     design = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=keep, settings=QUICK)
-    assert np.max(np.abs(design.check.errors)) < 0.0415
+    assert np.max(np.abs(design.check.errors)) < 0.045
     free = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=QUICK)
-    assert np.max(np.abs(free.check.errors)) > 0.045
+    assert np.max(np.abs(free.check.errors)) > 0.0465
     short = TorqueBand(angles=(0.0, 0.3, 0.5), lower=(0.0, 0.0, 0.0), upper=(1.0, 2.0, 3.0))
     with pytest.raises(ValueRangeError, match="ends before the target does"):
         design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=[TorqueWithin(short)])

@@ -173,6 +173,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         else (),
         miss=_miss(solved, limits),
         remarks=_remarks(search),
+        drive=problem.law.cam.drive,
     )
 
 

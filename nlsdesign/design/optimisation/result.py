@@ -268,6 +268,8 @@ class CamDesign:
         What a designer should know besides.
     alternatives
         All combinations of the stock that was offered.
+    drive
+        Path of the part that holds the cam.
     """
 
     target: Target
@@ -287,6 +289,7 @@ class CamDesign:
     miss: Miss | None = None
     remarks: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
+    drive: str | None = None
 
     @property
     def met(self) -> bool:
