@@ -50,7 +50,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
-    "design.optimisation.solve": ("components.core.element",),
+    "design.statics.smooth_cables": ("components.core.element",),
     "design.optimisation.stock": ("components.assembly.other_rubber", "components.materials.library"),
     "discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),

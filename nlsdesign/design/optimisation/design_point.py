@@ -10,9 +10,11 @@ from typing import Literal, NamedTuple
 import casadi as ca
 
 from ...errors import ArrangementError
+from ...model import FlatModel
 from ...model.structure import CamNames
 from ...symbolic import Expression
 from ..curves.target import Target
+from ..statics.equilibrium import ElasticLaw
 
 
 def anchor_of(cam: CamNames) -> str:
@@ -74,6 +76,10 @@ class DesignPoint:
         What one element does at an extension in m.
     shown_units
         Unit in which each parameter is shown.
+    model
+        Flat model of the actuator, with its numbers as they are declared.
+    law
+        Equilibrium law of one element.
     """
 
     cam: CamNames
@@ -93,6 +99,8 @@ class DesignPoint:
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
     shown_units: Mapping[str, str]
+    model: FlatModel
+    law: ElasticLaw
 
     @property
     def elements(self) -> Expression:

@@ -186,7 +186,7 @@ def design_problem(
         DesignProblem(
             law=law,
             variables=(*scalars.values(), *(contour.all() if contour else ())),
-            design=_design(law, target, shape, parameters),
+            design=_design(model, law, target, shape, parameters),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
@@ -280,7 +280,9 @@ def _lifted(problem: DesignProblem) -> DesignProblem:
     )
 
 
-def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]) -> DesignPoint:
+def _design(
+    model: FlatModel, law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]
+) -> DesignPoint:
     cam = law.cam
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
 
@@ -311,4 +313,6 @@ def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str,
         parameters=parameters,
         element=element,
         shown_units={v.name: _SHOWN.get(v.unit, v.unit) for v in law.parameters},
+        model=model,
+        law=law,
     )
