@@ -28,7 +28,7 @@ from .drawing.machined_cam import (
 )
 from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.task_target import TaskTarget
-from .optimisation.checks import torque_check, torque_sensitivity
+from .optimisation.checks import torque_check
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
@@ -47,7 +47,7 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
-from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
@@ -110,7 +110,6 @@ __all__ = [
     "QuantileEstimate",
     "RestLengthRange",
     "RubberStock",
-    "Sensitivity",
     "SeparateModuli",
     "SmoothContour",
     "SpreadReading",
@@ -159,7 +158,6 @@ __all__ = [
     "scan_gear_ratio",
     "tolerance_analysis",
     "torque_check",
-    "torque_sensitivity",
     "walking_task",
     "write_drawings",
 ]
