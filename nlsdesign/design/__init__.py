@@ -55,6 +55,7 @@ from .statics.contour import Contour, contour_from_curvature, contour_from_lever
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .statics.unmakeable import UnmakeablePart, unmakeable_parts
 from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
 from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
@@ -136,6 +137,7 @@ __all__ = [
     "TrimEffect",
     "TwoBranchSpring",
     "UniformSpread",
+    "UnmakeablePart",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
@@ -158,6 +160,7 @@ __all__ = [
     "scan_gear_ratio",
     "tolerance_analysis",
     "torque_check",
+    "unmakeable_parts",
     "walking_task",
     "write_drawings",
 ]
