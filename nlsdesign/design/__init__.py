@@ -27,6 +27,7 @@ from .drawing.machined_cam import (
     MachinedTwoSidedCam,
 )
 from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
 from .optimisation.checks import torque_check
 from .optimisation.defaults import safe_limits
@@ -150,6 +151,7 @@ __all__ = [
     "equilibrium_torque",
     "fingerprint",
     "job_of",
+    "machined_cam",
     "motor_and_gear",
     "motor_cycle",
     "read_band",
