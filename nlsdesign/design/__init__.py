@@ -2,6 +2,7 @@
 
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
@@ -20,6 +21,7 @@ from .optimisation.limits import (
 )
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
+from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam, torque_check, torque_sensitivity
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
@@ -29,15 +31,20 @@ from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
 __all__ = [
     "AnchorDistance",
     "AreaRange",
+    "BothStrokes",
     "CamDesign",
     "CamFit",
     "CamProfile",
     "Contour",
     "DesignSettings",
     "ElasticLaw",
+    "EnergyLost",
     "ExponentialTorque",
     "Goal",
+    "InsensitiveStiffness",
+    "LeastMass",
     "LeastRubber",
+    "LeastSize",
     "Limit",
     "LimitState",
     "MaximumCableTension",

@@ -13,6 +13,7 @@ from ...errors import ArrangementError
 from ...model.structure import CamNames
 from ...symbolic import Expression
 from ..curves.target import Target
+from ..statics.relaxing_law import RelaxingLaw
 
 
 def anchor_of(cam: CamNames) -> str:
@@ -72,6 +73,10 @@ class DesignPoint:
         All parameters of the flat model by name; symbols where they are free.
     element
         What one element does at an extension in m.
+    relaxing
+        Gives the law of one element with its inner states free.
+    through_centre
+        Whether the cable passes through the centre, so that both signs of the angle stretch the rubber alike.
     """
 
     cam: CamNames
@@ -90,6 +95,8 @@ class DesignPoint:
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
+    relaxing: Callable[[], RelaxingLaw]
+    through_centre: bool
 
     @property
     def elements(self) -> Expression:

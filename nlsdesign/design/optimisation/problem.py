@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -18,6 +19,7 @@ from ..curves.target import Target
 from ..statics.declared_cam import declared_cam
 from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
+from ..statics.relaxing_law import RelaxingLaw, relaxing_law
 from .design_point import DesignPoint, Stretched
 from .program import Rows
 from .shape import ContourVariables, Shape, given, parallel, through_centre
@@ -181,11 +183,16 @@ def design_problem(
         contour, shape = parallel(target.last_angle, arm)
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
     sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
+
+    @cache
+    def relaxing() -> RelaxingLaw:
+        return relaxing_law(model, spring)
+
     return _lifted(
         DesignProblem(
             law=law,
             variables=(*scalars.values(), *(contour.all() if contour else ())),
-            design=_design(law, target, shape, parameters),
+            design=_design(law, target, shape, parameters, (relaxing, made.through_centre)),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
@@ -279,7 +286,13 @@ def _lifted(problem: DesignProblem) -> DesignProblem:
     )
 
 
-def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]) -> DesignPoint:
+def _design(
+    law: ElasticLaw,
+    target: Target,
+    shape: Shape,
+    parameters: dict[str, Expression],
+    more: tuple[Callable[[], RelaxingLaw], bool],
+) -> DesignPoint:
     cam = law.cam
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
 
@@ -309,4 +322,6 @@ def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str,
         torque_errors=parameters[cam.elements] * shape.lever_arms * forces - wanted,
         parameters=parameters,
         element=element,
+        relaxing=more[0],
+        through_centre=more[1],
     )
