@@ -52,7 +52,7 @@ class LeastSize(Goal):
 
 @dataclass(frozen=True)
 class LeastMass(Goal):
-    """Mass of the rubber and of the plates from which the cam is cut; what no free number changes is left out.
+    """Mass of the rubber and of the plates from which the cam is cut, the parts that a design changes.
 
     A cam through whose centre the cable passes has two equal halves. Each plate is the sector that the
     contour encloses with the centre, ½∫p·ρ dφ, without hub and run-out.
@@ -109,8 +109,8 @@ class InsensitiveStiffness(Goal):
     whatever the design. If after assembly it is trimmed until the force at angle zero is the designed one
     again, the force at extension e deviates per factor by F(e) − F₀·K(e)/K₀, so that a design which carries
     its torque by pretension notices the deviation less. Johnston, Orekhov and Simaan 2023 have insensitivity
-    to the spring constant as a goal for wire-wrapped cams; only their abstract was at hand, so this definition
-    is not theirs.
+    to the spring constant as a goal for wire-wrapped cams; this definition is not taken from there, as only
+    their abstract was at hand.
 
     Parameters
     ----------

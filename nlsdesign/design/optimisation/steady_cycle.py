@@ -2,9 +2,9 @@
 
 The cam turns as a sine, θ = A·sin(2πft) where the cable passes through the centre, which stretches the rubber
 twice a cycle, else θ = A·(1 − cos(2πft))/2. Up and down run over the same nodes of the contour, so the
-instants follow from the angles. From node to node the states are stepped by the collocation of Lobatto (IIIA,
-order 4), which for a law that is affine in its states is a linear map; the composition of all steps of a cycle
-maps the states onto themselves, a linear equation for the first of them.
+instants follow from the angles. From node to node the states are stepped by the collocation of Lobatto
+(IIIA, order 4), which for a law that is affine in its states is a linear map; the composition of all steps
+of a cycle maps the states onto themselves, a linear equation for the first of them.
 Source: Hairer and Wanner 1996 (Lobatto IIIA).
 """
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...errors import ArrangementError, ValueRangeError
+from ...errors import ValueRangeError
 from ...quantity import with_unit
 from ...symbolic import Expression, depends
 from ..statics.relaxing_law import RelaxingLaw
@@ -25,6 +25,8 @@ from .design_point import DesignPoint
 
 _ROUNDED = 1e-4
 """Phase in rad within which the reversal is rounded where it lies between nodes."""
+_SHORTEST = 0.25
+"""Amplitude relative to the last angle below which too few nodes of the contour take part."""
 _SIMPSON = (1.0, 4.0, 1.0)
 
 Affine = tuple[Expression, Expression]
@@ -136,16 +138,17 @@ def steady_cycle(design: DesignPoint, frequency: float, amplitude: float | None 
     Raises
     ------
     ValueRangeError
-        If the amplitude lies beyond the target.
+        If the amplitude lies beyond the target, or is too small a part of it.
     ArrangementError
         If the rubber relaxes by a law that is not affine in its states.
     """
     last, law = design.target.last_angle, design.relaxing()
-    if amplitude is not None and amplitude > last * (1 + 1e-9):
+    if amplitude is not None and not _SHORTEST * last <= amplitude <= last * (1 + 1e-9):
+        ends = with_unit(f"[{_SHORTEST * last:.4g}, {last:.4g}]", "rad")
         raise ValueRangeError(
             f"amplitude = {with_unit(f'{amplitude:g}', 'rad')}",
-            "lies beyond the last angle of the target, " + with_unit(f"{last:g}", "rad"),
-            next_step="take a smaller amplitude, or a target that reaches further",
+            f"must lie in {ends}, a quarter of the target to all of it",
+            next_step="leave it out for all of the target, or take a target that ends nearer to it",
         )
     largest = last if amplitude is None else amplitude
     intervals = _intervals(design, largest)
@@ -242,10 +245,11 @@ def _forces(
     ) -> Expression:
         first, last = ends
         middle = _middle(laws, (first, last), direction * times[k])
-        return ca.vertcat(*[
-            law.function.call([at.extension, direction * speed * at.progress * at.lever_arm, x, parameters])[0]
-            for at, x in zip(intervals[k].places, (first, middle, last), strict=True)
-        ])  # fmt: skip
+        places = zip(intervals[k].places, (first, middle, last), strict=True)
+        arguments = [
+            [at.extension, direction * speed * at.progress * at.lever_arm, x, parameters] for at, x in places
+        ]
+        return ca.vertcat(*[law.function.call(each)[0] for each in arguments])
 
     total = 2 * count
     return (
@@ -255,7 +259,7 @@ def _forces(
 
 
 def _affine(law: RelaxingLaw) -> tuple[Callable[[Expression, Expression, Expression], Affine], bool]:
-    """Return the matrix and constant of the derivatives of the states, and whether they depend on the rate."""
+    """Return matrix and constant of the derivatives of the states, and whether they depend on the rate."""
     symbols = [ca.SX.sym(f"v{i}", law.function.size1_in(i)) for i in range(4)]
     extension, rate, states, parameters = symbols
     derivatives = law.function.call(symbols)[1]

@@ -65,23 +65,28 @@ def relaxing_law(model: FlatModel, spring: str | None = None) -> RelaxingLaw:
     place = {v.name: i for i, v in enumerate(model.parameters)}
     extension, rate = ca.SX.sym("extension"), ca.SX.sym("rate")
     inner = [i for i, v in enumerate(model.states) if v.name in cam.states]
-    states = ca.SX(ca.vertcat(*[symbols.state[i] for i in inner]))
-    # The cam's own numbers are those of the model, whatever the parameters say: any cam cuts the same element.
+    states = _column([symbols.state[i] for i in inner])
+    # The cam's own numbers are those of the model, whatever the parameters say: any cam cuts the same.
     own = [place[name] for name in place if name.startswith(f"{cam.name}.")]
     old = ca.vertcat(*[symbols.parameter[i] for i in (place[cam.pretension], *own)])
     new = ca.vertcat(extension - before, *[model.parameters[i].start for i in own])
     force = symbols.signal[[v.name for v in model.signals].index(cam.force)]
     cut = ca.substitute(ca.vertcat(force, *[symbols.derivative[i] for i in inner]), old, new)
     cut = _moved(model, symbols, cut, cam, rate / arm)
-    if depends(ca.jacobian(cut[1:], states), states):
+    rates = _column(ca.vertsplit(cut)[1:])
+    if depends(ca.jacobian(rates, states), states):
         raise ArrangementError(
             f"'{cam.element}'", "relaxes by a law that is not linear in its inner states",
             next_step="exchange it for linear branches (springs with dashpots) that do the same at the "
             "working point, or leave out goals that let the rubber relax",
         )  # fmt: skip
-    excess = _excess(cut[0], ca.SX(cut[1:]), states, rate)
-    function = ca.Function("relaxing", [extension, rate, states, symbols.parameter], [excess, cut[1:]])
+    excess = _excess(cut[0], rates, states, rate)
+    function = ca.Function("relaxing", [extension, rate, states, symbols.parameter], [excess, rates])
     return RelaxingLaw(cam.element, tuple(model.states[i].name for i in inner), function)
+
+
+def _column(items: list[Expression]) -> Expression:
+    return ca.vertcat(*items) if items else ca.SX(0, 1)
 
 
 def _excess(force: Expression, rates: Expression, states: Expression, rate: Expression) -> Expression:
@@ -108,7 +113,7 @@ def _at_the_cut(model: FlatModel, cam: CamNames) -> tuple[float, float]:
 def _moved(
     model: FlatModel, symbols: Symbols, cut: Expression, cam: CamNames, speed: Expression
 ) -> Expression:
-    """Return expressions where the cam stands at the angle of the cut and turns at a speed; all else rests."""
+    """Return expressions with the cam at the angle of the cut, turning at a speed; all else rests."""
     movable = ca.vertcat(symbols.state, symbols.input)
     names = [v.name for v in (*model.states, *model.inputs)]
     angle = symbols.signal[[v.name for v in model.signals].index(cam.angle)]
