@@ -4,6 +4,7 @@ from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Targ
 from .drawing.cam_drawing import fingerprint, write_drawings
 from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
+from .optimisation.front import FrontPoint, ParetoFront
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -19,6 +20,7 @@ from .optimisation.limits import (
     PretensionRange,
     RestLengthRange,
 )
+from .optimisation.pareto import pareto
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
@@ -40,6 +42,7 @@ __all__ = [
     "ElasticLaw",
     "EnergyLost",
     "ExponentialTorque",
+    "FrontPoint",
     "Goal",
     "InsensitiveStiffness",
     "LeastMass",
@@ -53,6 +56,7 @@ __all__ = [
     "MaximumStress",
     "MaximumTorqueError",
     "MinimumRadiusOfCurvature",
+    "ParetoFront",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
@@ -72,6 +76,7 @@ __all__ = [
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "pareto",
     "safe_limits",
     "torque_check",
     "torque_sensitivity",

@@ -116,9 +116,43 @@ def design_cam(
     ArrangementError
         If the structure does not say which spring is meant, or its cam has no contour.
     """
+    question, chosen = asked(
+        actuator, target=target, free=free, keep=keep, spring=spring, goals=goals, settings=settings
+    )
+    search = question.search(chosen)
+    search.require_influence()
+    outcomes = search.outcomes()
+    if not any(outcome.solved for outcome in outcomes):
+        # Whether there is any cam at all is found out with softened limits.
+        outcomes.append(search.program.solve(feasible_point(search, chosen)))
+    taken = _best(outcomes)
+    return finished_design(_narrowed(FoundDesign(actuator, search, chosen, outcomes, taken, outcomes[taken])))
+
+
+def asked(
+    actuator: Assembly,
+    *,
+    target: Target,
+    free: Sequence[str] | None,
+    keep: Sequence[Limit],
+    spring: str | None,
+    goals: Sequence[Goal],
+    settings: DesignSettings,
+) -> tuple[Question, tuple[str, ...]]:
+    """Return the question of a design and the names of what is free.
+
+    Parameters
+    ----------
+    actuator, target, free, keep, spring, goals, settings
+        As :func:`design_cam`.
+
+    Raises
+    ------
+    ArrangementError
+        If the structure does not say which spring is meant, or its cam has no contour.
+    """
     model = flatten(_with_smooth_cables(actuator))
     names = series_cam(model, spring)
-    chosen = tuple(contour_names(names)[:1] if free is None else free)
     defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
     question = Question(
         model=model,
@@ -129,14 +163,7 @@ def design_cam(
         goals=tuple(goals),
         settings=settings,
     )
-    search = question.search(chosen)
-    search.require_influence()
-    outcomes = search.outcomes()
-    if not any(outcome.solved for outcome in outcomes):
-        # Whether there is any cam at all is found out with softened limits.
-        outcomes.append(search.program.solve(feasible_point(search, chosen)))
-    taken = _best(outcomes)
-    return _finished(_narrowed(_Found(actuator, search, chosen, outcomes, taken, outcomes[taken])))
+    return question, tuple(contour_names(names)[:1] if free is None else free)
 
 
 def _with_smooth_cables(actuator: Assembly) -> Assembly:
@@ -152,8 +179,22 @@ def _with_smooth_cables(actuator: Assembly) -> Assembly:
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """A search with its outcomes, the one that was taken, and the assembly that follows from it."""
+class FoundDesign:
+    """A search with its outcomes, the one that was taken, and the assembly that follows from it.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    search
+        In which the best was found.
+    free
+        What may change.
+    outcomes, taken
+        Of all starts, and the number of the one that was taken.
+    best
+        What came of it in the end.
+    """
 
     actuator: Assembly
     search: Search
@@ -164,19 +205,29 @@ class _Found:
 
     @cached_property
     def predicted_rms(self) -> float:
+        """Rms torque error in N·m as the optimiser sees it."""
         return self.rms(self.best)
 
     def rms(self, outcome: Solution) -> float:
+        """Return the rms torque error of an outcome in N·m.
+
+        Parameters
+        ----------
+        outcome
+            Of the search.
+        """
         problem = self.search.problem
         square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
         return float(np.sqrt(max(square, 0.0)))
 
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
+        """Contour, and how well the declared cam holds it."""
         return _contour(self.actuator, self.search.problem, self.best)
 
     @cached_property
     def changes(self) -> dict[str, Quantity]:
+        """Numbers of the assembly that change, by full name."""
         problem = self.search.problem
         target, values = problem.design.target, problem.named(self.best.point)
         known = self.actuator.quantities()
@@ -189,19 +240,22 @@ class _Found:
 
     @cached_property
     def changed(self) -> Assembly:
+        """The assembly with them."""
         return self.actuator.with_values(self.changes)
 
     @cached_property
     def model(self) -> FlatModel:
+        """Its flat model."""
         return flatten(self.changed)
 
     @cached_property
     def check(self) -> TorqueCheck:
+        """Its torque against the target."""
         spring = _spring_of(self.model, self.search.problem.law.cam.name)
         return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
 
 
-def _narrowed(found: _Found) -> _Found:
+def _narrowed(found: FoundDesign) -> FoundDesign:
     """Return the design on a law whose knots are rounded less, where the rounding shows in the torque."""
     for _ in range(_NARROWED):
         target, rounding = found.search.problem.design.target, found.search.rounding
@@ -229,11 +283,18 @@ def _best(outcomes: Sequence[Solution]) -> int:
     return min(solved, key=lambda i: outcomes[i].cost)
 
 
-def _finished(found: _Found) -> CamDesign:
+def finished_design(found: FoundDesign) -> CamDesign:
+    """Return what was found as a design, with all that is said of it.
+
+    Parameters
+    ----------
+    found
+        By a search.
+    """
     search, problem, best = found.search, found.search.problem, found.best
     contour, fit = found.contour_fit
     settings, design = search.question.settings, problem.design
-    limits = tuple(_state(problem, bound, best.point) for bound in search.bounds)
+    limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
     return CamDesign(
         target=design.target,
         changes=tuple(found.changes.items()),
@@ -258,7 +319,7 @@ def _finished(found: _Found) -> CamDesign:
     )
 
 
-def _miss(found: _Found, limits: Sequence[LimitState]) -> Miss | None:
+def _miss(found: FoundDesign, limits: Sequence[LimitState]) -> Miss | None:
     settings, target, check = found.search.question.settings, found.search.problem.design.target, found.check
     allowed = settings.largest_error * target.largest
     if check.rms <= allowed:
@@ -342,7 +403,18 @@ def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tupl
     return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
 
 
-def _state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+    """Return how a design stands to a limit.
+
+    Parameters
+    ----------
+    problem
+        Its problem.
+    bound
+        One side of the limit.
+    point
+        Shape (variables,), scaled.
+    """
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
