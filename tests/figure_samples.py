@@ -8,7 +8,7 @@ import numpy as np
 
 from nlsdesign import figures
 from nlsdesign.analysis import Chart
-from nlsdesign.design import ExponentialTorque, contour_from_curvature
+from nlsdesign.design import ExponentialTorque, FrontPoint, ParetoFront, contour_from_curvature
 from nlsdesign.model import Variable
 from nlsdesign.observer import ErrorStability
 from nlsdesign.quantity import degrees
@@ -108,6 +108,16 @@ def against_measured() -> figures.Figure:
     )
 
 
+def front() -> ParetoFront:
+    """Three goals; nothing to make whole designs from."""
+    size = np.linspace(6.5e-3, 10.5e-3, 7)
+    points = tuple(
+        FrontPoint((2.6e-6 * (10.5e-3 / r) ** 1.3, float(r), 0.02 + 3.0 * float(r)), (), (), ()) for r in size
+    )
+    goals = ("rubber volume", "cam radius", "energy lost per cycle")
+    return ParetoFront(TARGET, goals, ("cm^3", "mm", "%"), points[::-1], (), ())
+
+
 FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "cam_positions": lambda: figures.cam_positions(motion()),
     "torque_curve": lambda: figures.torque_curve(motion(), at=30),
@@ -132,5 +142,6 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         unit="N*m",
         name="block load",
     ),
+    "pareto_front": lambda: figures.pareto_front(front()),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
 }

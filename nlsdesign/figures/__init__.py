@@ -20,6 +20,7 @@ from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_erro
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .trade_off import pareto_front
 
 __all__ = [
     "CamMotion",
@@ -50,6 +51,7 @@ __all__ = [
     "observer_error",
     "observer_stability",
     "over_time",
+    "pareto_front",
     "significant",
     "stability_over_angle",
     "styled",

@@ -124,7 +124,7 @@ def test_the_table_says_what_the_designs_are_worth(first: type, second: type, wh
 
 @pytest.mark.parametrize(("first", "second", "which"), FRONTS)
 def test_no_design_nearby_is_better_in_both(first: type, second: type, which: tuple[int, int]) -> None:
-    """200 neighbours of each point that miss no limit by more than 0.02 %: scattered, and between it and the next point."""
+    """200 neighbours that miss no limit by more than 0.02 %: scattered, and between a point and the next."""
     front = front_of(first, second)
     designs = designs_of(front)
     draw = np.random.default_rng(11)

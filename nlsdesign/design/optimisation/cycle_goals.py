@@ -10,7 +10,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint
-from .goals import Goal, Measured, root_mean_square
+from .goals import Goal, GoalMeasure, rms_of_mean_square
 from .steady_cycle import steady_cycle
 
 
@@ -52,11 +52,11 @@ class EnergyLost(Goal):
         """Return weight · lost / stored / 1 %."""
         return self.weight * self.measured(design).expression / 0.01
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the share of the stored energy that is lost."""
         amplitude = None if self.amplitude is None else plain(self.amplitude)
         cycle = steady_cycle(design, plain(self.frequency), amplitude)
-        return Measured("energy lost per cycle", cycle.lost / cycle.stored, "%")
+        return GoalMeasure("energy lost per cycle", cycle.lost / cycle.stored, "%")
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,11 @@ class BothStrokes(Goal):
         Of the cam angle, which turns as a sine, in Hz; all count alike.
     amplitude
         Largest angle in rad; the last angle of the target if it is left out.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no frequency, or a number lies outside its range.
     """
 
     frequencies: Sequence[Quantity | float]
@@ -90,9 +95,9 @@ class BothStrokes(Goal):
         """Return (rms error / 0.1 % of the largest torque)²."""
         return self._mean_square(design) / (1e-3 * design.target.largest) ** 2
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the rms error."""
-        return root_mean_square("rms torque error on both strokes", self._mean_square(design), design)
+        return rms_of_mean_square("rms torque error on both strokes", self._mean_square(design), design)
 
     def _mean_square(self, design: DesignPoint) -> Expression:
         amplitude = None if self.amplitude is None else plain(self.amplitude)

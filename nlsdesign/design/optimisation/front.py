@@ -68,6 +68,8 @@ class ParetoFront:
         The designs.
     left_out
         What the solver did not find, or another point betters.
+    sources
+        What whole designs are made from.
     """
 
     target: Target
@@ -75,7 +77,7 @@ class ParetoFront:
     units: tuple[str, ...]
     points: tuple[FrontPoint, ...]
     left_out: tuple[LeftOut, ...]
-    found: tuple[FoundDesign, ...] = field(repr=False)
+    sources: tuple[FoundDesign, ...] = field(repr=False)
 
     @property
     def values(self) -> Floats:
@@ -107,7 +109,7 @@ class ParetoFront:
                 f"point {number}", f"the front has points 0 to {len(self.points) - 1}",
                 next_step="print the front for its table",
             )  # fmt: skip
-        return finished_design(self.found[number])
+        return finished_design(self.sources[number])
 
     def write_csv(self, path: Path) -> None:
         """Write one row for each point: goals, free numbers, binding limits.

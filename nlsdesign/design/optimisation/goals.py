@@ -17,7 +17,7 @@ _FLOOR = 1e-6
 """Rms error relative to the largest torque that keeps the root smooth where the error vanishes."""
 
 
-class Measured(NamedTuple):
+class GoalMeasure(NamedTuple):
     """What a goal is about: a column in SI of which the largest counts, and the unit in which it is shown."""
 
     what: str
@@ -39,7 +39,7 @@ class Goal(ABC):
             The design in symbols.
         """
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return what the goal is about, as it is compared between designs; the cost by itself.
 
         Parameters
@@ -47,16 +47,16 @@ class Goal(ABC):
         design
             The design in symbols.
         """
-        return Measured(f"cost of {type(self).__name__}", ca.SX(self.cost(design)), "1")
+        return GoalMeasure(f"cost of {type(self).__name__}", ca.SX(self.cost(design)), "1")
 
 
 @dataclass(frozen=True)
 class TorqueError(Goal):
     """Mean over the angle of the squared torque error."""
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the rms torque error."""
-        return root_mean_square("rms torque error", design.mean_square_error, design)
+        return rms_of_mean_square("rms torque error", design.mean_square_error, design)
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return (rms error / 0.1 % of the largest torque)²."""
@@ -104,9 +104,9 @@ class LeastRubber(Goal):
     weight: float = 1e-3
     energy_density: float = 6e5
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the volume."""
-        return Measured("rubber volume", ca.SX(design.rubber_volume), "cm^3")
+        return GoalMeasure("rubber volume", ca.SX(design.rubber_volume), "cm^3")
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return weight · volume / typical volume."""
@@ -114,7 +114,7 @@ class LeastRubber(Goal):
         return self.weight * design.rubber_volume / needed
 
 
-def root_mean_square(what: str, mean_square: Expression, design: DesignPoint) -> Measured:
+def rms_of_mean_square(what: str, mean_square: Expression, design: DesignPoint) -> GoalMeasure:
     """Return a mean square torque as its root, smooth where it vanishes.
 
     Parameters
@@ -126,4 +126,4 @@ def root_mean_square(what: str, mean_square: Expression, design: DesignPoint) ->
     design
         The design in symbols.
     """
-    return Measured(what, ca.sqrt(mean_square + (_FLOOR * design.target.largest) ** 2), "mN*m")
+    return GoalMeasure(what, ca.sqrt(mean_square + (_FLOOR * design.target.largest) ** 2), "mN*m")

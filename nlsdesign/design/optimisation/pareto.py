@@ -26,7 +26,7 @@ from ...quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .conflict import feasible_point
 from .front import FrontPoint, LeftOut, ParetoFront
-from .goals import Goal, Measured, SmoothContour
+from .goals import Goal, GoalMeasure, SmoothContour
 from .limits import Limit, MaximumTorqueError
 from .program import Program, Rows, Solution
 from .search import Search
@@ -68,10 +68,12 @@ def pareto(
         Torque curve.
     goals
         Two or three, each of another kind; the first is made small under bounds on the others.
-    free, keep, settings
-        As :func:`design_cam`; progress is told after each solution.
+    free, keep
+        As :func:`design_cam`.
     points
         On each ladder of bounds, ends included.
+    settings
+        As :func:`design_cam`; progress is told after each solution.
 
     Returns
     -------
@@ -97,11 +99,11 @@ def pareto(
     search = question.search(chosen)
     search.require_influence()
     front = _Ladder(search, tuple(goals), chosen)
-    found = front.ends()
-    values = np.array([each.values for each in found])
+    reached = front.ends()
+    values = np.array([each.values for each in reached])
     lowest, highest = values.min(axis=0), values.max(axis=0)
-    found += front.between(found, lowest, highest, points)
-    return _front(actuator, front, found)
+    reached += front.between(reached, lowest, highest, points)
+    return _front(actuator, front, reached)
 
 
 def _check(goals: Sequence[Goal], points: int) -> None:
@@ -120,7 +122,7 @@ def _check(goals: Sequence[Goal], points: int) -> None:
 
 
 class _Tried(NamedTuple):
-    """An outcome, the bounds under which it was found, and what the goals are there."""
+    """An outcome, the bounds under which it was reached, and what the goals are there."""
 
     bounds: tuple[float, ...]
     outcome: Solution
@@ -140,7 +142,7 @@ class _Ladder:
     free: tuple[str, ...]
 
     @cached_property
-    def measures(self) -> tuple[Measured, ...]:
+    def measures(self) -> tuple[GoalMeasure, ...]:
         return tuple(goal.measured(self.search.problem.design) for goal in self.goals)
 
     @cached_property
@@ -152,15 +154,12 @@ class _Ladder:
     @cached_property
     def scales(self) -> Floats:
         """Size of each goal at the first start."""
-        sizes = np.array([np.max(np.abs(v)) for v in self._evaluated(self._points[0])])
-        return np.where(np.isfinite(sizes) & (sizes > 0.0), sizes, 1.0)
-
-    def _evaluated(self, point: Floats) -> list[Floats]:
-        return [self.search.problem.evaluate(measure.expression, point) for measure in self.measures]
+        return _sizes(self.values(self._points[0]))
 
     def values(self, point: Floats) -> Floats:
         """Return the goals at a point in SI."""
-        return np.array([float(np.max(v)) for v in self._evaluated(point)])
+        problem = self.search.problem
+        return np.array([float(np.max(problem.evaluate(m.expression, point))) for m in self.measures])
 
     @cached_property
     def program(self) -> Program:
@@ -181,8 +180,7 @@ class _Ladder:
     def _cost_scales(self) -> Floats:
         design = self.search.problem.design
         costs = ca.vertcat(*[goal.cost(design) for goal in self.goals])
-        sizes = np.abs(self.search.problem.evaluate(costs, self._points[0]))
-        return np.where(np.isfinite(sizes) & (sizes > 0.0), sizes, 1.0)
+        return _sizes(self.search.problem.evaluate(costs, self._points[0]))
 
     def _solved(self, start: Floats, goal: int, bounds: Sequence[float]) -> _Tried:
         # Small costs are made about 1; large ones are squares of errors, which may become small.
@@ -197,9 +195,9 @@ class _Ladder:
         _ = self._cost_scales
         self.program.prepare()
         count, open_ended = len(self.goals), [np.inf] * (len(self.goals) - 1)
-        found: list[_Tried] = []
+        reached: list[_Tried] = []
         for goal in range(count):
-            begin = [*self._points, *(each.outcome.point for each in found)]
+            begin = [*self._points, *(each.outcome.point for each in reached)]
 
             def tried(number: int, goal: int = goal, begin: list[Floats] = begin) -> _Tried:
                 return self._solved(begin[number], goal, open_ended)
@@ -207,9 +205,9 @@ class _Ladder:
             outcomes = []
             for each in parallel_map(tried, len(begin)):
                 outcomes.append(each)
-                self._told()
-            found.append(self._best(goal, outcomes))
-        return found
+                self.search.question.settings.progress()
+            reached.append(self._best(goal, outcomes))
+        return reached
 
     def _best(self, goal: int, outcomes: Sequence[_Tried]) -> _Tried:
         solved = [each for each in outcomes if each.outcome.solved]
@@ -223,9 +221,6 @@ class _Ladder:
                 next_step="free one number more, or bound the sizes, for instance with RestLengthRange",
             )
         return min(solved, key=lambda each: each.outcome.cost)
-
-    def _told(self) -> None:
-        self.search.question.settings.progress()
 
     def between(self, ends: list[_Tried], lowest: Floats, highest: Floats, points: int) -> list[_Tried]:
         """Return the best of the first goal for each combination of bounds on the others."""
@@ -250,7 +245,7 @@ class _Ladder:
         tried = None
         for each in sorted(known, key=distance)[:2]:
             tried = self._solved(each.outcome.point, 0, bounds)
-            self._told()
+            self.search.question.settings.progress()
             if tried.outcome.solved:
                 break
         assert tried is not None
@@ -264,16 +259,21 @@ class _Ladder:
         if cell.outcome.solved and best.values[0] >= cell.values[0] - _BETTER * span[0]:
             return cell
         again = self._solved(best.outcome.point, 0, cell.bounds)
-        self._told()
+        self.search.question.settings.progress()
         return again if again.outcome.solved else cell
 
 
-def _front(actuator: Assembly, ladder: _Ladder, found: Sequence[_Tried]) -> ParetoFront:
+def _sizes(values: Floats) -> Floats:
+    sizes = np.abs(values)
+    return np.where(np.isfinite(sizes) & (sizes > 0.0), sizes, 1.0)
+
+
+def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> ParetoFront:
     search, measures = ladder.search, ladder.measures
-    solved = sorted((each for each in found if each.outcome.solved), key=lambda each: tuple(each.values))
+    solved = sorted((each for each in reached if each.outcome.solved), key=lambda each: tuple(each.values))
     left_out = [
         LeftOut(_said(measures, each.bounds), f"IPOPT stopped with '{each.outcome.status}'")
-        for each in found
+        for each in reached
         if not each.outcome.solved
     ]
     kept: list[_Tried] = []
@@ -293,7 +293,7 @@ def _front(actuator: Assembly, ladder: _Ladder, found: Sequence[_Tried]) -> Pare
         units=tuple(measure.unit for measure in measures),
         points=tuple(_point(search, each) for each in kept),
         left_out=tuple(left_out),
-        found=tuple(
+        sources=tuple(
             FoundDesign(actuator, search, ladder.free, [each.outcome], 0, each.outcome) for each in kept
         ),
     )
@@ -316,7 +316,7 @@ def _point(search: Search, tried: _Tried) -> FrontPoint:
     )
 
 
-def _said(measures: Sequence[Measured], bounds: Sequence[float]) -> str:
+def _said(measures: Sequence[GoalMeasure], bounds: Sequence[float]) -> str:
     def parts() -> Iterator[str]:
         for measure, bound in zip(measures[1:], bounds, strict=True):
             if np.isfinite(bound):

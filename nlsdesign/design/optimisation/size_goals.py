@@ -10,7 +10,7 @@ from ...quantity import Quantity
 from ...symbolic import Expression
 from ..curves.numbers import in_si, plain
 from .design_point import DesignPoint
-from .goals import Goal, Measured, root_mean_square
+from .goals import Goal, GoalMeasure, rms_of_mean_square
 
 _RADIUS = 0.01
 """Radius in m whose cost is the weight."""
@@ -45,9 +45,9 @@ class LeastSize(Goal):
         """Return weight · radius / 10 mm; a power mean of the nodes stands for the largest of them."""
         return self.weight * ca.sum1((design.radii / _RADIUS) ** _POWER) ** (1.0 / _POWER)
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the distances of the contour from the centre."""
-        return Measured("cam radius", design.radii, "mm")
+        return GoalMeasure("cam radius", design.radii, "mm")
 
 
 @dataclass(frozen=True)
@@ -85,10 +85,10 @@ class LeastMass(Goal):
         """Return weight · mass / 100 g."""
         return self.weight * self.measured(design).expression / _MASS
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the mass."""
         plates = plain(self.plate_density) * plain(self.plate_thickness) * _plate_area(design)
-        return Measured("mass", plain(self.rubber_density) * design.rubber_volume + plates, "g")
+        return GoalMeasure("mass", plain(self.rubber_density) * design.rubber_volume + plates, "g")
 
 
 def _plate_area(design: DesignPoint) -> Expression:
@@ -127,9 +127,9 @@ class InsensitiveStiffness(Goal):
         """Return (rms error by the deviation / 0.1 % of the largest torque)²."""
         return self._mean_square(design) / (1e-3 * design.target.largest) ** 2
 
-    def measured(self, design: DesignPoint) -> Measured:
+    def measured(self, design: DesignPoint) -> GoalMeasure:
         """Return the rms torque error by the deviation."""
-        return root_mean_square("rms torque error by stiffness", self._mean_square(design), design)
+        return rms_of_mean_square("rms torque error by stiffness", self._mean_square(design), design)
 
     def _mean_square(self, design: DesignPoint) -> Expression:
         force, stiffness = design.forces, design.stiffnesses

@@ -236,8 +236,8 @@ def _forces(
     falling = of(-1.0) if of_rate else rising
     times = [each.phase / speed for each in intervals]
     count = len(intervals)
-    up = [_step(*rising[k], times[k]) for k in range(count)]
-    down = [_step(*reversed(falling[k]), times[k]) for k in reversed(range(count))]
+    up = [_step(rising[k], times[k]) for k in range(count)]
+    down = [_step(falling[k][::-1], times[k]) for k in reversed(range(count))]
     states = _periodic([*up, *down], len(law.states))
 
     def force(
@@ -274,9 +274,9 @@ def _affine(law: RelaxingLaw) -> tuple[Callable[[Expression, Expression, Express
     return at, depends(ca.vertcat(ca.vec(matrix), constant), rate)
 
 
-def _step(first: Affine, middle: Affine, last: Affine, time: Expression) -> Affine:
+def _step(laws: Sequence[Affine], time: Expression) -> Affine:
     """Return matrix and constant of the map from the states at the begin to those at the end."""
-    (a0, b0), (am, bm), (a1, b1) = first, middle, last
+    (a0, b0), (am, bm), (a1, b1) = laws
     one, h = ca.SX.eye(a0.shape[0]), time / 6.0
     ahead = one - h * (2 * am + a1 - time / 2 * ca.mtimes(am, a1))
     behind = one + h * (2 * am + a0 + time / 2 * ca.mtimes(am, a0))

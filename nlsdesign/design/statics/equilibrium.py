@@ -264,7 +264,22 @@ def _at_rest(
 
 
 def handle_of(angle: Expression, movable: Expression, motion: str) -> tuple[int, Expression]:
-    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio)."""
+    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio).
+
+    Parameters
+    ----------
+    angle
+        Of the spring.
+    movable
+        States and inputs, as a column.
+    motion
+        Name of the angle, for messages.
+
+    Raises
+    ------
+    ArrangementError
+        If no single state or input turns it.
+    """
     slopes = ca.SX(ca.jacobian(angle, movable))
     places = [i for i in range(movable.shape[0]) if not slopes[i].is_zero()]
     places.sort(key=lambda i: not ca.is_equal(slopes[i], ca.SX(1)))
@@ -277,7 +292,15 @@ def handle_of(angle: Expression, movable: Expression, motion: str) -> tuple[int,
 
 
 def resting_states(rates: Expression, states: Expression) -> Expression:
-    """Return the states at which the rates vanish; those that never move at rest stay at zero."""
+    """Return the states at which the rates vanish; those that never move at rest stay at zero.
+
+    Parameters
+    ----------
+    rates
+        Derivatives of the states.
+    states
+        Symbols, as a column.
+    """
     moving = [i for i in range(states.shape[0]) if not rates[i].is_zero()]
     idle = [i for i in range(states.shape[0]) if i not in moving]
     result = ca.SX.zeros(states.shape)
