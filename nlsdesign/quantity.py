@@ -48,6 +48,7 @@ _PREFIXED = {"g", "m", "s", "A", "N", "Pa", "J", "W", "V", "Hz", "rad", "Ohm", "
 # Superscripts, and the Greek mu and the ohm sign that look like the micro sign and the Greek omega.
 _TO_ASCII = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻\u03bc\u2126", "0123456789-\u00b5\u03a9")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 _POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
 
 
@@ -416,6 +417,23 @@ def with_error(value: float, error: float) -> str:
     pair = [f"{round(number / scale, digit):.{max(0, digit)}f}" for number in (value, error)]
     text = " ± ".join(pair).replace("-", "−")
     return f"({text})·10{str(exponent).translate(_SUPERSCRIPTS)}" if small else text
+
+
+def name_and_unit(head: str) -> tuple[str, str | None]:
+    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit.
+
+    Parameters
+    ----------
+    head
+        Without a unit it is the name as it stands, and the unit is ``None``.
+    """
+    match = _BRACKETED.match(head)
+    name, _, unit = (match["name"], "", match["unit"]) if match else head.rpartition("_")
+    try:
+        parse_unit(unit)
+    except UnitError:
+        return head, None  # brackets that hold no unit belong to the name
+    return name, unit
 
 
 def degrees(value: float) -> float:

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
 
 from nlsdesign import figures
 from nlsdesign.analysis import Chart
-from nlsdesign.design import ExponentialTorque, FrontPoint, ParetoFront, contour_from_curvature
+from nlsdesign.design import (
+    ExponentialTorque,
+    FrontPoint,
+    MotorAndGear,
+    ParetoFront,
+    Task,
+    TaskCurve,
+    ToleranceResult,
+    contour_from_curvature,
+    curve_for_task,
+    tolerance_analysis,
+)
 from nlsdesign.model import Variable
 from nlsdesign.observer import ErrorStability
 from nlsdesign.quantity import degrees
 from nlsdesign.simulation import Trace
+from tests import cam_cases
 
 TARGET = ExponentialTorque(maximum=5.0, angle=degrees(53.0), shape=1.0, tolerance=0.05)
 TIME = np.linspace(0.0, 1.0, 4001)
@@ -118,10 +131,28 @@ def front() -> ParetoFront:
     return ParetoFront(TARGET, goals, ("cm^3", "mm", "%"), points[::-1], (), ())
 
 
+@functools.cache
+def task_curve() -> TaskCurve:
+    """A joint that swings like a pendulum with a second harmonic in its torque."""
+    phase = np.linspace(0.0, 2 * np.pi, 101)
+    task = Task(
+        time=phase / 6.0, angle=0.4 * np.sin(phase), torque=-4.0 * np.sin(phase) + 0.8 * np.cos(3 * phase)
+    )
+    drive = MotorAndGear(inertia=1.4e-5, torque_constant=0.03, resistance=0.3, gear_ratio=80.0)
+    return curve_for_task(task, drive)
+
+
+def made_springs() -> ToleranceResult:
+    """Springs with contact errors and a trim, from few draws."""
+    return tolerance_analysis(cam_cases.actuator(cam_cases.CONCAVE, pretension=2e-3), target=TARGET, draws=40)
+
+
 FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "cam_positions": lambda: figures.cam_positions(motion()),
     "torque_curve": lambda: figures.torque_curve(motion(), at=30),
     "torque_against_target": against_target,
+    "tolerance_bars": lambda: figures.tolerance_bars(made_springs()),
+    "torque_band": lambda: figures.torque_band(made_springs()),
     "torque_against_measured": against_measured,
     "torque_loops": lambda: figures.torque_loops({"25°": (loop(0.1), loop(0.12))}),
     "observability": lambda: figures.observability_over_angle(
@@ -143,5 +174,7 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         name="block load",
     ),
     "pareto_front": lambda: figures.pareto_front(front()),
+    "motor_over_task": lambda: figures.motor_over_task(task_curve()),
+    "curve_of_task": lambda: figures.curve_of_task(task_curve()),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
 }

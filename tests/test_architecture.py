@@ -51,6 +51,7 @@ ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
     "design.optimisation.solve": ("components.core.element",),
+    "design.optimisation.stock": ("components.assembly.other_rubber", "components.materials.library"),
     "discrepancy": (ASSEMBLY,),
     "simulation.measure": (ASSEMBLY,),
     "design.statics": ("components.transmission",),
@@ -69,7 +70,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"blocks"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"}, {"reporting"},
         {"diagnose"},
     ),
-    "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}),
+    "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip
 

@@ -1,7 +1,34 @@
 """Design of cam, rubber and pretension for a target torque curve."""
 
+from .curves.compliance import OddSpring, OneSidedSpring, SpringSymmetry, TwoBranchSpring
+from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
+from .curves.shapes import PolynomialTorque, TabulatedStiffness, TorqueBand
 from .curves.target import ExponentialTorque, PowerTorque, TabulatedTorque, Target
+from .curves.target_files import read_band, read_target
+from .curves.task import Task, TaskCycle, read_task, walking_task
+from .curves.task_curve import (
+    LeastEnergy,
+    LeastPeakPower,
+    SpringLimits,
+    TaskCurve,
+    TaskGoal,
+    TaskProblem,
+    curve_for_task,
+    scan_gear_ratio,
+)
 from .drawing.cam_drawing import fingerprint, write_drawings
+from .drawing.cam_part import CamPart, Hole
+from .drawing.machined_cam import (
+    BoltCircle,
+    ClampScrew,
+    FerruleSeat,
+    MachinedCam,
+    MachinedOneSidedCam,
+    MachinedTwoSidedCam,
+)
+from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.task_target import TaskTarget
+from .optimisation.checks import torque_check, torque_sensitivity
 from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
 from .optimisation.front import FrontPoint, ParetoFront
@@ -16,69 +43,135 @@ from .optimisation.limits import (
     MaximumStress,
     MaximumTorqueError,
     MinimumRadiusOfCurvature,
+    NumberRange,
     PositiveStiffness,
     PretensionRange,
     RestLengthRange,
 )
+from .optimisation.limits_of_use import OverTravel, TorqueWithin
 from .optimisation.pareto import pareto
 from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
-from .optimisation.solve import design_cam, torque_check, torque_sensitivity
+from .optimisation.solve import design_cam
+from .optimisation.stock import RubberStock, Stock, StockChoice
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
+from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
+from .tolerance.monte_carlo import tolerance_analysis
+from .tolerance.tolerance_result import CauseEffect, QuantileEstimate, ToleranceResult, TrimEffect
+from .tolerance.trimming import Trim
 
 __all__ = [
     "AnchorDistance",
     "AreaRange",
+    "BoltCircle",
     "BothStrokes",
     "CamDesign",
     "CamFit",
+    "CamPart",
     "CamProfile",
+    "Cause",
+    "CauseEffect",
+    "ClampScrew",
     "Contour",
+    "DesignJob",
     "DesignSettings",
     "ElasticLaw",
     "EnergyLost",
     "ExponentialTorque",
+    "FerruleSeat",
     "FrontPoint",
     "Goal",
+    "Hole",
     "InsensitiveStiffness",
+    "LeastEnergy",
     "LeastMass",
+    "LeastPeakPower",
     "LeastRubber",
     "LeastSize",
     "Limit",
     "LimitState",
+    "MachinedCam",
+    "MachinedOneSidedCam",
+    "MachinedTwoSidedCam",
+    "MaterialScatter",
     "MaximumCableTension",
     "MaximumCamRadius",
     "MaximumStrain",
     "MaximumStress",
     "MaximumTorqueError",
     "MinimumRadiusOfCurvature",
+    "MotorAndGear",
+    "MotorCycle",
+    "NormalSpread",
+    "NumberRange",
+    "OddSpring",
+    "OneBatch",
+    "OneSidedSpring",
+    "OverTravel",
     "ParetoFront",
+    "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
     "PretensionRange",
+    "QuantileEstimate",
     "RestLengthRange",
+    "RubberStock",
     "Sensitivity",
+    "SeparateModuli",
     "SmoothContour",
+    "SpreadReading",
+    "SpreadRules",
+    "SpringLimits",
+    "SpringSymmetry",
+    "Stock",
+    "StockChoice",
+    "TabulatedStiffness",
     "TabulatedTorque",
     "Target",
+    "Task",
+    "TaskCurve",
+    "TaskCycle",
+    "TaskGoal",
+    "TaskProblem",
+    "TaskTarget",
+    "ToleranceResult",
+    "TorqueBand",
     "TorqueCheck",
     "TorqueError",
+    "TorqueWithin",
+    "Trim",
+    "TrimEffect",
+    "TwoBranchSpring",
+    "UniformSpread",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
     "contour_of_cam",
+    "curve_for_task",
     "design_cam",
+    "draw_deviations",
     "elastic_law",
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "job_of",
+    "motor_and_gear",
+    "motor_cycle",
     "pareto",
+    "read_band",
+    "read_job",
+    "read_target",
+    "read_task",
     "safe_limits",
+    "scan_gear_ratio",
+    "tolerance_analysis",
     "torque_check",
     "torque_sensitivity",
+    "walking_task",
     "write_drawings",
 ]

@@ -14,13 +14,17 @@ from .before_after import (
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
+from .design_figures import design_picture, limit_margins
+from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
+from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
 from .trade_off import pareto_front
+from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
     "CamMotion",
@@ -29,7 +33,9 @@ __all__ = [
     "ClosedLoopRun",
     "Figure",
     "HeldOut",
+    "InspectionRow",
     "RecordError",
+    "TitleBlock",
     "alternative_text",
     "binned_errors",
     "cam_motion",
@@ -40,13 +46,17 @@ __all__ = [
     "closed_loop",
     "closed_loop_of",
     "compact",
+    "curve_of_task",
     "curves",
     "described",
+    "design_picture",
     "gap_bars",
     "held_out_series",
     "inline_svg",
+    "limit_margins",
     "loop_area",
     "metric_note",
+    "motor_over_task",
     "observability_over_angle",
     "observer_error",
     "observer_stability",
@@ -56,9 +66,12 @@ __all__ = [
     "stability_over_angle",
     "styled",
     "svg_text",
+    "tolerance_bars",
     "torque_against_measured",
     "torque_against_target",
+    "torque_band",
     "torque_curve",
     "torque_loops",
+    "workshop_drawing",
     "write_figures",
 ]

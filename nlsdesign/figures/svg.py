@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"-?\d+\.\d+")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 _REFERENCE = re.compile(r"#([\w-]+)")
 _GEOMETRY = ("d", "x", "y", "points", "width", "height")
-SUFFIXES = (".svg", ".png")
+SUFFIXES = (".svg", ".png", ".pdf")
 
 _VARIABLES = {tone.light: f"var(--{tone.name})" for tone in TONES}
 
@@ -83,7 +83,7 @@ def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = 
     figures
         By name of the file without suffix.
     suffix
-        ``".svg"`` or ``".png"`` (200 dots per inch).
+        ``".svg"``, ``".png"`` (200 dots per inch) or ``".pdf"``.
 
     Raises
     ------
@@ -105,8 +105,13 @@ def _content(figure: Figure, suffix: str) -> bytes:
     if suffix == ".svg":
         return svg_text(figure).encode()
     stream = io.BytesIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
+    # No date and no version, so that the same figure gives the same file; letters as fonts, not as drawings.
+    with mpl.rc_context({**STYLE, "pdf.fonttype": 42}):
+        if suffix == ".pdf":
+            metadata = {"CreationDate": None, "Creator": None, "Producer": None}
+            figure.savefig(stream, format="pdf", facecolor="white", metadata=metadata)
+        else:
+            figure.savefig(stream, format="png", dpi=200, facecolor="white", metadata={"Software": None})
     return stream.getvalue()
 
 

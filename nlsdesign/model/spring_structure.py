@@ -13,6 +13,7 @@ from ..components.core.tie import Tie
 from ..components.materials.specimen import Specimen, Strength
 from ..components.transmission.cam import Cable, Cam
 from ..components.transmission.cam_drive import Through
+from ..components.transmission.capstan import CapstanFriction
 from .owners import Owners, declared_by, number_names
 
 
@@ -91,6 +92,8 @@ class CamNames:
         The pieces of material in it.
     cable
         The declared cable; ``None`` where there is none.
+    guides
+        For each guide that bends its cable the parameters whose product is the exponent µφ of its friction.
     """
 
     name: str
@@ -110,6 +113,7 @@ class CamNames:
     states: tuple[str, ...]
     specimens: tuple[SpecimenNames, ...]
     cable: CableNames | None = None
+    guides: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -202,7 +206,12 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
         states=tuple(declared_by(pieces, owners.states)),
         specimens=tuple(_specimen(name, p) for name, p in pieces.items() if isinstance(p, Specimen)),
         cable=_cable(cam, part.cam),
+        guides=tuple(_exponent(name, p) for name, p in pieces.items() if isinstance(p, CapstanFriction)),
     )
+
+
+def _exponent(path: str, part: CapstanFriction) -> tuple[str, ...]:
+    return tuple(f"{path}.{field}" for field in templates(type(part.guide)))
 
 
 def _single_numbers(parts: Mapping[str, Part]) -> Iterator[str]:

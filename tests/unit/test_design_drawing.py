@@ -12,32 +12,13 @@ import pytest
 from nlsdesign.design import Contour, contour_from_curvature, fingerprint, write_drawings
 from nlsdesign.errors import ExportError, ValueRangeError
 from nlsdesign.quantity import quantity
+from tests.dxf_reading import entities_of, header_of, polylines_of
 
 
 @pytest.fixture
 def contour() -> Contour:
     nodes = np.linspace(0.0, 1.4, 8)
     return contour_from_curvature(nodes, np.full(8, 6e-3), first_slope=9e-3, anchor_distance=25e-3)
-
-
-def polylines(text: str) -> list[np.ndarray]:
-    """Vertices of all closed polylines of a DXF file."""
-    lines = text.splitlines()
-    pairs = [(int(code), value) for code, value in zip(lines[::2], lines[1::2], strict=True)]
-    found: list[list[list[float]]] = []
-    kind = ""
-    for code, value in pairs:
-        if code == 0:
-            kind = value
-            if kind == "POLYLINE":
-                found.append([])
-            if kind == "VERTEX":
-                found[-1].append([0.0, 0.0])
-        elif kind == "VERTEX" and code in (10, 20):
-            found[-1][-1][code // 10 - 1] = float(value)
-        elif kind == "POLYLINE" and code == 70:
-            assert int(value) == 1, "the outline is not closed"
-    return [np.array(item) for item in found]
 
 
 def test_three_files_with_unit_and_note(tmp_path: Path, contour: Contour) -> None:
@@ -62,13 +43,17 @@ def test_csv_holds_the_contour_in_millimetres(tmp_path: Path, contour: Contour) 
     assert table[:, 5] == pytest.approx(5.5)
 
 
-def test_dxf_holds_both_halves_as_closed_polylines(tmp_path: Path, contour: Contour) -> None:
+def test_dxf_of_the_contour_says_its_unit_and_that_it_is_no_edge(tmp_path: Path, contour: Contour) -> None:
     *_, file = write_drawings(tmp_path, contour, note="größer", cable_radius=0.5e-3)
-    text = file.read_bytes().decode("ascii")
-    assert text.endswith("  0\nEOF\n")
-    lower, upper = polylines(text)
-    assert lower == pytest.approx(1e3 * contour.outlines(cable_radius=0.5e-3)[0][:-1], abs=1e-6)
+    text = file.read_text(encoding="ascii")
+    assert header_of(text)["$INSUNITS"].strip() == "4"
+    lower, upper = polylines_of(text, "CONTOUR")
+    assert lower[:, :2] == pytest.approx(1e3 * contour.outlines(cable_radius=0.5e-3)[0][:-1], abs=1e-6)
     assert upper == pytest.approx(-lower)
+    assert polylines_of(text, "EDGE") == []
+    said = "; ".join(value for item in entities_of(text) for value in item.values.get(1, []))
+    assert "no edge to be cut" in said
+    assert r"gr\U+00F6\U+00DFer" in said
 
 
 def test_svg_is_well_formed_and_to_scale(tmp_path: Path, contour: Contour) -> None:
@@ -76,6 +61,7 @@ def test_svg_is_well_formed_and_to_scale(tmp_path: Path, contour: Contour) -> No
     root = ElementTree.parse(file).getroot()
     assert root.attrib["width"].endswith("mm")
     assert root.attrib["viewBox"].split()[2] == root.attrib["width"].removesuffix("mm")
+    assert root.attrib["viewBox"].split()[3] == root.attrib["height"].removesuffix("mm")
     halves = [item for item in root.iter("{http://www.w3.org/2000/svg}path") if item.attrib.get("fill")]
     assert len(halves) == 2
     numbers = [

@@ -25,8 +25,8 @@ from nlsdesign.design import (
     RestLengthRange,
     design_cam,
 )
+from nlsdesign.design.optimisation.design_search import row_of
 from nlsdesign.design.optimisation.problem import design_problem
-from nlsdesign.design.optimisation.search import row_of
 from nlsdesign.design.optimisation.starts import Start
 from nlsdesign.errors import ArrangementError, UnitError, ValueRangeError
 from nlsdesign.model import flatten

@@ -11,7 +11,7 @@ from typing import overload
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator, PPoly
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
 from ...errors import ValueRangeError
 from ...quantity import Quantity
@@ -48,6 +48,23 @@ class Target(ABC):
     @abstractmethod
     def energy_law(self, angle: Expression) -> Expression:
         """Return ∫₀ torque in J."""
+
+    def weight_law(self, angle: Expression) -> Expression:
+        """Return the weight of the error at an angle: the square of the error counts as often; one.
+
+        Only the ratio of weights matters: the mean square error of a design is ∫w·e² dθ / ∫w dθ.
+        """
+        return 0.0 * angle + 1.0
+
+    def weight(self, angle: ArrayLike) -> Floats:
+        """Return the weight of the error, of the same shape.
+
+        Parameters
+        ----------
+        angle
+            Numbers of any shape in rad.
+        """
+        return np.asarray(_over(self.weight_law, np.asarray(angle, dtype=float)))
 
     @overload
     def torque(self, angle: Expression) -> Expression: ...
@@ -92,6 +109,12 @@ class Target(ABC):
         """Slope of the curve at angle zero in N·m/rad, as the one-sided limit."""
         step = 1e-7 * self.last_angle
         return float(self.torque(step) / step)
+
+    @property
+    def falls(self) -> bool:
+        """Whether the torque falls anywhere: there the stiffness is negative, and a cam may snap through."""
+        torque = self.torque(np.linspace(0.0, self.last_angle, 401))
+        return bool(np.min(np.diff(torque)) < -1e-9 * float(np.max(torque)))
 
     @property
     def largest(self) -> float:
@@ -225,37 +248,46 @@ class TabulatedTorque(Target):
         Ascending from zero, in rad.
     torques
         From zero, nowhere negative, in N·m.
+    weights
+        Of the error at each point, see :meth:`Target.weight_law`; straight between them. Empty for one
+        everywhere.
+    slopes
+        Stiffness at each point in N·m/rad, where it is known; empty for the monotone cubic.
 
     Raises
     ------
     ValueRangeError
-        If the points are out of order, or the curve does not start at zero.
+        If the points are out of order, the curve does not start at zero, or a weight is negative.
     """
 
     angles: tuple[float, ...]
     torques: tuple[float, ...]
+    weights: tuple[float, ...] = ()
+    slopes: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "angles", tuple(float(item) for item in self.angles))
         object.__setattr__(self, "torques", tuple(float(item) for item in self.torques))
-        points = (
-            np.array([self.angles, self.torques]) if len(self.angles) == len(self.torques) else np.zeros(0)
-        )
-        if points.size < 6 or not np.all(np.isfinite(points)):
-            raise ValueRangeError(
-                f"target table of {len(self.angles)} angles and {len(self.torques)} torques",
-                "needs at least three points, one finite torque for each angle",
-            )
-        steps = np.diff(points[0])
-        if points[0, 0] != 0.0 or np.any(steps <= 0.0) or points[0, -1] > 6.3:
-            row = 0 if points[0, 0] != 0.0 else int(np.argmax(steps <= 0.0)) + 1
-            raise ValueRangeError(
-                f"target table, row {row + 1}", "angles must ascend from zero, in rad",
-                next_step="sort the table by angle and convert degrees to rad",
-            )  # fmt: skip
+        points = table_of_curve("target table", "torque", self.angles, self.torques)
         if points[1, 0] != 0.0 or np.any(points[1] < 0.0):
             raise ValueRangeError("target table", "torques must start at zero and be nowhere negative")
+        if self.slopes:
+            object.__setattr__(self, "slopes", tuple(float(item) for item in self.slopes))
+            table_of_curve("target table", "slope", self.angles, self.slopes)
+        if self.weights:
+            object.__setattr__(self, "weights", tuple(float(item) for item in self.weights))
+            weights = table_of_curve("target table", "weight", self.angles, self.weights)[1]
+            if np.any(weights < 0.0) or not np.any(weights > 0.0):
+                raise ValueRangeError(
+                    "target table", "weights must be nowhere negative and somewhere positive"
+                )
+
+    @property
+    def _curve(self) -> PPoly:
+        if self.slopes:
+            return CubicHermiteSpline(self.angles, self.torques, self.slopes)
+        return PchipInterpolator(self.angles, self.torques)
 
     @property
     def last_angle(self) -> float:
@@ -264,15 +296,71 @@ class TabulatedTorque(Target):
 
     def torque_law(self, angle: Expression) -> Expression:
         """Return the interpolated torque."""
-        return _piecewise(PchipInterpolator(self.angles, self.torques), angle)
+        return piecewise(self._curve, angle)
 
     def energy_law(self, angle: Expression) -> Expression:
         """Return the exact integral of the interpolation."""
-        return _piecewise(PchipInterpolator(self.angles, self.torques).antiderivative(), angle)
+        return piecewise(self._curve.antiderivative(), angle)
+
+    def weight_law(self, angle: Expression) -> Expression:
+        """Return the weight, straight between the points."""
+        return piecewise(straight(self.angles, self.weights), angle) if self.weights else 0.0 * angle + 1.0
 
 
-def _piecewise(polynomial: PPoly, at: Expression) -> Expression:
-    """Return a piecewise polynomial as an expression."""
+def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tuple[float, ...]) -> Floats:
+    """Return the points of a curve over the angle, shape (2, n), after a check of their order.
+
+    Parameters
+    ----------
+    table, what
+        Name of the table and of its values, for messages.
+    angles
+        Ascending from zero, in rad.
+    values
+        One finite number for each angle.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are too few points, or the angles do not ascend from zero.
+    """
+    points = np.array([angles, values]) if len(angles) == len(values) else np.zeros(0)
+    if points.size < 6 or not np.all(np.isfinite(points)):
+        raise ValueRangeError(
+            f"{table} of {len(angles)} angles and {len(values)} {what}s",
+            f"needs at least three points, one finite {what} for each angle",
+        )
+    steps = np.diff(points[0])
+    if points[0, 0] != 0.0 or np.any(steps <= 0.0) or points[0, -1] > 6.3:
+        row = 0 if points[0, 0] != 0.0 else int(np.argmax(steps <= 0.0)) + 1
+        raise ValueRangeError(
+            f"{table}, row {row + 1}", "angles must ascend from zero, in rad",
+            next_step="sort the table by angle and convert degrees to rad",
+        )  # fmt: skip
+    return points
+
+
+def straight(at: tuple[float, ...], values: tuple[float, ...]) -> PPoly:
+    """Return the straight lines between points.
+
+    Parameters
+    ----------
+    at, values
+        Shape (n,) each, ``at`` ascending.
+    """
+    return PPoly(np.array([np.diff(values) / np.diff(at), values[:-1]]), np.array(at))
+
+
+def piecewise(polynomial: PPoly, at: Expression) -> Expression:
+    """Return a piecewise polynomial as an expression; beyond its ends the outer pieces go on.
+
+    Parameters
+    ----------
+    polynomial
+        With its breaks.
+    at
+        Argument, a scalar.
+    """
     inner = [float(item) for item in polynomial.x[1:-1]]
     local = at - ca.pw_const(at, inner, [float(item) for item in polynomial.x[:-1]])
     result = ca.SX(0)

@@ -1,4 +1,4 @@
-"""Drawings of a cam for the workshop: CSV, SVG and DXF (R12), all in millimetres.
+"""Drawings of a cam for the workshop: CSV, SVG, DXF and STEP, all in millimetres.
 
 Each file says its unit and a short hash of the numbers that it was drawn from, so that a part on the bench
 can be traced to its design. Files appear whole or not at all.
@@ -7,17 +7,28 @@ can be traced to its design. Files appear whole or not at all.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import ValueRangeError, unknown_name
 from ...quantity import Quantity
 from ...writing import write_text
 from ..statics.contour import Contour, turn
+from .arc_path import ArcPath
+from .cam_part import CamPart
+from .dxf_drawing import contour_dxf, part_dxf
+from .machined_cam import MachinedCam
+from .step_solid import part_step
+from .svg_drawing import page, part_svg, path_data
 
 Floats = NDArray[np.float64]
+
+FORMATS = ("csv", "svg", "dxf")
+"""Files that are written unless others are asked for."""
 
 _MM = 1e3
 _COLUMNS = "angle_deg,direction_deg,x_mm,y_mm,lever_arm_mm,radius_of_curvature_mm,radius_mm"
@@ -36,9 +47,19 @@ def fingerprint(values: Mapping[str, Quantity]) -> str:
 
 
 def write_drawings(
-    folder: Path, contour: Contour, *, name: str = "cam", note: str = "", cable_radius: float = 0.0
+    folder: Path,
+    contour: Contour,
+    *,
+    machined: MachinedCam | None = None,
+    name: str = "cam",
+    note: str = "",
+    cable_radius: float = 0.0,
+    formats: Sequence[str] = FORMATS,
 ) -> list[Path]:
-    """Write the contour as ``name.csv``, ``name.svg`` and ``name.dxf``.
+    """Write the drawings of a cam: ``name.csv``, ``name.svg`` and ``name.dxf``.
+
+    With ``machined`` they show the part that a workshop makes: edge under the cable, channel, run-out, holes;
+    ``name_centre_line.csv`` holds the curve of the cable's centre line. Without, they show the contour alone.
 
     Parameters
     ----------
@@ -46,29 +67,109 @@ def write_drawings(
         Is made where it does not exist.
     contour
         What the cable's centre line touches.
+    machined
+        Sizes of the part.
     name
         Name of the files without suffix.
     note
         One line for each file, for instance a fingerprint and what it was designed for.
     cable_radius
-        Radius of the cable in m: the cam lies deeper by it.
+        In m, for the contour alone: the curve lies deeper by it. A machined cam declares its cable itself.
+    formats
+        ``"csv"``, ``"svg"``, ``"dxf"`` and, with ``machined`` and the extra ``step``, ``"step"``.
 
     Returns
     -------
     list of Path
-        The files, in this order.
+        The files, in the order of the formats.
+
+    Raises
+    ------
+    ValueRangeError
+        If the cable is given twice, or the part cannot be made.
+    ArrangementError
+        If the edge crosses itself, or a bore would cut the channel.
+    UnknownNameError
+        If there is no such format.
+    MissingLibraryError
+        If STEP is asked for and Open CASCADE is not installed.
     """
     folder = Path(folder)
     note = " ".join(note.split())
-    texts = {
-        "csv": csv_text(contour, note=note, cable_radius=cable_radius),
-        "svg": svg_text(contour, note=note, cable_radius=cable_radius),
-        "dxf": dxf_text(contour, note=note, cable_radius=cable_radius),
+    known = (*FORMATS, "step") if machined is not None else FORMATS
+    for suffix in formats:
+        if suffix not in known:
+            raise unknown_name("format", suffix, known)
+    if machined is None:
+        texts = _contour_texts(contour, note, cable_radius)
+    elif cable_radius:
+        raise ValueRangeError(
+            f"cable_radius {cable_radius * _MM:g} mm", "is declared by the machined cam already",
+            next_step="leave cable_radius out",
+        )  # fmt: skip
+    else:
+        texts = _part_texts(machined.part(contour), contour, name, note)
+    # All are made before the first is written.
+    made = [(f"{name}{ending}", text()) for suffix in formats for ending, text in texts[suffix].items()]
+    for file, text in made:
+        write_text(folder / file, text)
+    return [folder / file for file, _ in made]
+
+
+def _contour_texts(
+    contour: Contour, note: str, cable_radius: float
+) -> dict[str, dict[str, Callable[[], str]]]:
+    return {
+        suffix: {f".{suffix}": partial(make, contour, note=note, cable_radius=cable_radius)}
+        for suffix, make in (("csv", csv_text), ("svg", svg_text), ("dxf", dxf_text))
     }
-    paths = [folder / f"{name}.{suffix}" for suffix in texts]
-    for path, text in zip(paths, texts.values(), strict=True):
-        write_text(path, text)
-    return paths
+
+
+def _part_texts(
+    part: CamPart, contour: Contour, name: str, note: str
+) -> dict[str, dict[str, Callable[[], str]]]:
+    note = f"{note}; sizes {fingerprint(part.numbers)}" if note else f"sizes {fingerprint(part.numbers)}"
+    return {
+        "csv": {
+            ".csv": partial(edge_csv, part, note=note),
+            "_centre_line.csv": partial(csv_text, contour, note=note),
+        },
+        "svg": {".svg": partial(part_svg, part, note=note)},
+        "dxf": {".dxf": partial(part_dxf, part, note=note)},
+        "step": {".step": partial(part_step, part, name=name)},
+    }
+
+
+def edge_csv(part: CamPart, *, note: str = "") -> str:
+    """Return the lines and arcs of the edges, then the holes, one a row, in mm.
+
+    Parameters
+    ----------
+    part
+        The cam.
+    note
+        One line.
+    """
+    rows = []
+    for index, outline in enumerate(part.outlines, start=1):
+        for start, end, radius, centre in zip(*outline.ends[:2], outline.radii, outline.centres, strict=True):
+            arc = [radius, *centre] if np.isfinite(radius) else [None] * 3
+            rows.append((f"edge {index}", [*start, *end, *arc]))
+    rows += [(hole.name, [None] * 4 + [hole.diameter / 2.0, *hole.centre]) for hole in part.holes]
+    if part.base_radius:
+        rows.append(("base", [None] * 4 + [part.base_radius, 0.0, 0.0]))
+    head = [
+        "# cam, machined edge; lengths in mm, axis at (0, 0), cable at angle zero along x",
+        "# a row without a radius is a straight line; a positive radius turns to the left",
+        f"# cable radius {part.number('cable_radius') * _MM:.6g} mm is taken off",
+        f"# {note}",
+        "outline,start_x_mm,start_y_mm,end_x_mm,end_y_mm,radius_mm,centre_x_mm,centre_y_mm",
+    ]
+    cells = [
+        ",".join([what, *("" if item is None else f"{item * _MM + 0.0:.6f}" for item in row)])
+        for what, row in rows
+    ]
+    return "\n".join([*head, *cells]) + "\n"
 
 
 def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
@@ -110,64 +211,37 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
     """
     reach = 1.15 * float(contour.radii.max()) * _MM + 4.0
     last = float(contour.angles[-1])
-    halves = [_svg_path(half * _MM) for half in contour.outlines(cable_radius=cable_radius)]
+    halves = [_polygon(half) for half in contour.outlines(cable_radius=cable_radius)]
     # In the frame of the cam the cable turns the other way.
     cables = []
     for angle in (0.0, last, -last):
-        line = contour.cable(angle) * _MM
-        end = line[0] + (line[1] - line[0]) * min(1.0, 0.8 * reach / float(np.hypot(*(line[1] - line[0]))))
-        cables += [_svg_line(turn(np.array([line[0], end]) * side, -angle)) for side in (1.0, -1.0)]
-    size = 2 * reach
+        line = contour.cable(angle)
+        step = line[1] - line[0]
+        end = line[0] + step * min(1.0, 8e-4 * reach / float(np.hypot(*step)))
+        cables += [turn(np.array([line[0], end]) * side, -angle) for side in (1.0, -1.0)]
     body = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{size:.3f}mm" height="{size:.3f}mm" '
-        f'viewBox="{-reach:.3f} {-reach:.3f} {size:.3f} {size:.3f}">',
-        f"<title>Cam contour, millimetres, scale 1:1. {_escaped(note)}</title>",
-        '<g transform="scale(1,-1)" fill="none" stroke-linejoin="round">',
-        *[f'<path d="{d}" fill="#d8d8d8" stroke="#202020" stroke-width="0.15"/>' for d in halves],
-        *[f'<path d="{d}" stroke="#b03020" stroke-width="0.12"/>' for d in cables],
+        *[f'<path d="{path_data(d)}" fill="#d8d8d8" stroke="#202020" stroke-width="0.15"/>' for d in halves],
+        *[
+            f'<path d="{path_data(ArcPath(d, np.zeros(2)))}" stroke="#b03020" stroke-width="0.12"/>'
+            for d in cables
+        ],
         '<path d="M -1.5 0 H 1.5 M 0 -1.5 V 1.5" stroke="#202020" stroke-width="0.1"/>',
-        "</g>",
-        f'<text x="{-reach + 1:.3f}" y="{reach - 1:.3f}" font-family="sans-serif" font-size="1.8">'
-        f"mm, 1:1. {_escaped(note)}</text>",
-        "</svg>",
     ]
-    return "\n".join(body) + "\n"
+    return page(reach, body, ["Cam contour, no edge to be cut; mm, 1:1", note])
 
 
 def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:
-    """Return both halves as closed polylines in AutoCAD R12 form, drawing units millimetres.
+    """Return both halves as closed polylines on the layer ``CONTOUR``, in millimetres.
 
     Parameters
     ----------
     contour, note, cable_radius
         As for :func:`write_drawings`.
     """
-    pairs: list[tuple[int, object]] = [
-        (999, "cam contour; drawing units are millimetres"),
-        (999, note.encode("ascii", "replace").decode()),
-        (0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC"),
-        (0, "SECTION"), (2, "ENTITIES"),
-    ]  # fmt: skip
-    for half in contour.outlines(cable_radius=cable_radius):
-        pairs += [(0, "POLYLINE"), (8, "CAM"), (66, 1), (10, 0.0), (20, 0.0), (30, 0.0), (70, 1)]
-        for x, y in half[:-1] * _MM:
-            pairs += [(0, "VERTEX"), (8, "CAM"), (10, x), (20, y), (30, 0.0)]
-        pairs += [(0, "SEQEND"), (8, "CAM")]
-    pairs += [(0, "POINT"), (8, "CENTRE"), (10, 0.0), (20, 0.0), (30, 0.0), (0, "ENDSEC"), (0, "EOF")]
-    return "".join(f"{code:3d}\n{_dxf_value(value)}\n" for code, value in pairs)
+    taken = f"cable radius {cable_radius * _MM:.6g} mm taken off" if cable_radius else "cable's centre line"
+    lines = [f"Cam contour, {taken}; millimetres, 1:1", "no edge to be cut: without channel and run-out"]
+    return contour_dxf(contour.outlines(cable_radius=cable_radius), lines=[*lines, note] if note else lines)
 
 
-def _dxf_value(value: object) -> str:
-    return f"{value:.6f}" if isinstance(value, float) else str(value)
-
-
-def _svg_path(points: Floats) -> str:
-    return f"{_svg_line(points)} Z"
-
-
-def _svg_line(points: Iterable[Sequence[float]]) -> str:
-    return "M " + " L ".join(f"{x:.4f} {y:.4f}" for x, y in points)
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+def _polygon(points: Floats) -> ArcPath:
+    return ArcPath(points[:-1], np.zeros(len(points) - 1), closed=True)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, InfeasibleError
+from .design_search import Search
 from .limits import Bound
 from .loosening import FEASIBLE, Freed, Give, Loosened
 from .program import PROVED_INFEASIBLE
-from .search import Search
 
 Floats = NDArray[np.float64]
 

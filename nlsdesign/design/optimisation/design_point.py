@@ -77,6 +77,8 @@ class DesignPoint:
         Gives the law of one element with its inner states free.
     through_centre
         Whether the cable passes through the centre, so that both signs of the angle stretch the rubber alike.
+    shown_units
+        Unit in which each parameter is shown.
     """
 
     cam: CamNames
@@ -97,6 +99,7 @@ class DesignPoint:
     element: Callable[[Expression], Stretched]
     relaxing: Callable[[], RelaxingLaw]
     through_centre: bool
+    shown_units: Mapping[str, str]
 
     @property
     def elements(self) -> Expression:
@@ -147,9 +150,13 @@ class DesignPoint:
 
     @property
     def mean_square_error(self) -> Expression:
-        """Mean over the angle of the squared torque error in (N·m)², by the trapezoidal rule."""
-        squared, steps = self.torque_errors**2, self.angles[1:] - self.angles[:-1]
-        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / self.target.last_angle
+        """Mean of the squared torque error in (N·m)², weighted as the target says, by trapezoids."""
+        rows = range(self.angles.shape[0])
+        weights = ca.vertcat(*[self.target.weight_law(self.angles[i]) for i in rows])
+        steps = self.angles[1:] - self.angles[:-1]
+        squared = weights * self.torque_errors**2
+        whole = ca.dot((weights[1:] + weights[:-1]) / 2, steps)
+        return ca.dot((squared[1:] + squared[:-1]) / 2, steps) / whole
 
     @property
     def rubber_volume(self) -> Expression:

@@ -13,8 +13,8 @@ from ...errors import ValueRangeError
 from ...quantity import parse_unit, typeset_unit
 from ...writing import write_table
 from ..curves.target import Target
+from .finish import SolvedSearch, finished
 from .result import CamDesign
-from .solve import FoundDesign, finished_design
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class ParetoFront:
     units: tuple[str, ...]
     points: tuple[FrontPoint, ...]
     left_out: tuple[LeftOut, ...]
-    sources: tuple[FoundDesign, ...] = field(repr=False)
+    sources: tuple[SolvedSearch, ...] = field(repr=False)
 
     @property
     def values(self) -> Floats:
@@ -109,7 +109,7 @@ class ParetoFront:
                 f"point {number}", f"the front has points 0 to {len(self.points) - 1}",
                 next_step="print the front for its table",
             )  # fmt: skip
-        return finished_design(self.sources[number])
+        return finished(self.sources[number])
 
     def write_csv(self, path: Path) -> None:
         """Write one row for each point: goals, free numbers, binding limits.

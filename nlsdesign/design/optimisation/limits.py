@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ValueRangeError
+from ...errors import ValueRangeError, unknown_name
 from ...quantity import Quantity, parse_unit, typeset_unit, with_unit
 from ...symbolic import Expression
 from ..curves.numbers import in_si, plain
@@ -281,6 +281,53 @@ class ParameterRange(Limit):
         scale = plain(self.maximum) or 1e-3
         yield self._bound(of, expression, plain(self.minimum), upper=False, unit=unit, scale=scale)
         yield self._bound(of, expression, plain(self.maximum), upper=True, unit=unit, scale=scale)
+
+
+@dataclass(frozen=True)
+class NumberRange(Limit):
+    """Any single number of the actuator between two numbers, for instance the thickness of a strip.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    minimum, maximum
+        Quantities, or bare numbers in SI.
+
+    Raises
+    ------
+    ValueRangeError
+        If the minimum exceeds the maximum.
+    """
+
+    name: str
+    minimum: Quantity | float
+    maximum: Quantity | float
+
+    def __post_init__(self) -> None:
+        for end in ("minimum", "maximum"):
+            given = getattr(self, end)
+            object.__setattr__(self, end, given.number if isinstance(given, Quantity) else float(given))
+        if plain(self.minimum) > plain(self.maximum):
+            raise ValueRangeError(
+                f"NumberRange('{self.name}')", "the minimum exceeds the maximum", next_step="exchange the two"
+            )
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield both sides.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such number.
+        """
+        if self.name not in design.parameters:
+            raise unknown_name("NumberRange of", self.name, design.parameters)
+        low, high, value = plain(self.minimum), plain(self.maximum), design.parameters[self.name]
+        unit = design.shown_units.get(self.name, "1")
+        scale = max(abs(low), abs(high)) or 1.0
+        yield self._bound(self.name, value, low, upper=False, unit=unit, scale=scale)
+        yield self._bound(self.name, value, high, upper=True, unit=unit, scale=scale)
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from ...processes import parallel_map
 from ...quantity import parse_unit, with_unit
+from .design_search import Search, carried_over, row_of
 from .limits import Bound, MaximumTorqueError
 from .problem import contour_names
 from .program import Program, Solution
-from .search import Search, carried_over, row_of
 from .starts import starts
 from .variables import DesignVariable, scaled
 
@@ -207,8 +207,7 @@ class Loosened:
             Of :meth:`least`.
         """
         values = self.open.problem.named(outcome.point[: self.count])
-        units = [self.open.question.model.variable(name).unit for name in names]
-        shown = tuple({"m": "mm", "m^2": "mm^2"}.get(unit, unit) for unit in units)
+        shown = tuple(self.open.problem.design.shown_units[name] for name in names)
         error = None
         if self.error is not None:
             mean_square = self.open.problem.design.mean_square_error

@@ -25,13 +25,14 @@ from ...processes import parallel_map
 from ...quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .conflict import feasible_point
+from .design_search import Search
+from .finish import SolvedSearch, limit_state
 from .front import FrontPoint, LeftOut, ParetoFront
 from .goals import Goal, GoalMeasure, SmoothContour
 from .limits import Limit, MaximumTorqueError
 from .program import Program, Rows, Solution
-from .search import Search
 from .settings import DesignSettings
-from .solve import USUAL, FoundDesign, asked, limit_state
+from .solve import USUAL, Wanted
 from .starts import starts
 
 Floats = NDArray[np.float64]
@@ -92,10 +93,10 @@ def pareto(
     _check(goals, points)
     if not any(isinstance(limit, MaximumTorqueError) for limit in keep):
         keep = (*keep, MaximumTorqueError(settings.largest_error * target.largest))
-    question, chosen = asked(
-        actuator, target=target, free=free, keep=keep, spring=None,
-        goals=(*goals, SmoothContour()), settings=settings,
-    )  # fmt: skip
+    wanted = Wanted(
+        target, None if free is None else tuple(free), tuple(keep), None, (*goals, SmoothContour())
+    )
+    question, chosen = wanted.question(actuator, settings)
     search = question.search(chosen)
     search.require_influence()
     front = _Ladder(search, tuple(goals), chosen)
@@ -294,7 +295,7 @@ def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> Pa
         points=tuple(_point(search, each) for each in kept),
         left_out=tuple(left_out),
         sources=tuple(
-            FoundDesign(actuator, search, ladder.free, [each.outcome], 0, each.outcome) for each in kept
+            SolvedSearch(actuator, search, ladder.free, [each.outcome], 0, each.outcome) for each in kept
         ),
     )
 

@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 
 _ERROR_SCALE = 0.01
 """Scale of the equations of the torque errors: first errors of the size of the torque become about 10."""
+_SHOWN = {"m": "mm", "m^2": "mm^2"}
 _NEAREST_START = 0.45
 """Largest lever arm of a start, relative to the distance of the anchor."""
 
@@ -324,4 +325,5 @@ def _design(
         element=element,
         relaxing=more[0],
         through_centre=more[1],
+        shown_units={v.name: _SHOWN.get(v.unit, v.unit) for v in law.parameters},
     )

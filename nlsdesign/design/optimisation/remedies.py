@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .design_search import Search
 from .loosening import Freed, Give, Loosened
-from .search import Search
 
 Floats = NDArray[np.float64]
 
@@ -45,20 +45,22 @@ class Remedies:
         largest
             Largest torque of the target in N·m, to which errors are related.
         """
-        said = [f"{freed}: {_percent(freed.error, largest)}" for freed in self.enough]
+        sentences = [f"{freed}: {_percent(freed.error, largest)}" for freed in self.enough]
         for give, also in self.gives:
-            said.append(f"{give}" + ("" if also is None else f", and {also}"))
-        if said:
-            return said
+            sentences.append(f"{give}" + ("" if also is None else f", and {also}"))
+        if sentences:
+            return sentences
         if self.everything is not None and self.everything.error is not None:
-            said.append(
+            sentences.append(
                 f"no size and no single limit is enough; with all sizes free "
                 f"({', '.join(self.everything.names)}) {_percent(self.everything.error, largest)} is left: "
                 "ask for another target, more elements or another rubber"
             )
         else:
-            said.append("no size is left to free: ask for another target, more elements or another rubber")
-        return said
+            sentences.append(
+                "no size is left to free: ask for another target, more elements or another rubber"
+            )
+        return sentences
 
 
 def _percent(error: float | None, largest: float) -> str:
@@ -81,7 +83,7 @@ def find_remedies(
     allowed
         Rms torque error in N·m that is asked for.
     error
-        That was found.
+        That was kept.
     binding
         Indices of the limits that the design sits on.
     """
@@ -121,9 +123,9 @@ def _freed(loose: Loosened, names: Sequence[str]) -> Freed | None:
 def _smallest(loose: Loosened, ranked: Sequence[str], allowed: float) -> Freed | None:
     """Return the first of the best two, best three, ... names that is enough."""
     for count in range(2, len(ranked) + 1):
-        found = _freed(loose, ranked[:count])
-        if found is not None and _error(found) <= _ENOUGH * allowed:
-            return found
+        kept = _freed(loose, ranked[:count])
+        if kept is not None and _error(kept) <= _ENOUGH * allowed:
+            return kept
     return None
 
 
@@ -131,11 +133,11 @@ def _gives(loose: Loosened, binding: Sequence[int]) -> tuple[tuple[Give, Freed |
     """Return limits that are enough alone, or else together with all sizes freed."""
     for names in ((), loose.candidates):
         answers = loose.several([(names, [i]) for i in binding])
-        found = [
+        kept = [
             (loose.give(i, outcome), loose.freed(names, outcome) if names else None)
             for i, outcome in zip(binding, answers, strict=True)
             if outcome.solved and loose.give(i, outcome).sensible
         ]
-        if found:
-            return tuple(found)
+        if kept:
+            return tuple(kept)
     return ()

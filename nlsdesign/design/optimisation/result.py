@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from .remedies import Remedies
-from .valleys import Valley
+from .size_ranges import SizeRange
 
 Floats = NDArray[np.float64]
 
@@ -63,11 +63,14 @@ class TorqueCheck:
     ----------
     angles, torques, targets
         Shape (n,), in rad and N·m.
+    weights
+        Of the squared error, shape (n,); all alike for ``None``.
     """
 
     angles: Floats
     torques: Floats
     targets: Floats
+    weights: Floats | None = None
 
     @property
     def errors(self) -> Floats:
@@ -76,8 +79,10 @@ class TorqueCheck:
 
     @property
     def rms(self) -> float:
-        """Root of the mean over the angle of the squared error."""
-        return float(np.sqrt(np.trapezoid(self.errors**2, self.angles) / (self.angles[-1] - self.angles[0])))
+        """Root of the mean over the angle of the squared error, weighted as the target says."""
+        weights = np.ones_like(self.angles) if self.weights is None else self.weights
+        squares = np.trapezoid(weights * self.errors**2, self.angles)
+        return float(np.sqrt(squares / np.trapezoid(weights, self.angles)))
 
     @property
     def largest(self) -> float:
@@ -164,6 +169,29 @@ class StartOutcome:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """What became of one combination of a stock.
+
+    Parameters
+    ----------
+    choice
+        In words.
+    cost, rms
+        Sum of the goals and torque error in N·m; ``None`` where there is no design.
+    met
+        Whether it meets the target.
+    reason
+        Why not.
+    """
+
+    choice: str
+    cost: float | None
+    rms: float | None
+    met: bool
+    reason: str
+
+
+@dataclass(frozen=True)
 class Miss:
     """Why a design is not a success.
 
@@ -178,7 +206,7 @@ class Miss:
     binding
         Limits that the design sits on.
     remedies
-        What would help.
+        What would help; ``None`` where it was not looked for.
     advice
         The same as sentences.
     """
@@ -188,7 +216,7 @@ class Miss:
     worst_angle: float
     worst_error: float
     binding: tuple[str, ...]
-    remedies: Remedies
+    remedies: Remedies | None
     advice: tuple[str, ...]
 
     def __str__(self) -> str:
@@ -232,12 +260,16 @@ class CamDesign:
         Where the search from each start came to; ``taken`` is the number of the one that was taken.
     taken
         Number of the start.
-    valleys
+    size_ranges
         Ranges of sizes that cost nothing.
     miss
         Why the design is no success; ``None`` if it is one.
     remarks
         What a designer should know besides.
+    alternatives
+        All combinations of the stock that was offered.
+    drive
+        Path of the part that holds the cam.
     """
 
     target: Target
@@ -253,9 +285,11 @@ class CamDesign:
     rubber_volume: float
     starts: tuple[StartOutcome, ...]
     taken: int
-    valleys: tuple[Valley, ...] = ()
+    size_ranges: tuple[SizeRange, ...] = ()
     miss: Miss | None = None
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    drive: str | None = None
 
     @property
     def met(self) -> bool:
@@ -332,11 +366,15 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         ("radius of curvature", f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
         ("lever arm", f"up to {1e3 * design.contour.lever_arms.max():.4g} mm"),
-        ("flat valleys", "; ".join(str(each) for each in design.valleys if each.wide) or "none"),
+        (
+            "sizes that cost nothing",
+            "; ".join(str(each) for each in design.size_ranges if each.wide) or "none",
+        ),
         ("starts", _starts(design)),
         ("solver", f"{design.starts[design.taken].iterations} iterations{fit}"),
         ("fingerprint", design.fingerprint),
     ]
+    rows += [("stock", _alternative(design, each)) for each in design.alternatives]
     rows += [("remark", remark) for remark in design.remarks]
     inside = design.within_tolerance
     return rows if inside is None else [*rows, ("within tolerance", f"{100 * inside:.3g} % of the angles")]
@@ -351,6 +389,13 @@ def _starts(design: CamDesign) -> str:
         return text + "; no second one to compare with"
     ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
     return text + f"; the next best has {ratio:.4g} times the cost, {1e3 * others[0].rms:.3g} mN·m rms"
+
+
+def _alternative(design: CamDesign, each: Alternative) -> str:
+    if each.rms is None:
+        return f"{each.choice}: no design, {each.reason}"
+    share = 100.0 * each.rms / design.target.largest
+    return f"{each.choice}: {share:.2g} % rms, cost {each.cost:.4g}" + ("" if each.met else ", a miss")
 
 
 def _cost(outcome: StartOutcome) -> float:

@@ -29,10 +29,12 @@ class DesignSettings:
     defaults
         Limits that hold unless one of the same kind is asked for; ``None`` for those that follow from the
         declared cable and rubber, see :func:`safe_limits`. Empty for none.
-    look_for_valleys
+    look_for_size_ranges
         Whether the ranges of sizes that cost nothing are looked for, which takes as long as the design again.
+    look_for_remedies
+        Whether it is found out, at a miss, what to free.
     progress
-        Called after each starting point.
+        Called after each starting point, or after each combination of a stock.
 
     Raises
     ------
@@ -49,7 +51,8 @@ class DesignSettings:
     seed: int = 1
     largest_error: float = 0.01
     defaults: Sequence[Limit] | None = None
-    look_for_valleys: bool = True
+    look_for_size_ranges: bool = True
+    look_for_remedies: bool = True
     progress: Callable[[], None] = _quiet
 
     def __post_init__(self) -> None:

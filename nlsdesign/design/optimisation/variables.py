@@ -53,7 +53,7 @@ def scaled(variable: DesignVariable, value: float) -> float:
     """
     at_zero = float(ca.evalf(ca.substitute(variable.value, variable.symbol, 0.0)))
     if at_zero > 0.0:
-        found = math.log(max(value, 1e-300) / at_zero)
+        position = math.log(max(value, 1e-300) / at_zero)
     else:
-        found = value / float(ca.evalf(ca.substitute(variable.value, variable.symbol, 1.0)))
-    return min(max(found, variable.lower), variable.upper)
+        position = value / float(ca.evalf(ca.substitute(variable.value, variable.symbol, 1.0)))
+    return min(max(position, variable.lower), variable.upper)

@@ -14,6 +14,7 @@ Source: Schneider 2014 (support function of a convex curve).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,7 +40,7 @@ class Contour:
     radii_of_curvature
         ρ.
     anchor_distance
-        D.
+        D; infinite for a parallel cable.
     """
 
     directions: Floats
@@ -68,7 +69,10 @@ class Contour:
 
     @cached_property
     def free_lengths(self) -> Floats:
-        """Length of the cable between contact point and anchor; a cam that reaches the anchor has none."""
+        """Length of the cable between contact point and anchor; a cam that reaches the anchor has none.
+
+        With an infinite anchor distance it is infinite; see :attr:`taken_lengths`.
+        """
         return np.sqrt(self.anchor_distance**2 - self.lever_arms**2) - self.slopes
 
     @cached_property
@@ -77,6 +81,14 @@ class Contour:
         rho = self.radii_of_curvature
         steps = (rho[1:] + rho[:-1]) / 2 * np.diff(self.directions)
         return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @cached_property
+    def taken_lengths(self) -> Floats:
+        """Length of cable that the cam has taken up since the first point: the integral of the lever arm."""
+        root = np.sqrt(self.anchor_distance**2 - self.lever_arms**2)
+        straight = (self.lever_arms[0] ** 2 - self.lever_arms**2) / (root + root[0])
+        result: Floats = self.arc_lengths + straight - (self.slopes - self.slopes[0])
+        return result
 
     def surface(self, cable_radius: float = 0.0) -> Floats:
         """Return the points of the cam below a cable of that radius, in the frame of the cam.
@@ -109,7 +121,8 @@ class Contour:
     def cable(self, angle: float) -> Floats:
         """Return contact point and anchor in the resting frame, for the right-hand cable.
 
-        The left-hand cable is the same turned by half a turn.
+        The left-hand cable is the same turned by half a turn. With an infinite anchor distance the second
+        point is one on the parallel cable, ten times the largest radius away from the axis.
 
         Parameters
         ----------
@@ -135,7 +148,10 @@ class Contour:
         touched = turn(np.array([contact]), abs(angle))[0]
         # A negative angle uses the upper lip: everything mirrored at the x axis.
         side = -1.0 if angle < 0.0 else 1.0
-        return np.array([touched * [1.0, side], [self.anchor_distance, 0.0]])
+        anchor = np.array([self.anchor_distance, 0.0])
+        if math.isinf(self.anchor_distance):
+            anchor = np.array([10.0 * self.radii.max(), side * touched[1]])
+        return np.array([touched * [1.0, side], anchor])
 
     def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Floats, Floats]:
         """Return the two halves of the cam as closed polygons in the resting frame: lower, upper.
@@ -232,7 +248,7 @@ def contour_from_lever_arm(angles: ArrayLike, lever_arms: ArrayLike, *, anchor_d
     lever_arms
         h, shape (n,), in m.
     anchor_distance
-        D in m.
+        D in m; infinite for a parallel cable.
 
     Raises
     ------

@@ -162,8 +162,8 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         step = end / (len(values) - 3)
 
         def support(at: Floats, order: int = 0) -> Floats:
-            found: Floats = _basis_derivative(at, end, len(values), order) @ values / step**order
-            return found
+            basis: Floats = _basis_derivative(at, end, len(values), order) @ values / step**order
+            return basis
 
         directions = np.linspace(0.0, end, max(points, 1001))
         reached = directions - np.arcsin(support(directions) / anchor)

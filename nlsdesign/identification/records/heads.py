@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ...errors import MeasurementError, UnitError
+from ...errors import MeasurementError
 from ...model import FlatModel
 from ...model.readings import reading_of
-from ...quantity import parse_unit, same_dimension, typeset_unit
+from ...quantity import name_and_unit, same_dimension, typeset_unit
 from .mapping import Column, ColumnMap
 
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 _TIME_NAMES = ("t", "time")
 
 
@@ -24,7 +22,7 @@ def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
     heads
         Of a table.
     """
-    named = [(head, *_name_and_unit(head)) for head in heads]
+    named = [(head, *name_and_unit(head)) for head in heads]
     return [(h, u) for h, n, u in named if u and same_dimension(u, "s") and n.lower() in _TIME_NAMES]
 
 
@@ -60,7 +58,7 @@ def heads_with_units(file: str, heads: Sequence[str], units: Mapping[str, str]) 
     """
     result = []
     for head in heads:
-        name, own = _name_and_unit(head)
+        name, own = name_and_unit(head)
         unit = units.get(head)
         if unit and own and unit != own:
             raise MeasurementError(
@@ -95,7 +93,7 @@ def default_mapping(
     """
     if given is not None and given.columns:
         return given
-    split_heads = [(head, *_name_and_unit(head)) for head in heads]
+    split_heads = [(head, *name_and_unit(head)) for head in heads]
     timed = given is not None and given.time.name in heads
     times = [(given.time.name, given.time.unit)] if given is not None and timed else times_among(heads)
     if not times:
@@ -114,18 +112,6 @@ def default_mapping(
             )
     clock = Column(times[0][0], "time", times[0][1])
     return replace(given or ColumnMap(clock, ()), time=clock, columns=tuple(columns))
-
-
-def _name_and_unit(head: str) -> tuple[str, str | None]:
-    match = _BRACKETED.match(head)
-    name, unit = (
-        (match["name"], match["unit"]) if match else (head.rpartition("_")[0], head.rpartition("_")[2])
-    )
-    try:
-        parse_unit(unit)
-    except UnitError:
-        return head, None  # brackets that hold no unit belong to the name
-    return name, unit
 
 
 def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str) -> str | None:

@@ -1,4 +1,4 @@
-"""Flat valleys: how far a size may go, all others chosen again, while the torque error stays small."""
+"""How far a size may go, all others chosen again, while the torque error stays small."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...processes import parallel_map
 from ...quantity import parse_unit, with_unit
+from .design_search import Search, row_of
 from .limits import MaximumTorqueError
 from .program import Program, Solution
-from .search import Search, row_of
 from .variables import scaled
 
 Floats = NDArray[np.float64]
@@ -21,14 +21,14 @@ Floats = NDArray[np.float64]
 _SMALL = 1e-3
 """Rms error, relative to the largest torque, that counts as nothing."""
 _WIDE = 1.05
-"""Ratio of the ends from which a valley is worth a word."""
+"""Ratio of the ends from which a range is worth a word."""
 _FAR = 3.0
 """By what factor from the design the ends are looked for."""
 _ITERATIONS = 100
 
 
 @dataclass(frozen=True)
-class Valley:
+class SizeRange:
     """Range of one size over which the target is still met; all other free numbers follow.
 
     Parameters
@@ -71,7 +71,7 @@ class Valley:
         return self.highest > _WIDE * self.lowest + 1e-12
 
 
-def valleys(search: Search, best: Floats, rms: float) -> tuple[Valley, ...]:
+def size_ranges(search: Search, best: Floats, rms: float) -> tuple[SizeRange, ...]:
     """Return the range of each free size over which the target is met as well, by two more solutions each.
 
     Parameters
@@ -110,17 +110,16 @@ def valleys(search: Search, best: Floats, rms: float) -> tuple[Valley, ...]:
         towards[number // 2] = 1.0 if number % 2 == 0 else -1.0
         return program.solve(best, parameters=towards)
 
-    found = list(parallel_map(end, 2 * len(problem.scalars)))
-    named = [problem.named(outcome.point) if outcome.solved else None for outcome in found]
+    outcomes = list(parallel_map(end, 2 * len(problem.scalars)))
+    named = [problem.named(outcome.point) if outcome.solved else None for outcome in outcomes]
     return tuple(
-        _valley(search, variable.name, named[2 * i : 2 * i + 2], values[variable.name], allowed)
+        _size_range(search, variable.name, named[2 * i : 2 * i + 2], values[variable.name], allowed)
         for i, variable in enumerate(problem.scalars)
     )
 
 
-def _valley(
+def _size_range(
     search: Search, name: str, ends: Sequence[dict[str, float] | None], value: float, allowed: float
-) -> Valley:
+) -> SizeRange:
     lowest, highest = (None if end is None else end[name] for end in ends)
-    unit = search.question.model.variable(name).unit
-    return Valley(name, lowest, highest, value, {"m": "mm", "m^2": "mm^2"}.get(unit, unit), allowed)
+    return SizeRange(name, lowest, highest, value, search.problem.design.shown_units[name], allowed)

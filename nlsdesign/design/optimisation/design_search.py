@@ -159,13 +159,13 @@ class Search:
         slopes = ca.Function("slopes", [problem.vector], [ca.jacobian(effects, symbols)])
         largest = np.zeros(len(problem.scalars))
         for start in starts(3, 0, []):
-            found = np.abs(np.array(slopes(problem.at(start)), dtype=float))
-            largest = np.maximum(largest, np.nan_to_num(found, nan=1.0, posinf=1.0).max(axis=0))
+            sizes = np.abs(np.array(slopes(problem.at(start)), dtype=float))
+            largest = np.maximum(largest, np.nan_to_num(sizes, nan=1.0, posinf=1.0).max(axis=0))
         idle = [v.name for v, size in zip(problem.scalars, largest, strict=True) if size < _NO_INFLUENCE]
         if idle:
-            others = [
-                name for name in movable_numbers(self.question.model, problem.law.cam) if name not in idle
-            ]
+            movable = movable_numbers(self.question.model, problem.law.cam)
+            behind = f"{problem.law.cam.drive}."
+            others = [name for name in movable if name not in idle and name.startswith(behind)]
             raise ValueRangeError(
                 "free: " + ", ".join(f"'{name}'" for name in idle),
                 "changes neither a goal nor a limit of this design, so any value of it would do",
@@ -188,16 +188,16 @@ def row_of(bound: Bound, slack: Expression | float = 0.0) -> Rows:
     return Rows(distance - slack, -ca.inf, 0.0) if bound.upper else Rows(distance + slack, 0.0, ca.inf)
 
 
-def carried_over(found: Search, point: Floats, into: Search) -> Floats:
+def carried_over(source: Search, point: Floats, into: Search) -> Floats:
     """Return a point of one search as a start of another with other numbers free.
 
     Parameters
     ----------
-    found
+    source
         Where the point was found.
     point
         Shape (variables,), scaled.
     into
         With the same contour.
     """
-    return into.problem.completed(found.problem.chosen(point))
+    return into.problem.completed(source.problem.chosen(point))

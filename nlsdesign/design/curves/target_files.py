@@ -1,0 +1,149 @@
+"""Target curves and bands from CSV files with units in their heads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import MeasurementError, ValueRangeError
+from .columns import ReadColumns, read_columns
+from .shapes import TabulatedStiffness, TorqueBand
+from .target import TabulatedTorque, Target
+
+_COLUMNS = {
+    "angle": ("rad",),
+    "torque": ("N*m",),
+    "stiffness": ("N*m/rad",),
+    "weight": ("1",),
+    "lower": ("N*m",),
+    "upper": ("N*m",),
+}
+
+
+def read_target(path: Path | str) -> Target:
+    """Read a target curve from a CSV file.
+
+    The first row names the columns with their units, ``angle [deg]`` or ``angle_deg``: the angle with the
+    torque, or with the stiffness. A column ``weight`` weighs the error; columns ``lower`` and ``upper`` are
+    the band that :func:`read_band` reads. Lines that begin with ``#`` are comments.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+
+    Returns
+    -------
+    Target
+        A :class:`TabulatedTorque`, or a :class:`TabulatedStiffness`.
+
+    Raises
+    ------
+    MeasurementError
+        If the file cannot be read, or a column or a cell is missing, unknown or no number.
+    UnitError
+        If a unit is missing or of another dimension.
+    ValueRangeError
+        If the angles do not ascend from zero, or a torque, stiffness or weight is negative.
+    """
+    table = read_columns(path, _COLUMNS)
+    kinds = [name for name in ("torque", "stiffness") if name in table.values]
+    _require(table, "angle")
+    if len(kinds) != 1:
+        raise MeasurementError(
+            table.file,
+            "has a column of torque and one of stiffness" if kinds else "has no column 'torque'",
+            next_step="keep one of them" if kinds else "name it 'torque [N*m]', or read a band by read_band",
+        )
+    _ascending_from_zero(table)
+    _nowhere_negative(table, kinds[0])
+    angles, values = tuple(table.values["angle"]), tuple(table.values[kinds[0]])
+    if kinds == ["stiffness"]:
+        if "weight" in table.values:
+            raise MeasurementError(
+                f"{table.file}, column 'weight'", "belongs to a torque, not to a stiffness",
+                next_step="give 'torque [N*m]' in the place of the stiffness",
+            )  # fmt: skip
+        return TabulatedStiffness(angles=angles, stiffnesses=values)
+    if values[0] != 0.0:
+        raise ValueRangeError(
+            f"{table.cell(0, 'torque')} = {values[0]:g} N·m", "the curve must start at zero torque",
+            next_step="a spring has no torque at angle zero; a band may be wider there, see read_band",
+        )  # fmt: skip
+    weights: tuple[float, ...] = ()
+    if "weight" in table.values:
+        _nowhere_negative(table, "weight")
+        weights = tuple(table.values["weight"])
+    return TabulatedTorque(angles=angles, torques=values, weights=weights)
+
+
+def read_band(path: Path | str) -> TorqueBand:
+    """Read a band of torques from a CSV file with the columns ``angle``, ``lower`` and ``upper``.
+
+    Parameters
+    ----------
+    path
+        Of the file; its heads are those of :func:`read_target`.
+
+    Raises
+    ------
+    MeasurementError
+        If the file cannot be read, or a column or a cell is missing, unknown or no number.
+    UnitError
+        If a unit is missing or of another dimension.
+    ValueRangeError
+        If the angles do not ascend from zero, or the lower torque is not below the upper.
+    """
+    table = read_columns(path, _COLUMNS)
+    for name in ("angle", "lower", "upper"):
+        _require(table, name)
+    _ascending_from_zero(table)
+    lower, upper = table.values["lower"], table.values["upper"]
+    crossed = upper <= lower
+    crossed[0] = upper[0] < lower[0]
+    if np.any(crossed):
+        row = int(np.argmax(crossed))
+        raise ValueRangeError(
+            table.cell(row, "upper"),
+            f"the upper torque {upper[row]:g} must be above the lower {lower[row]:g} N·m",
+            next_step="exchange the columns, or widen the band there",
+        )
+    return TorqueBand(angles=tuple(table.values["angle"]), lower=tuple(lower), upper=tuple(upper))
+
+
+def _require(table: ReadColumns, name: str) -> None:
+    if name not in table.values:
+        raise MeasurementError(
+            table.file, f"has no column '{name}'", next_step=f"name it '{name} [{_COLUMNS[name][0]}]'"
+        )
+
+
+def _ascending_from_zero(table: ReadColumns) -> None:
+    angles = table.values["angle"]
+    if angles[0] != 0.0:
+        raise ValueRangeError(
+            f"{table.cell(0, 'angle')}", "the first angle must be zero",
+            next_step="add a row for angle zero",
+        )  # fmt: skip
+    backward = np.diff(angles) <= 0.0
+    if np.any(backward):
+        raise ValueRangeError(
+            table.cell(int(np.argmax(backward)) + 1, "angle"), "angles must ascend",
+            next_step="sort the rows by angle and keep one of equal ones",
+        )  # fmt: skip
+    if angles[-1] > 6.3:
+        raise ValueRangeError(
+            f"{table.cell(len(angles) - 1, 'angle')} = {angles[-1]:g} rad", "is more than one turn",
+            next_step="were degrees meant? name the column 'angle [deg]'",
+        )  # fmt: skip
+
+
+def _nowhere_negative(table: ReadColumns, name: str) -> None:
+    negative = table.values[name] < 0.0
+    if np.any(negative):
+        row = int(np.argmax(negative))
+        raise ValueRangeError(
+            f"{table.cell(row, name)} = {table.values[name][row]:g}", "must be nowhere negative",
+            next_step="torque resists a positive angle: turn the sign of the column, or of the angle",
+        )  # fmt: skip

@@ -1,0 +1,350 @@
+"""The torque curve of the spring that serves a task best, for a declared motor and gear."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InfeasibleError, NlsError, ValueRangeError
+from ...quantity import Quantity, with_unit
+from .compliance import OddSpring, SpringSymmetry, TwoBranchSpring
+from .motor_and_gear import MotorAndGear, MotorCycle, motor_cycle
+from .numbers import in_si, plain
+from .target import TabulatedTorque
+from .task import Task
+from .task_program import TaskOptimum, TaskProgram, least_energy, least_peak_power
+
+Floats = NDArray[np.float64]
+
+_RIGID = 0.01
+"""Deflection in rad under the largest torque below which a spring counts as rigid."""
+_POINTS = 4
+"""Points of the table of the curve for each piece of the compliance."""
+_RATIO, _HALVINGS = 1.5, 8
+"""Between two points the stiffness changes by this factor at most; else there are points between them."""
+
+
+class TaskGoal(ABC):
+    """What is made small over a period of a task; a small object, chosen by the designer."""
+
+    @abstractmethod
+    def best(self, program: TaskProgram) -> TaskOptimum:
+        """Return the best spring of a program."""
+
+    @abstractmethod
+    def of(self, motor: MotorCycle) -> float:
+        """Return the number that is made small, in SI."""
+
+
+@dataclass(frozen=True)
+class LeastEnergy(TaskGoal):
+    """Least Joule heat and work of a period in J. Convex: the optimum is global, with a proved bound.
+
+    Source: Bolívar et al. 2018.
+    """
+
+    def best(self, program: TaskProgram) -> TaskOptimum:
+        """Return the global optimum."""
+        return least_energy(program)
+
+    def of(self, motor: MotorCycle) -> float:
+        """Return heat and work in J."""
+        return motor.energy
+
+
+@dataclass(frozen=True)
+class LeastPeakPower(TaskGoal):
+    """Least peak power at the motor shaft in W. Not convex: the best of three local optima, unproved."""
+
+    def best(self, program: TaskProgram) -> TaskOptimum:
+        """Return the best local optimum."""
+        return least_peak_power(program)
+
+    def of(self, motor: MotorCycle) -> float:
+        """Return the peak power in W."""
+        return motor.peak_power
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringLimits:
+    """Limits of the spring of a task; those of motor and supply are in :class:`MotorAndGear`.
+
+    Parameters
+    ----------
+    stiffness
+        Largest stiffness in N·m/rad; ``None`` for one that deflects by 0.01 rad (0.6°) under the largest
+        torque, beyond which a spring is as good as rigid.
+    deflection
+        Largest deflection in rad; a quarter turn, more than which a cable through the centre of a cam does
+        not reach.
+    motor_speed
+        In rad/s; infinite for none but the supply's.
+    """
+
+    stiffness: Quantity | float | None = None
+    deflection: Quantity | float = np.pi / 2.0
+    motor_speed: Quantity | float = float("inf")
+
+    def __post_init__(self) -> None:
+        if self.stiffness is not None:
+            object.__setattr__(
+                self, "stiffness", in_si("stiffness", self.stiffness, "N*m/rad", minimum=1e-6, maximum=1e9)
+            )
+        for name, unit, most in (("deflection", "rad", 6.3), ("motor_speed", "rad/s", float("inf"))):
+            object.__setattr__(self, name, in_si(name, getattr(self, name), unit, minimum=1e-3, maximum=most))
+
+    def floor(self, torque: float) -> float:
+        """Return the smallest compliance in rad/(N·m).
+
+        Parameters
+        ----------
+        torque
+            Largest of the task in N·m.
+        """
+        return _RIGID / torque if self.stiffness is None else 1.0 / plain(self.stiffness)
+
+
+@dataclass(frozen=True, eq=False)
+class TaskCurve:
+    """The curve for a task, and what it is worth.
+
+    Parameters
+    ----------
+    target
+        Torque over deflection for positive torque, rising; what :func:`design_cam` takes.
+    opposite
+        For negative torque, with both signs turned; ``None`` for an odd spring.
+    goal
+        What was made small.
+    rigid, linear, best
+        The motor over a period: rigidly coupled, with the best linear spring, and with the curve as it stands
+        in ``target`` and ``opposite``. The rigid drive need not keep the limits; ``linear`` is ``None`` where
+        no linear spring does.
+    linear_stiffness
+        Of the best linear spring in N·m/rad, ``None`` where there is none.
+    bound
+        Below which no spring of this symmetry gets, in the unit of the goal; ``None`` if nothing is proved.
+    two_branch
+        The goal with a spring whose directions differ; what an odd or one-sided one cannot have. ``None``
+        where it was not found.
+    """
+
+    target: TabulatedTorque
+    opposite: TabulatedTorque | None
+    goal: TaskGoal
+    rigid: MotorCycle
+    linear: MotorCycle | None
+    best: MotorCycle
+    linear_stiffness: float | None
+    bound: float | None
+    two_branch: float | None
+
+    @property
+    def gap(self) -> float | None:
+        """How far the curve is above the bound, as a share of the heat of its period."""
+        if self.bound is None:
+            return None
+        return (self.goal.of(self.best) - self.bound) / max(self.best.heat, 1e-300)
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Return a table: what, rigid, best linear spring, this curve."""
+        cycles = (self.rigid, self.linear, self.best)
+
+        def row(name: str, unit: str, value: Callable[[MotorCycle], float]) -> tuple[str, str, str, str]:
+            a, b, c = (with_unit(f"{value(each):.4g}", unit) if each else "none" for each in cycles)
+            return name, a, b, c
+
+        return [
+            row("Joule heat per period", "J", lambda motor: motor.heat),
+            row("heat and work per period", "J", lambda motor: motor.energy),
+            row("peak power of the motor", "W", lambda motor: motor.peak_power),
+            row("peak current", "A", lambda motor: motor.peaks["current"]),
+            row("peak voltage", "V", lambda motor: motor.peaks["voltage"]),
+            row("peak motor speed", "rad/s", lambda motor: motor.peaks["speed"]),
+            row("peak deflection", "deg", lambda motor: float(np.degrees(motor.peaks["deflection"]))),
+        ]
+
+    def __str__(self) -> str:
+        unit = "J" if isinstance(self.goal, LeastEnergy) else "W"
+
+        def shown(value: float | None, unit: str) -> str:
+            return "none keeps the limits" if value is None else with_unit(f"{value:.4g}", unit)
+
+        proof = (
+            "no bound is proved: the problem is not convex"
+            if self.bound is None
+            else f"no spring of this kind gets below {shown(self.bound, unit)}"
+        )
+        lines = [f"{name}: rigid {a}, linear {b}, curve {c}" for name, a, b, c in self.rows()]
+        return "\n".join(
+            [
+                *lines,
+                f"best linear spring: {shown(self.linear_stiffness, 'N*m/rad')}",
+                proof,
+                f"with a curve of its own in each direction: {shown(self.two_branch, unit)}",
+            ]
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskProblem:
+    """Everything that a curve for a task depends on, besides task and drive.
+
+    Parameters
+    ----------
+    goal
+        :class:`LeastEnergy` or :class:`LeastPeakPower`.
+    symmetry
+        :class:`OddSpring`, :class:`OneSidedSpring` or :class:`TwoBranchSpring`.
+    limits
+        Of the spring.
+    pieces
+        Of the compliance over the range of torque.
+    """
+
+    goal: TaskGoal = field(default_factory=LeastEnergy)
+    symmetry: SpringSymmetry = field(default_factory=OddSpring)
+    limits: SpringLimits = field(default_factory=SpringLimits)
+    pieces: int = 48
+
+    def program(self, task: Task, drive: MotorAndGear) -> TaskProgram:
+        """Return the program.
+
+        Parameters
+        ----------
+        task, drive
+            What is asked for and what drives.
+
+        Raises
+        ------
+        ValueRangeError
+            If the task has no torque, or there are too few pieces.
+        """
+        cycle = task.sampled()
+        most = float(np.max(np.abs(cycle.torque)))
+        if most == 0.0:
+            raise ValueRangeError("task", "has no torque, so no spring is needed")
+        if not 4 <= self.pieces <= 200:
+            raise ValueRangeError(f"pieces = {self.pieces}", "must lie in [4, 200]")
+        spline, floor = self.symmetry.spline(cycle, self.pieces), self.limits.floor(most)
+        freedom, offset = self.symmetry.freedom(spline, floor)
+        if freedom.shape[1] == 0:
+            raise ValueRangeError(
+                "task for a one-sided spring", "has no positive torque",
+                next_step="turn the signs of angle and torque",
+            )  # fmt: skip
+        limits = self.limits
+        return TaskProgram(
+            cycle, drive, spline, freedom, offset, floor, plain(limits.deflection), plain(limits.motor_speed)
+        )
+
+
+def curve_for_task(task: Task, drive: MotorAndGear, problem: TaskProblem | None = None) -> TaskCurve:
+    """Return the torque curve of the series spring that serves a task best.
+
+    Unknown is the compliance over the torque, a spline with many pieces; motor torque and speed are affine in
+    it. Least energy is a convex quadratic program, solved to the global optimum with a proved bound.
+    Friction and the losses of the gear are not in it. Source: Bolívar et al. 2018.
+
+    Parameters
+    ----------
+    task
+        Motion and torque of the joint.
+    drive
+        Motor and gear, for instance from :func:`motor_and_gear`.
+    problem
+        Goal, symmetry and limits; least energy with an odd spring if it is left out.
+
+    Raises
+    ------
+    InfeasibleError
+        If no spring keeps the limits, with the amounts; or if the spring has no influence on the motor.
+    ValueRangeError
+        If the task has no torque.
+
+    Examples
+    --------
+    >>> from nlsdesign.design import walking_task
+    >>> motor = MotorAndGear(inertia=1.4e-5, torque_constant=0.03, resistance=0.3, gear_ratio=60.0)
+    >>> curve = curve_for_task(walking_task("ankle", body_mass=75.0).scaled(0.05), motor)
+    >>> curve.best.heat < 0.4 * curve.rigid.heat
+    True
+    """
+    problem = problem or TaskProblem()
+    program = problem.program(task, drive)
+    solution = problem.goal.best(program)
+    target, opposite = _branches(program, solution.unknowns)
+    odd = isinstance(problem.symmetry, OddSpring)
+    straight = _best_or_none(problem.goal, program.linear())
+    wider = replace(problem, symmetry=TwoBranchSpring()).program(task, drive)
+    any_spring = _best_or_none(problem.goal, wider)
+    return TaskCurve(
+        target=target,
+        opposite=None if odd else opposite,
+        goal=problem.goal,
+        rigid=motor_cycle(task, drive),
+        linear=program.linear().motor(straight.unknowns) if straight else None,
+        best=motor_cycle(task, drive, spring=target, opposite=None if odd else opposite),
+        linear_stiffness=1.0 / float(straight.unknowns[0]) if straight else None,
+        bound=solution.bound,
+        two_branch=problem.goal.of(wider.motor(any_spring.unknowns)) if any_spring else None,
+    )
+
+
+def _best_or_none(goal: TaskGoal, program: TaskProgram) -> TaskOptimum | None:
+    try:
+        return goal.best(program)
+    except InfeasibleError:  # the curve keeps the limits and this comparison does not: there is none to show
+        return None
+
+
+def _branches(program: TaskProgram, unknowns: Floats) -> tuple[TabulatedTorque, TabulatedTorque]:
+    """Return the curve for positive and for negative torque, each as a table from zero."""
+    tables = []
+    for most in (program.spline.high, program.spline.low):
+        if most == 0.0:  # no torque in this direction: a short line as stiff as allowed, which nothing uses
+            angles = np.linspace(0.0, _RIGID, 3)
+            tables.append(TabulatedTorque(angles=tuple(angles), torques=tuple(angles / program.floor)))
+            continue
+        along = np.unique(program.spline.knots * np.sign(most))
+        knots = np.concatenate([[0.0], along[along > 1e-9 * abs(most)]])
+        torque = np.interp(np.arange(_POINTS * (len(knots) - 1) + 1) / _POINTS, np.arange(len(knots)), knots)
+        for _ in range(_HALVINGS):
+            compliance = program.spline.matrices(np.sign(most) * torque)[1] @ program.coefficients(unknowns)
+            steep = np.abs(np.diff(np.log(compliance))) > np.log(_RATIO)
+            torque = np.sort(np.append(torque, 0.5 * (torque[:-1] + torque[1:])[steep]))
+        matrices = program.spline.matrices(np.sign(most) * torque)
+        deflection, compliance = (each @ program.coefficients(unknowns) for each in matrices[:2])
+        tables.append(
+            TabulatedTorque(
+                angles=tuple(np.abs(deflection)), torques=tuple(torque), slopes=tuple(1.0 / compliance)
+            )
+        )
+    return tables[0], tables[1]
+
+
+def scan_gear_ratio(
+    task: Task, drive: MotorAndGear, ratios: Sequence[float], problem: TaskProblem | None = None
+) -> dict[float, TaskCurve | NlsError]:
+    """Return the curve for each of some gear ratios; where none keeps the limits, the error that says why.
+
+    Parameters
+    ----------
+    task, drive
+        As for :func:`curve_for_task`.
+    ratios
+        Motor turns per turn of the output.
+    problem
+        As for :func:`curve_for_task`.
+    """
+    curves: dict[float, TaskCurve | NlsError] = {}
+    for ratio in ratios:
+        try:
+            curves[ratio] = curve_for_task(task, drive.geared(ratio), problem)
+        except InfeasibleError as error:  # the ratio is out of question, and the error says why
+            curves[ratio] = error
+    return curves

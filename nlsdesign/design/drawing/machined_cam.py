@@ -1,0 +1,458 @@
+"""Sizes that a workshop needs beside the contour: cable, channel, plate, run-out, bore, bolts, cable end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ArrangementError, ValueRangeError
+from ...quantity import Quantity, quantity
+from ..curves.numbers import in_si, plain
+from ..statics.contour import Contour
+from .arc_path import ArcPath
+from .cam_outline import one_sided_outline, two_sided_outlines
+from .cam_part import CamPart, Hole
+from .lip_edge import LipEdge, lip_edge
+from .machinability import check_machinable
+
+Floats = NDArray[np.float64]
+
+_CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
+_OVER_TRAVEL = quantity(10.0, "deg", source="assumed: room for a stop behind the last angle")
+_CORNER = quantity(1.0, "mm", source="assumed: a corner that does not cut")
+_WALL = quantity(1.0, "mm", source="assumed: least wall that a workshop holds in metal")
+_TOLERANCE = quantity(0.02, "mm", source="assumed: usual in fine milling and wire erosion")
+_RANGES = {
+    "cable_radius": ("m", 1e-5, 0.01),
+    "channel_clearance": ("m", 0.0, 0.01),
+    "thickness": ("m", 1e-4, 0.2),
+    "groove_depth": ("m", 1e-4, 0.2),
+    "over_travel": ("rad", 0.0, math.pi),
+    "corner_radius": ("m", 1e-5, 0.1),
+    "tool_radius": ("m", 0.0, 0.05),
+    "minimum_wall": ("m", 0.0, 0.05),
+    "edge_tolerance": ("m", 1e-7, 1e-3),
+    "body_radius": ("m", 0.0, 1.0),
+    "hub_bore": ("m", 1e-4, 0.5),
+    "lead_in": ("m", 0.0, 0.5),
+    "circle": ("m", 1e-4, 1.0),
+    "hole": ("m", 1e-4, 0.1),
+    "diameter": ("m", 1e-4, 0.1),
+}
+
+
+def _check(item: object) -> None:
+    """Turn the numbers of a frozen object into quantities, each checked for dimension and range."""
+    for field in fields(item):  # type: ignore[arg-type]
+        given = getattr(item, field.name)
+        if field.name in _RANGES and given is not None:
+            unit, minimum, maximum = _RANGES[field.name]
+            value = in_si(field.name, given, unit, minimum=minimum, maximum=maximum)
+            if not isinstance(given, Quantity):
+                object.__setattr__(item, field.name, Quantity(value, unit))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoltCircle:
+    """Bolt holes on a circle about the axis.
+
+    On a two-sided cam they lie as far from the channel as their number allows.
+
+    Parameters
+    ----------
+    count
+        Number of holes; even on a two-sided cam.
+    circle
+        Diameter of the circle of their centres, in m.
+    hole
+        Diameter of a hole, in m.
+
+    Raises
+    ------
+    ValueRangeError
+        If a number lies outside its range.
+
+    Examples
+    --------
+    >>> from nlsdesign.quantity import quantity
+    >>> BoltCircle(count=4, circle=quantity(16.0, "mm"), hole=quantity(2.2, "mm")).centres.shape
+    (4, 2)
+    """
+
+    count: int
+    circle: Quantity | float
+    hole: Quantity | float
+
+    def __post_init__(self) -> None:
+        in_si("count of bolts", float(self.count), "1", minimum=1.0, maximum=100.0)
+        _check(self)
+
+    @property
+    def centres(self) -> Floats:
+        """Centres of the holes in m, shape (count, 2); the first nearest to the y axis."""
+        step = 2.0 * math.pi / self.count
+        # Half a step off the y axis where a hole would else lie on the x axis.
+        first = math.pi / 2 + (step / 2 if self.count % 4 == 0 else 0.0)
+        angles = first + step * np.arange(self.count)
+        result: Floats = plain(self.circle) / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
+        return result
+
+
+@dataclass(frozen=True, kw_only=True)
+class FerruleSeat:
+    """Round pocket in the line of the cable for a ferrule that is pressed on it.
+
+    On a two-sided cam it lies on the axis, on a one-sided at the end of the lead-in.
+
+    Parameters
+    ----------
+    diameter
+        Of the pocket, in m.
+
+    Raises
+    ------
+    ValueRangeError
+        If a number lies outside its range.
+    """
+
+    diameter: Quantity | float
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClampScrew:
+    """Hole beside the cable for a screw whose head or washer clamps it.
+
+    On a two-sided cam there is one in each half, across the axis; on a one-sided one beside the lead-in.
+
+    Parameters
+    ----------
+    diameter
+        Of the hole (core hole of the thread), in m.
+
+    Raises
+    ------
+    ValueRangeError
+        If a number lies outside its range.
+    """
+
+    diameter: Quantity | float
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachinedCam:
+    """Sizes common to all cams; take :class:`MachinedTwoSidedCam` or :class:`MachinedOneSidedCam`.
+
+    Each number is a quantity, or bare in SI. What is left out is derived from the contour and the cable; the
+    drawing lists every number with its source.
+
+    Parameters
+    ----------
+    cable_radius
+        Half the diameter of the cable: the edge lies deeper than the contour by it.
+    channel_clearance
+        By how much the channel is wider than the cable, between its mouths.
+    thickness
+        Of the plate.
+    groove_depth
+        Depth from the face of the plate to which the edges are milled; the rest is a round base plate that
+        carries the lips. Left out: the edges are cut through the plate.
+    over_travel
+        Angle of the cam beyond the last one over which the cable still lies on a round edge.
+    corner_radius
+        Of the ends of the lips.
+    tool_radius
+        Smallest radius of an inner corner.
+    minimum_wall
+        Least material between holes and edges.
+    edge_tolerance
+        Profile tolerance of the edge under the cable, ± in m.
+    body_radius
+        The lips are backed by material to at least this distance from the axis.
+    hub_bore
+        Diameter of a bore on the axis.
+    bolts
+        Bolt holes.
+    cable_end
+        What holds the cable on the cam.
+
+    Raises
+    ------
+    ValueRangeError
+        If a number lies outside its range, which mostly means a slip of units.
+    UnitError
+        If a unit measures something else.
+    """
+
+    cable_radius: Quantity | float
+    channel_clearance: Quantity | float = _CLEARANCE
+    thickness: Quantity | float | None = None
+    groove_depth: Quantity | float | None = None
+    over_travel: Quantity | float = _OVER_TRAVEL
+    corner_radius: Quantity | float = _CORNER
+    tool_radius: Quantity | float | None = None
+    minimum_wall: Quantity | float = _WALL
+    edge_tolerance: Quantity | float = _TOLERANCE
+    body_radius: Quantity | float | None = None
+    hub_bore: Quantity | float | None = None
+    bolts: BoltCircle | None = None
+    cable_end: FerruleSeat | ClampScrew | None = None
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    def given(self) -> dict[str, Quantity]:
+        """Return the numbers by name, with those derived that need no contour."""
+        numbers = {
+            field.name: item
+            for field in fields(self)
+            if isinstance(item := getattr(self, field.name), Quantity)
+        }
+        if self.bolts is not None:
+            numbers |= {
+                "bolt_count": quantity(float(self.bolts.count), "1"),
+                "bolt_circle": as_quantity(self.bolts.circle),
+                "bolt_hole": as_quantity(self.bolts.hole),
+            }
+        if isinstance(self.cable_end, FerruleSeat):
+            numbers["ferrule_seat"] = as_quantity(self.cable_end.diameter)
+        if isinstance(self.cable_end, ClampScrew):
+            numbers["clamp_hole"] = as_quantity(self.cable_end.diameter)
+        radius = plain(self.cable_radius)
+        numbers.setdefault(
+            "tool_radius",
+            _derived(
+                min(5e-4, radius), "smaller of 0.5 mm and the cable radius, so that it passes the mouth"
+            ),
+        )
+        numbers.setdefault("thickness", self._thickness())
+        return numbers
+
+    def part(self, contour: Contour) -> CamPart:
+        """Return the cam as it is made, checked.
+
+        Parameters
+        ----------
+        contour
+            Curve of the cable's centre line.
+
+        Raises
+        ------
+        ArrangementError
+            If the edge crosses itself, or a bore would cut the channel.
+        ValueRangeError
+            If the contour, the cable, a hole or the plate does not fit; the message names it.
+        """
+        numbers = self.given()
+        lip = lip_edge(contour, numbers["cable_radius"].number, over_travel=numbers["over_travel"].number)
+        numbers |= {
+            "last_angle": quantity(math.degrees(contour.angles[-1]), "deg", source="contour"),
+            "sharpest_edge": _derived(
+                float(np.min(contour.radii_of_curvature)) - numbers["cable_radius"].number,
+                "smallest radius of curvature of the contour less the cable radius",
+            ),
+            "edge_deviation": _derived(lip.deviation, "largest distance of the arcs from the exact edge"),
+        }
+        if math.isfinite(contour.anchor_distance):
+            numbers["anchor_distance"] = quantity(1e3 * contour.anchor_distance, "mm", source="contour")
+        outlines, holes, cables = self._drawn(contour, lip, numbers)
+        if self.bolts is not None:
+            holes += [
+                Hole(f"bolt hole {k}", c, plain(self.bolts.hole)) for k, c in enumerate(self.bolts.centres, 1)
+            ]
+        base = 0.0
+        if self.groove_depth is not None:
+            base = self._base_radius(outlines, holes, numbers)
+            numbers["base_radius"] = _derived(base, "lips, holes and the least wall around them")
+        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), contour.points, numbers)
+        numbers["reach"] = _derived(made.reach, "largest distance of an edge from the axis")
+        check_machinable(made)
+        return made
+
+    def _drawn(
+        self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
+    ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
+        """Return outlines, holes but those of the bolts, and cables; adds the numbers that it derives."""
+        raise NotImplementedError
+
+    def _body_radius(self, limit: float, numbers: dict[str, Quantity]) -> None:
+        """Add the body radius where it is not given: what holes need, else half of what fits."""
+        needed = 0.0
+        if self.bolts is not None and self.groove_depth is None:
+            needed = (plain(self.bolts.circle) + plain(self.bolts.hole)) / 2 + plain(self.minimum_wall)
+        if self.hub_bore is not None:
+            needed = max(needed, plain(self.hub_bore) / 2 + plain(self.minimum_wall))
+        size = max(0.0, min(limit, max(needed, limit / 2)))
+        numbers.setdefault("body_radius", _derived(size, "what the holes need, at least half of what fits"))
+        if numbers["body_radius"].number > limit + 1e-9:
+            raise ValueRangeError(
+                f"body_radius {numbers['body_radius']}",
+                f"stands out over the edge under the cable; at most {1e3 * limit:.4g} mm fits",
+                next_step="take a smaller body_radius",
+            )
+
+    def _base_radius(self, outlines: list[ArcPath], holes: list[Hole], numbers: dict[str, Quantity]) -> float:
+        rims = [float(np.hypot(*outline.polygon().T).max()) for outline in outlines]
+        rims += [math.hypot(*hole.centre) + hole.diameter / 2 for hole in holes]
+        return math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
+
+    def _thickness(self) -> Quantity:
+        """Plate so thick that the cable stays on it: four diameters, with a groove as much again below."""
+        if self.groove_depth is not None:
+            wall = max(2e-3, plain(self.minimum_wall))
+            return _derived(plain(self.groove_depth) + wall, "groove and a base of 2 mm or the least wall")
+        return _derived(
+            max(4e-3, math.ceil(8e3 * plain(self.cable_radius)) * 1e-3),
+            "4 diameters of the cable, at least 4 mm",
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachinedTwoSidedCam(MachinedCam):
+    """Sizes of a cam whose cable runs through its centre, in a channel between two halves.
+
+    At the mouths the channel is exactly as wide as the cable, so that the cable leaves it along the contour;
+    between them it is wider by the clearance. Parameters are those of :class:`MachinedCam`.
+
+    Examples
+    --------
+    >>> from nlsdesign.quantity import quantity
+    >>> MachinedTwoSidedCam(cable_radius=quantity(0.25, "mm")).given()["thickness"].shown
+    4.0
+    """
+
+    def _drawn(
+        self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
+    ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
+        radius, clearance = numbers["cable_radius"].number, numbers["channel_clearance"].number
+        offset = float(contour.lever_arms[0])
+        if abs(offset) > max(clearance / 2, 1e-6) or contour.slopes[0] <= 0.0:
+            raise ArrangementError(
+                f"contour with a lever arm of {1e3 * offset:.4g} mm at angle zero",
+                "its cable does not run through the centre, so there is no channel between two halves",
+                next_step="draw it as a MachinedOneSidedCam",
+            )
+        if self.hub_bore is not None and self.groove_depth is None:
+            raise ArrangementError(
+                f"hub bore of {numbers['hub_bore']}",
+                "would cut the channel of the cable, which runs through the axis",
+                next_step="give a groove_depth, or leave hub_bore out and take bolts",
+            )
+        if self.bolts is not None and self.groove_depth is None and self.bolts.count < 4:
+            raise ArrangementError(
+                f"{self.bolts.count} bolts", "do not hold two separate halves, each needs two",
+                next_step="take 4 or more, or a groove_depth so that the cam is one piece",
+            )  # fmt: skip
+        numbers["channel_width"] = _derived(2 * radius + clearance, "cable diameter and clearance")
+        numbers["mouth_width"] = _derived(2 * (radius - offset), "cable diameter: the lips guide the cable")
+        numbers["channel_length"] = _derived(2 * float(contour.slopes[0]), "between the mouths")
+        self._body_radius(lip.last_support, numbers)
+        outlines = list(two_sided_outlines(lip, numbers))
+        holes = []
+        if self.hub_bore is not None:
+            holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore), base_only=True))
+        if isinstance(self.cable_end, ClampScrew):
+            size = plain(self.cable_end.diameter)
+            away = numbers["channel_width"].number / 2 + plain(self.minimum_wall) + size / 2
+            # Beside the bore in the base, which lies under them.
+            aside = plain(self.hub_bore) / 2 + plain(self.minimum_wall) + size / 2 if self.hub_bore else 0.0
+            holes += [Hole("clamp hole", side * np.array([-aside, away]), size) for side in (-1.0, 1.0)]
+        beyond = 0.35 * float(contour.radii.max())
+        half = _cable(contour, float(contour.angles[-1]), beyond)
+        turned = np.vstack([-half[::-1], half])
+        end = min(1.3 * float(contour.radii.max()), contour.anchor_distance)
+        return outlines, holes, [
+            ArcPath(points, np.zeros(len(points)))
+            for points in (np.array([[-end, 0.0], [end, 0.0]]), turned, turned * [1.0, -1.0])
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachinedOneSidedCam(MachinedCam):
+    """Sizes of a cam that takes up its cable on one side.
+
+    Before the contour a straight lead-in carries the cable from its end. Other parameters are those of
+    :class:`MachinedCam`.
+
+    Parameters
+    ----------
+    lead_in
+        Length of the straight edge before the contour, in m; four diameters of the cable, and room for its
+        end, if it is left out.
+    """
+
+    lead_in: Quantity | float | None = None
+
+    def given(self) -> dict[str, Quantity]:
+        """Return the numbers by name, with those derived that need no contour."""
+        numbers = super().given()
+        end = plain(self.cable_end.diameter) if self.cable_end is not None else 0.0
+        room = end + 2.0 * plain(self.minimum_wall) if end else 0.0
+        numbers.setdefault(
+            "lead_in",
+            _derived(8.0 * plain(self.cable_radius) + room, "4 diameters of the cable, and room for its end"),
+        )
+        return numbers
+
+    def _drawn(
+        self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
+    ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
+        radius, wall = numbers["cable_radius"].number, plain(self.minimum_wall)
+        self._body_radius(float(np.min(contour.lever_arms)) - radius, numbers)
+        outline = one_sided_outline(lip, numbers)
+        phi, lead = float(contour.directions[0]), numbers["lead_in"].number
+        along, normal = np.array([math.cos(phi), -math.sin(phi)]), np.array([math.sin(phi), math.cos(phi)])
+        holes = []
+        if self.hub_bore is not None:
+            bore = plain(self.hub_bore)
+            fits = bore / 2 + wall <= numbers["body_radius"].number
+            holes.append(
+                Hole("hub bore", np.zeros(2), bore, base_only=self.groove_depth is not None and not fits)
+            )
+        start = contour.points[0] - lead * along
+        if isinstance(self.cable_end, ClampScrew):
+            size = plain(self.cable_end.diameter)
+            place = start + (size / 2 + wall) * along - (radius + wall + size / 2) * normal
+            holes.append(Hole("clamp hole", place, size))
+        beyond = 0.35 * float(contour.radii.max())
+        cables = [
+            np.vstack([start, _cable(contour, angle, beyond)])
+            for angle in (float(contour.angles[0]), float(contour.angles[-1]))
+        ]
+        return [outline], holes, [ArcPath(points, np.zeros(len(points))) for points in cables]
+
+
+def _cable(contour: Contour, angle: float, beyond: float) -> Floats:
+    """Return the cable from the first point of the contour to beyond the contact, in the frame of the cam."""
+    on = contour.angles <= angle
+    last = int(np.flatnonzero(on)[-1])
+    away = min(float(contour.free_lengths[last]), beyond + (0.0 if last else float(contour.radii.max())))
+    direction = float(contour.directions[last])
+    leaving = contour.points[last] + away * np.array([math.cos(direction), -math.sin(direction)])
+    result: Floats = np.vstack([contour.points[: last + 1], leaving])
+    return result
+
+
+def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:
+    """Return a quantity.
+
+    Parameters
+    ----------
+    given
+        A quantity, or a number in SI.
+    unit
+        SI unit of a bare number.
+    """
+    return given if isinstance(given, Quantity) else Quantity(given, unit)
+
+
+def _derived(value: float, how: str) -> Quantity:
+    return quantity(round(1e3 * value, 9), "mm", source=f"derived: {how}")

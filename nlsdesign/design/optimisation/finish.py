@@ -1,0 +1,289 @@
+"""From the solution of a search to a finished design, measured on the changed assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...components.assembly.named_parts import Assembly
+from ...model import FlatModel, flatten
+from ...quantity import Quantity, significant
+from ..statics.contour import Contour, contour_from_curvature
+from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
+from .checks import torque_check, torque_sensitivity
+from .design_search import Search, carried_over
+from .limits import Bound
+from .problem import DesignProblem
+from .program import Solution
+from .remedies import find_remedies
+from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
+from .size_ranges import size_ranges
+
+Floats = NDArray[np.float64]
+
+_ACTIVE = 1e-3
+_CONTROL_VALUES = 64
+_NARROWED = 2
+"""How often the rounding of knots is narrowed at most."""
+_PROMISED = 2e-4
+"""Difference between the error that the optimiser saw and that of the finished assembly, relative to the
+largest torque, from which the rounding of knots is narrowed."""
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedSearch:
+    """A search with its outcomes, the one that was taken, and the assembly that follows from it.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    search
+        That was solved.
+    free
+        What may change in it.
+    outcomes
+        From each start.
+    taken
+        Number of the best of them.
+    best
+        That one, or what followed from it with knots rounded less.
+    """
+
+    actuator: Assembly
+    search: Search
+    free: tuple[str, ...]
+    outcomes: Sequence[Solution]
+    taken: int
+    best: Solution
+
+    @cached_property
+    def predicted_rms(self) -> float:
+        """Torque error in N·m that the optimiser saw."""
+        return self.rms(self.best)
+
+    def rms(self, outcome: Solution) -> float:
+        """Return the torque error in N·m at a solution.
+
+        Parameters
+        ----------
+        outcome
+            Of this search, or of the same with knots rounded otherwise.
+        """
+        problem = self.search.problem
+        square = problem.evaluate(problem.design.mean_square_error, outcome.point)[0]
+        return float(np.sqrt(max(square, 0.0)))
+
+    @cached_property
+    def contour_fit(self) -> tuple[Contour, CamFit | None]:
+        """Contour, and the declared cam made for it; none where the contour was given."""
+        return _contour(self.actuator, self.search.problem, self.best)
+
+    @cached_property
+    def changes(self) -> dict[str, Quantity]:
+        """Designed numbers by full name."""
+        problem = self.search.problem
+        target, values = problem.design.target, problem.named(self.best.point)
+        known = self.actuator.quantities()
+        source = f"designed for {type(target).__name__}, {target.largest:.6g} N·m"
+        changes = {n: _designed(known[n], value, source) for n, value in values.items() if n in known}
+        fit = self.contour_fit[1]
+        if fit is not None:
+            changes |= {f"{problem.law.cam.name}.{field}": given for field, given in fit.changes().items()}
+        return changes
+
+    @cached_property
+    def changed(self) -> Assembly:
+        """Copy of the assembly with those numbers."""
+        return self.actuator.with_values(self.changes)
+
+    @cached_property
+    def model(self) -> FlatModel:
+        """That copy, flattened."""
+        return flatten(self.changed)
+
+    @cached_property
+    def check(self) -> TorqueCheck:
+        """Its torque against the target."""
+        spring = _spring_of(self.model, self.search.problem.law.cam.name)
+        return torque_check(self.model, target=self.search.problem.design.target, spring=spring)
+
+
+def narrowed(solved: SolvedSearch) -> SolvedSearch:
+    """Return the design on a law whose knots are rounded less, where the rounding shows in the torque.
+
+    Parameters
+    ----------
+    solved
+        On the law with which the search began.
+    """
+    for _ in range(_NARROWED):
+        target, rounding = solved.search.problem.design.target, solved.search.rounding
+        finer = solved.search.question.finer(rounding)
+        if finer is None or abs(solved.check.rms - solved.predicted_rms) <= _PROMISED * target.largest:
+            break
+        search = solved.search.question.search(solved.free, finer)
+        outcome = search.program.solve(carried_over(solved.search, solved.best.point, search))
+        if not outcome.solved:
+            break
+        better = replace(solved, search=search, best=outcome)
+        if better.check.rms >= solved.check.rms:
+            break
+        solved = better
+    return solved
+
+
+def finished(solved: SolvedSearch) -> CamDesign:
+    """Return the finished design.
+
+    Parameters
+    ----------
+    solved
+        With its best solution.
+    """
+    search, problem, best = solved.search, solved.search.problem, solved.best
+    contour, fit = solved.contour_fit
+    settings, design = search.question.settings, problem.design
+    limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
+    return CamDesign(
+        target=design.target,
+        changes=tuple(solved.changes.items()),
+        actuator=solved.changed,
+        check=solved.check,
+        predicted_rms=solved.predicted_rms,
+        contour=contour,
+        fit_error=0.0 if fit is None else fit.error,
+        limits=limits,
+        sensitivity=torque_sensitivity(
+            solved.model, target=design.target, spring=_spring_of(solved.model, problem.law.cam.name)
+        ),
+        curves=_curves(problem, best.point),
+        rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
+        starts=tuple(
+            StartOutcome(o.solved, o.status, o.iterations, o.cost, solved.rms(o)) for o in solved.outcomes
+        ),
+        taken=solved.taken,
+        size_ranges=size_ranges(search, best.point, solved.predicted_rms)
+        if settings.look_for_size_ranges
+        else (),
+        miss=_miss(solved, limits),
+        remarks=_remarks(search),
+        drive=problem.law.cam.drive,
+    )
+
+
+def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
+    settings, target, check = (
+        solved.search.question.settings,
+        solved.search.problem.design.target,
+        solved.check,
+    )
+    allowed = settings.largest_error * target.largest
+    if check.rms <= allowed:
+        return None
+    binding = [i for i, state in enumerate(limits) if state.active]
+    remedies = (
+        find_remedies(
+            solved.search, solved.free, solved.best.point, allowed=allowed, error=check.rms, binding=binding
+        )
+        if settings.look_for_remedies
+        else None
+    )
+    worst = int(np.argmax(np.abs(check.errors)))
+    return Miss(
+        error=check.rms / target.largest,
+        allowed=settings.largest_error,
+        worst_angle=float(check.angles[worst]),
+        worst_error=float(check.errors[worst]),
+        binding=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
+        remedies=remedies,
+        advice=() if remedies is None else tuple(remedies.sentences(target.largest)),
+    )
+
+
+def _remarks(search: Search) -> tuple[str, ...]:
+    cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
+    sentences = []
+    if "MaximumCableTension" not in kinds:
+        sentences.append(
+            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
+        )
+    if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
+        sentences.append(
+            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
+        )
+    return tuple(sentences)
+
+
+def _curves(problem: DesignProblem, point: Floats) -> DesignCurves:
+    design = problem.design
+    columns = [
+        design.angles, design.lever_arms, design.radii_of_curvature, design.radii, design.torques,
+        design.tangent_stiffness, design.extensions, design.forces,
+        *design.strains.values(), *design.stresses.values(),
+    ]  # fmt: skip
+    table = problem.evaluate(ca.vertcat(*columns), point).reshape(len(columns), -1)
+    pieces = len(design.strains)
+    angles, arms, rho, radii, torques, stiffnesses, extensions, forces = table[:8]
+    return DesignCurves(
+        angles=angles,
+        lever_arms=arms,
+        radii_of_curvature=rho,
+        radii=radii,
+        torques=torques,
+        stiffnesses=stiffnesses,
+        extensions=extensions,
+        forces=forces,
+        strains=dict(zip(design.strains, table[8 : 8 + pieces], strict=True)),
+        stresses=dict(zip(design.stresses, table[8 + pieces :], strict=True)),
+    )
+
+
+def _spring_of(model: FlatModel, cam: str) -> str:
+    return next(each.name for each in model.springs for inside in each.cams if inside.name == cam)
+
+
+def _designed(old: Quantity, value: float, source: str) -> Quantity:
+    """Return a designed number, shown in millimetres where only metres were stated."""
+    (rounded,) = significant([value])
+    return replace(old.with_value(rounded, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
+
+
+def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
+    design, cam = problem.design, actuator[problem.law.cam.name]
+    if problem.contour is None:
+        return contour_of_cam(cam), None
+    anchor = design.cam.anchor_distance
+    contour = contour_from_curvature(
+        problem.evaluate(design.directions, best.point),
+        problem.evaluate(design.radii_of_curvature, best.point),
+        first_slope=float(problem.evaluate(problem.contour.first_slope.value, best.point)[0]),
+        first_lever_arm=float(problem.evaluate(design.lever_arms[0], best.point)[0]),
+        anchor_distance=(
+            np.inf if anchor is None else float(problem.evaluate(design.parameters[anchor], best.point)[0])
+        ),
+    )
+    return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
+
+
+def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+    """Return how a design stands to a limit.
+
+    Parameters
+    ----------
+    problem
+        Its problem.
+    bound
+        One side of the limit.
+    point
+        Shape (variables,), scaled.
+    """
+    values = problem.evaluate(bound.expression, point)
+    value = float(values.max() if bound.upper else values.min())
+    active = abs(value - bound.value) <= _ACTIVE * bound.scale
+    return LimitState(bound.limit, bound.of, value, bound.value, bound.upper, bound.unit, active)

@@ -1,0 +1,95 @@
+"""Limits on how a design is used: beyond its last angle, within a band, over a task."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ...errors import ValueRangeError
+from ...quantity import Quantity
+from ..curves.numbers import in_si, plain
+from ..curves.shapes import TorqueBand
+from .design_point import DesignPoint
+from .limits import Bound, Limit, MaximumCableTension, MaximumStrain, MaximumStress
+
+
+@dataclass(frozen=True)
+class OverTravel(Limit):
+    """Limits of rubber and cable that hold beyond the last angle too, where the lever arm stays what it was.
+
+    Parameters
+    ----------
+    angle
+        Beyond the last angle of the target, in rad.
+    limits
+        Those that must hold there: strain, stress, cable tension.
+
+    Raises
+    ------
+    ValueRangeError
+        If no limit is named, or one of another kind.
+    """
+
+    angle: Quantity | float
+    limits: tuple[Limit, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "angle", in_si("OverTravel: angle", self.angle, "rad", minimum=0.0, maximum=3.2)
+        )
+        object.__setattr__(self, "limits", tuple(self.limits))
+        allowed = (MaximumStrain, MaximumStress, MaximumCableTension)
+        if not self.limits or not all(isinstance(limit, allowed) for limit in self.limits):
+            raise ValueRangeError(
+                "OverTravel: limits", "needs limits of strain, stress or cable tension",
+                next_step="OverTravel(angle, limits=(MaximumStrain(1.0),))",
+            )  # fmt: skip
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield the bounds of its limits at the end of the over-travel."""
+        beyond = design.turned_beyond(plain(self.angle))
+        for limit in self.limits:
+            for bound in limit.bounds(beyond):
+                yield self._bound(
+                    f"{bound.of} at over-travel",
+                    bound.expression,
+                    bound.value,
+                    upper=bound.upper,
+                    unit=bound.unit,
+                    scale=bound.scale,
+                )
+
+
+@dataclass(frozen=True)
+class TorqueWithin(Limit):
+    """Torque between a lower and an upper curve at every angle of the contour that the band covers.
+
+    Parameters
+    ----------
+    band
+        The two curves.
+
+    Raises
+    ------
+    ValueRangeError
+        If the band ends before the target does.
+    """
+
+    band: TorqueBand
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield both edges, without angle zero, where a cable through the centre has no torque."""
+        if self.band.last_angle < design.target.last_angle * (1 - 1e-9):
+            raise ValueRangeError(
+                f"TorqueWithin: band up to {self.band.last_angle:.4g} rad",
+                f"ends before the target does, at {design.target.last_angle:.4g} rad",
+                next_step="continue both curves to the last angle of the target",
+            )
+        angles = [design.angles[i] for i in range(1, design.angles.shape[0])]
+        low = ca.vertcat(*[self.band.lower_law(angle) for angle in angles])
+        high = ca.vertcat(*[self.band.upper_law(angle) for angle in angles])
+        torques, scale = design.torques[1:], design.target.largest
+        yield self._bound("torque above band", torques - low, 0.0, upper=False, unit="mN*m", scale=scale)
+        yield self._bound("torque below band", torques - high, 0.0, upper=True, unit="mN*m", scale=scale)

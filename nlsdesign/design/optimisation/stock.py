@@ -1,0 +1,162 @@
+"""What can be bought: numbers and rubbers to choose from, one by one."""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from ...components.assembly.named_parts import Assembly
+from ...components.assembly.other_rubber import with_rubber
+from ...components.materials.library import material
+from ...errors import ValueRangeError, unknown_name
+from ...quantity import Quantity
+
+_MOST = 1000
+
+
+@dataclass(frozen=True)
+class StockChoice(ABC):
+    """Base of what a design chooses from a list."""
+
+    @property
+    @abstractmethod
+    def chosen(self) -> str:
+        """Full name of what is chosen."""
+
+    @abstractmethod
+    def options(self, actuator: Assembly) -> Iterator[tuple[str, Assembly]]:
+        """Yield each option in words, and the assembly with it.
+
+        Parameters
+        ----------
+        actuator
+            As declared.
+
+        Raises
+        ------
+        NlsError
+            If an option cannot be put into the assembly.
+        """
+
+
+@dataclass(frozen=True)
+class Stock(StockChoice):
+    """Numbers that are in stock, for instance thicknesses of sheets, diameters, numbers of elements.
+
+    Parameters
+    ----------
+    name
+        Full name of the number.
+    values
+        Quantities, or bare numbers in SI.
+
+    Raises
+    ------
+    ValueRangeError
+        If the list is empty or has something twice.
+
+    Examples
+    --------
+    >>> Stock("spring.cam.elements", (1, 2, 4)).chosen
+    'spring.cam.elements'
+    """
+
+    name: str
+    values: tuple[Quantity | float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", tuple(self.values))
+        _require_list(f"Stock('{self.name}')", self.values)
+
+    @property
+    def chosen(self) -> str:
+        """The name."""
+        return self.name
+
+    def options(self, actuator: Assembly) -> Iterator[tuple[str, Assembly]]:
+        """Yield the assembly with each number."""
+        known = actuator.quantities()
+        if self.name not in known:
+            raise unknown_name("stock of", self.name, known)
+        for value in self.values:
+            old = known[self.name]
+            number = value.number if isinstance(value, Quantity) else float(value)
+            source = value.source if isinstance(value, Quantity) else "chosen from the stock that was offered"
+            new = value if isinstance(value, Quantity) else old.with_value(number, source)
+            yield f"{self.name} = {new}", actuator.with_values({self.name: new})
+
+
+@dataclass(frozen=True)
+class RubberStock(StockChoice):
+    """Rubbers of the library to choose from.
+
+    Parameters
+    ----------
+    materials
+        Names in the library; see ``nlsdesign materials``.
+    piece
+        Path of the piece of rubber; decided from the structure if it is left out.
+
+    Raises
+    ------
+    ValueRangeError
+        If the list is empty or has something twice.
+    """
+
+    materials: tuple[str, ...]
+    piece: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "materials", tuple(self.materials))
+        _require_list("RubberStock", self.materials)
+
+    @property
+    def chosen(self) -> str:
+        """The piece of rubber, or that it is the only one."""
+        return self.piece or "rubber"
+
+    def options(self, actuator: Assembly) -> Iterator[tuple[str, Assembly]]:
+        """Yield the assembly with each rubber."""
+        for name in self.materials:
+            yield f"{self.chosen} of {name}", with_rubber(actuator, material(name), piece=self.piece)
+
+
+def combinations(actuator: Assembly, choices: Sequence[StockChoice]) -> list[tuple[str, Assembly]]:
+    """Return every combination of options in words, with its assembly.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    choices
+        In the order in which they are put into the assembly.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are too many.
+    """
+    combined = [("", actuator)]
+    for choice in choices:
+        combined = [
+            (", ".join(filter(None, (label, option))), changed)
+            for label, assembly in combined
+            for option, changed in itertools.islice(choice.options(assembly), _MOST + 1)
+        ]
+        if len(combined) > _MOST:
+            raise ValueRangeError(
+                "free: " + ", ".join(each.chosen for each in choices),
+                f"gives more than {_MOST} combinations",
+                next_step="offer fewer, or free a size without a stock first to see where it wants to be",
+            )
+    return combined
+
+
+def _require_list(what: str, values: Sequence[object]) -> None:
+    if not values:
+        raise ValueRangeError(what, "is an empty list", next_step="name at least one that can be had")
+    for place, value in enumerate(values):
+        if value in values[:place]:
+            raise ValueRangeError(what, f"has {value} twice", next_step="name each once")

@@ -1,0 +1,214 @@
+"""What differs from one made spring to the next, and by how much."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from ...quantity import parse_unit, with_unit
+
+Floats = NDArray[np.float64]
+
+
+def shown_unit(unit: str) -> str:
+    """Return the unit in which a length, an area or a stress of a spring is shown.
+
+    Parameters
+    ----------
+    unit
+        In SI.
+    """
+    return {"m": "mm", "m^2": "mm^2", "Pa": "MPa"}.get(unit, unit)
+
+
+@dataclass(frozen=True)
+class SpreadReading(ABC):
+    """Base of the ways to read a declared spread: as what, and how numbers with it are drawn."""
+
+    @abstractmethod
+    def deviation(self, spread: float) -> float:
+        """Return the standard deviation that belongs to a spread, in the unit of the spread.
+
+        Parameters
+        ----------
+        spread
+            As declared, one-sided.
+        """
+
+    @abstractmethod
+    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+        """Return deviations in units of the standard deviation, shape (count,).
+
+        Parameters
+        ----------
+        generator
+            Source of random numbers.
+        count
+            How many.
+        """
+
+    @abstractmethod
+    def at(self, shares: Floats) -> Floats:
+        """Return the deviations below which given shares of all lie, in units of the standard deviation.
+
+        Parameters
+        ----------
+        shares
+            Between 0 and 1, shape (n,).
+        """
+
+
+@dataclass(frozen=True)
+class NormalSpread(SpreadReading):
+    """A spread is one standard deviation of a normal distribution, as in the prior of a fit."""
+
+    def deviation(self, spread: float) -> float:
+        """Return the spread itself."""
+        return spread
+
+    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+        """Return standard normal numbers."""
+        return generator.standard_normal(count)
+
+    def at(self, shares: Floats) -> Floats:
+        """Return quantiles of the standard normal distribution."""
+        result: Floats = ndtri(shares)
+        return result
+
+
+@dataclass(frozen=True)
+class UniformSpread(SpreadReading):
+    """A spread is a bound, and every number within it is equally likely.
+
+    Source: JCGM 2008, 4.3.7 (the standard deviation is the half width over √3).
+    """
+
+    def deviation(self, spread: float) -> float:
+        """Return spread/√3."""
+        return spread / math.sqrt(3.0)
+
+    def drawn(self, generator: np.random.Generator, count: int) -> Floats:
+        """Return numbers between −√3 and √3."""
+        return generator.uniform(-math.sqrt(3.0), math.sqrt(3.0), count)
+
+    def at(self, shares: Floats) -> Floats:
+        """Return quantiles between −√3 and √3."""
+        return math.sqrt(3.0) * (2.0 * shares - 1.0)
+
+
+@dataclass(frozen=True)
+class Cause(ABC):
+    """Base of what differs from one made spring to the next.
+
+    Parameters
+    ----------
+    name
+        Full name of the number, of the row of numbers, or of what is not a number of the model.
+    nominal
+        Value in SI; 1 where the deviation is relative.
+    deviation
+        Standard deviation in SI; relative where ``unit`` is ``"1"`` and several numbers move together.
+    unit
+        Unit in which both are shown.
+    source
+        Where the deviation comes from: declared, given, or assumed with a reason.
+    """
+
+    name: str
+    nominal: float
+    deviation: float
+    unit: str
+    source: str
+
+    @property
+    def assumed(self) -> bool:
+        """Whether the deviation is an assumption of this package."""
+        return self.source.startswith("assumed")
+
+    @property
+    def size(self) -> str:
+        """The standard deviation as text, in per cent where it is relative."""
+        if self.unit == "1":
+            return f"{100 * self.deviation:.3g} %"
+        return with_unit(f"{self.deviation / parse_unit(self.unit).factor:.3g}", self.unit)
+
+    def __str__(self) -> str:
+        return f"{self.name} ± {self.size} ({self.source})"
+
+
+@dataclass(frozen=True)
+class NumberCause(Cause):
+    """Numbers behind the cam that move together.
+
+    Parameters
+    ----------
+    numbers
+        Pairs of parameter name and its deviation in SI per standard deviation of the cause.
+    """
+
+    numbers: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class AnchorCause(Cause):
+    """An anchor that stands nearer or farther while the made contour stays the same."""
+
+
+@dataclass(frozen=True)
+class WaveCause(Cause):
+    """An error of the contour's support function, a·cos(kπφ/φ_e) over the direction φ of the cable.
+
+    With k = 0 it is an offset: a tool of another radius, or a thicker cable.
+
+    Parameters
+    ----------
+    order
+        k.
+    """
+
+    order: int
+
+
+@dataclass(frozen=True)
+class ProfileCause(Cause):
+    """Declared numbers of the cam: the contour deviates as the lever arm changes with them.
+
+    Parameters
+    ----------
+    numbers
+        Pairs of parameter name and its deviation in SI per standard deviation of the cause.
+    """
+
+    numbers: tuple[tuple[str, float], ...]
+
+
+def draw_deviations(causes: Sequence[Cause], count: int, *, seed: int, reading: SpreadReading) -> Floats:
+    """Return independent deviations in units of their standard deviations.
+
+    Each cause draws from a generator of its own, seeded by the seed and its name, so that another cause more
+    or less, or another design with the same names, changes no other deviation.
+
+    Parameters
+    ----------
+    causes
+        In the order of the columns.
+    count
+        Number of draws.
+    seed
+        Any whole number from zero.
+    reading
+        How spreads are read.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (count, causes).
+    """
+    columns = [reading.drawn(np.random.default_rng([seed, *cause.name.encode()]), count) for cause in causes]
+    return np.column_stack(columns) if columns else np.zeros((count, 0))

@@ -1,0 +1,117 @@
+"""What made springs do: the torque error by cause, and the torque of most of them over the angle."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..design import ToleranceResult
+from ..errors import ValueRangeError
+from .number_text import significant
+from .style import BLUE, GRID, INK, MUTED, SURFACE, VERMILLION, described, legend, panels, styled
+
+_MOST_CAUSES = 12
+
+
+@styled
+def tolerance_bars(result: ToleranceResult) -> Figure:
+    """Draw the 95 % quantile of the torque error: of all causes, after each trim, and of each cause alone.
+
+    The lines at the bars of all causes are confidence intervals of 95 %.
+
+    Parameters
+    ----------
+    result
+        Of a tolerance analysis.
+
+    Raises
+    ------
+    ValueRangeError
+        If nothing deviates.
+    """
+    if not result.causes:
+        raise ValueRangeError(
+            "tolerance", "nothing deviates, so there is nothing to draw", next_step="leave this figure out"
+        )
+    built, causes = result.quantiles[-1], result.causes[:_MOST_CAUSES]
+    whole = [("all causes, as built", built)]
+    whole += [(f"all, {each.name} trimmed", each.quantiles[-1]) for each in result.trims]
+    names = [name for name, _ in whole] + [f"{each.cause.name} alone, ± {each.cause.size}" for each in causes]
+    figure, (axes,) = panels(height=1.1 + 0.27 * len(names))
+    places = -np.arange(len(names), dtype=float)
+    tones = [MUTED.light, *([VERMILLION.light] * len(result.trims)), *([BLUE.light] * len(causes))]
+    hatches = ["", *(["///"] * len(result.trims)), *([""] * len(causes))]
+    values = [1e3 * each.value for _, each in whole] + [1e3 * each.alone for each in causes]
+    bars = axes.barh(places, values, 0.66, color=tones, edgecolor=SURFACE.light)
+    for bar, hatch in zip(bars, hatches, strict=True):
+        bar.set_hatch(hatch)
+    ends = [value for value in values]
+    for k, (_, each) in enumerate(whole):
+        upper = each.upper if np.isfinite(each.upper) else each.value
+        axes.hlines(places[k], 1e3 * each.lower, 1e3 * upper, color=INK.light, linewidth=1.3)
+        ends[k] = 1e3 * upper
+    for place, value, end in zip(places, values, ends, strict=True):
+        axes.annotate(
+            significant(value, 3), (end, place), (4, 0), color=INK.light, fontsize=8, va="center",
+            textcoords="offset points",
+        )  # fmt: skip
+    axes.set_yticks(places, names)
+    axes.grid(visible=False, axis="y")
+    axes.set_ylim(places[-1] - 0.6, 0.6)
+    axes.margins(x=0.1)
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel("95 % quantile of the rms torque error in mN·m")
+    axes.set_title(f"{len(result.errors)} made springs")
+    best = min((each.value, name) for name, each in whole)
+    return described(
+        figure,
+        f"95 % quantile of the rms torque error of {len(result.errors)} made springs: "
+        f"{significant(1e3 * built.value, 3)} mN·m as built, {significant(1e3 * best[0], 3)} mN·m at best "
+        f"({best[1]}). Largest cause alone: {causes[0].cause.name}, "
+        f"{significant(1e3 * causes[0].alone, 3)} mN·m.",
+    )
+
+
+@styled
+def torque_band(result: ToleranceResult) -> Figure:
+    """Draw the band within which 90 % of the made springs lie at each angle, as built and after a trim.
+
+    Parameters
+    ----------
+    result
+        Of a tolerance analysis.
+    """
+    figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.6, 1])
+    degrees, wanted = np.degrees(result.angles), result.target.torque(result.angles)
+    bands = [("as built", result.band, MUTED.light, "")]
+    bands += [(f"{each.name} trimmed", each.band, VERMILLION.light, "//") for each in result.trims[:1]]
+    for label, band, tone, hatch in bands:
+        for axes, scale, off in ((upper, 1.0, 0.0 * wanted), (lower, 1e3, wanted)):
+            low, middle, high = (scale * (row - off) for row in band)
+            axes.fill_between(
+                degrees, low, high, color=tone, alpha=0.28, hatch=hatch, edgecolor=tone,
+                label=f"90 % of the springs, {label}",
+            )  # fmt: skip
+            axes.plot(degrees, middle, color=tone, linewidth=1.2)
+    _targeted(upper, degrees, wanted)
+    lower.axhline(0.0, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)))
+    lower.grid(color=GRID.light)
+    upper.set_ylabel("torque in N·m")
+    upper.set_title("Torque of made springs")
+    lower.set_ylabel("error in mN·m")
+    lower.set_title("Made minus target")
+    lower.set_xlabel("angle in degrees")
+    legend(upper, columns=2)
+    widest = [float(np.max(band[2] - band[0])) for _, band, _, _ in bands]
+    after = f", {significant(1e3 * widest[1], 3)} mN·m after the trim" if len(widest) > 1 else ""
+    return described(
+        figure,
+        f"Band of the torque over the angle up to {degrees[-1]:.0f}° within which 90 % of the made springs "
+        f"lie, with the target; at most {significant(1e3 * widest[0], 3)} mN·m wide as built{after}. "
+        "Errors below.",
+    )
+
+
+def _targeted(axes: Axes, degrees: np.ndarray, wanted: np.ndarray) -> None:
+    axes.plot(degrees, wanted, color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target")
