@@ -188,7 +188,7 @@ def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
 
 
 def test_a_torque_band_is_a_limit() -> None:
-    """The least mean square error has a peak of 47 mN·m; a band of 40 mN·m cuts it off, at the nodes of the contour."""
+    """The least mean square error peaks at 47 mN·m; a band of 40 mN·m cuts it off, at the nodes."""
     angles = np.linspace(0.0, TARGET.last_angle, 60)
     wide = TorqueBand(
         angles=tuple(angles),

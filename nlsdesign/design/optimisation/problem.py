@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -19,7 +18,6 @@ from ..curves.target import Target
 from ..statics.declared_cam import declared_cam
 from ..statics.energy import closed_form
 from ..statics.equilibrium import ElasticLaw, elastic_law
-from ..statics.relaxing_law import RelaxingLaw, relaxing_law
 from .design_point import DesignPoint, Stretched
 from .program import Rows
 from .shape import ContourVariables, Shape, given, parallel, through_centre
@@ -184,16 +182,11 @@ def design_problem(
         contour, shape = parallel(target.last_angle, arm)
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
     sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
-
-    @cache
-    def relaxing() -> RelaxingLaw:
-        return relaxing_law(model, spring)
-
     return _lifted(
         DesignProblem(
             law=law,
             variables=(*scalars.values(), *(contour.all() if contour else ())),
-            design=_design(law, target, shape, parameters, (relaxing, made.through_centre)),
+            design=_design(model, law, target, shape, parameters),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
@@ -288,11 +281,7 @@ def _lifted(problem: DesignProblem) -> DesignProblem:
 
 
 def _design(
-    law: ElasticLaw,
-    target: Target,
-    shape: Shape,
-    parameters: dict[str, Expression],
-    more: tuple[Callable[[], RelaxingLaw], bool],
+    model: FlatModel, law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]
 ) -> DesignPoint:
     cam = law.cam
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
@@ -323,7 +312,8 @@ def _design(
         torque_errors=parameters[cam.elements] * shape.lever_arms * forces - wanted,
         parameters=parameters,
         element=element,
-        relaxing=more[0],
-        through_centre=more[1],
+        through_centre=shape.through_centre,
         shown_units={v.name: _SHOWN.get(v.unit, v.unit) for v in law.parameters},
+        model=model,
+        law=law,
     )

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
-from ...components.core.element import Element
 from ...errors import ConvergenceError, InfeasibleError, NlsError, ValueRangeError
 from ...model import flatten
 from ...model.roles import series_cam
 from ...processes import parallel_map
 from ..curves.target import Target
+from ..statics.smooth_cables import with_smooth_cables
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
 from .design_search import Question
@@ -135,7 +135,8 @@ class Wanted:
         ArrangementError
             If the structure does not say which spring is meant.
         """
-        model = flatten(_with_smooth_cables(actuator))
+        # The finished design is measured on the assembly as it is declared.
+        model = flatten(with_smooth_cables(actuator))
         names = series_cam(model, self.spring)
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
         question = Question(
@@ -209,18 +210,6 @@ class Wanted:
 
 def _no_word() -> None:
     """Say nothing: progress is told for each combination."""
-
-
-def _with_smooth_cables(actuator: Assembly) -> Assembly:
-    """Return the assembly with every cable that goes slack in its smooth form, which an optimiser can follow.
-
-    Within the range of a design the cable is taut, where the two forms agree; the finished design is measured
-    on the assembly as it is declared.
-    """
-    for path, part in actuator.walk():
-        if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
-            actuator = actuator.with_part(path, part.smooth())
-    return actuator
 
 
 def _best(outcomes: Sequence[Solution]) -> int:

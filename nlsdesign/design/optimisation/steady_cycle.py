@@ -142,7 +142,7 @@ def steady_cycle(design: DesignPoint, frequency: float, amplitude: float | None 
     ArrangementError
         If the rubber relaxes by a law that is not affine in its states.
     """
-    last, law = design.target.last_angle, design.relaxing()
+    last, law = design.target.last_angle, design.relaxing
     if amplitude is not None and not _SHORTEST * last <= amplitude <= last * (1 + 1e-9):
         ends = with_unit(f"[{_SHORTEST * last:.4g}, {last:.4g}]", "rad")
         raise ValueRangeError(

@@ -14,6 +14,7 @@ from ...errors import ValueRangeError
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target
+from ..statics.smooth_cables import with_smooth_cables
 from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit
 from .declared_spreads import SpreadRules, spring_causes
 from .made_spring import MadeSpring, made_spring
@@ -61,7 +62,8 @@ def tolerance_analysis(
     Parameters
     ----------
     spring
-        The actuator, as declared or flat.
+        The actuator, as declared or flat; declared, its cables that go slack take their smooth form, which is
+        much quicker.
     target
         Torque curve.
     name
@@ -105,7 +107,7 @@ def tolerance_analysis(
     """
     _checked("draws", draws, _FEWEST, _MOST)
     _checked("seed", seed, 0, 2**63)
-    model = flatten(spring) if isinstance(spring, Assembly) else spring
+    model = flatten(with_smooth_cables(spring)) if isinstance(spring, Assembly) else spring
     rules, cam = rules or SpreadRules(), series_cam(model, name)
     chosen = [Trim(cam.pretension)] if trims is None else list(trims)
     columns = [trim.column(model, cam) for trim in chosen]

@@ -79,8 +79,8 @@ class Trim:
         size = 0.1 * abs(variable.start) or 1e-3
         name, unit, source = f"trim of {self.name}", variable.unit, "set after assembly"
         if self.name in anchored:
-            return AnchorCause(name, variable.start, size, unit, source), (ends[0], ends[1])
-        moved = NumberCause(name, variable.start, size, unit, source, ((self.name, size),))
+            return AnchorCause(name, variable.start, size, unit, source, False), (ends[0], ends[1])
+        moved = NumberCause(name, variable.start, size, unit, source, False, ((self.name, size),))
         return moved, (ends[0], ends[1])
 
 
