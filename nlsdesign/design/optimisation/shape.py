@@ -120,7 +120,9 @@ def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
     p, slopes, arcs, directions = _support(variables, arm.value, ca.SX(last_angle))
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     rows = (Rows(p / size, 0.0, ca.inf),)
-    return variables, Shape(directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False)
+    return variables, Shape(
+        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False
+    )
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
