@@ -273,7 +273,7 @@ def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> Pa
     search, measures = ladder.search, ladder.measures
     solved = sorted((each for each in reached if each.outcome.solved), key=lambda each: tuple(each.values))
     left_out = [
-        LeftOut(_said(measures, each.bounds), f"IPOPT stopped with '{each.outcome.status}'")
+        LeftOut(_bounds_text(measures, each.bounds), f"IPOPT stopped with '{each.outcome.status}'")
         for each in reached
         if not each.outcome.solved
     ]
@@ -285,7 +285,7 @@ def _front(actuator: Assembly, ladder: _Ladder, reached: Sequence[_Tried]) -> Pa
         same = [other for other in kept if np.all(np.abs(other.values - each.values) <= 1e-5 * scale)]
         if better or same:
             why = "another point betters it" if better else "it is the same design as another point"
-            left_out.append(LeftOut(_said(measures, each.bounds), why))
+            left_out.append(LeftOut(_bounds_text(measures, each.bounds), why))
         else:
             kept.append(each)
     return ParetoFront(
@@ -317,7 +317,7 @@ def _point(search: Search, tried: _Tried) -> FrontPoint:
     )
 
 
-def _said(measures: Sequence[GoalMeasure], bounds: Sequence[float]) -> str:
+def _bounds_text(measures: Sequence[GoalMeasure], bounds: Sequence[float]) -> str:
     def parts() -> Iterator[str]:
         for measure, bound in zip(measures[1:], bounds, strict=True):
             if np.isfinite(bound):

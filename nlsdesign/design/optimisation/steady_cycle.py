@@ -268,8 +268,8 @@ def _affine(law: RelaxingLaw) -> tuple[Callable[[Expression, Expression, Express
     function = ca.Function("affine", [extension, rate, parameters], [matrix, constant])
 
     def at(e: Expression, r: Expression, p: Expression) -> Affine:
-        found = function.call([e, r, p])
-        return found[0], found[1]
+        matrix_there, constant_there = function.call([e, r, p])
+        return matrix_there, constant_there
 
     return at, depends(ca.vertcat(ca.vec(matrix), constant), rate)
 
