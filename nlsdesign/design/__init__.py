@@ -29,8 +29,10 @@ from .drawing.machined_cam import (
 from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
-from .optimisation.checks import torque_check
+from .optimisation.checks import torque_check, torque_sensitivity
+from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
+from .optimisation.front import FrontPoint, ParetoFront
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -48,8 +50,10 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
-from .optimisation.result import CamDesign, LimitState, TorqueCheck
+from .optimisation.pareto import pareto
+from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
+from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
@@ -67,6 +71,7 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "BoltCircle",
+    "BothStrokes",
     "CamDesign",
     "CamFit",
     "CamPart",
@@ -78,13 +83,18 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "ElasticLaw",
+    "EnergyLost",
     "ExponentialTorque",
     "FerruleSeat",
+    "FrontPoint",
     "Goal",
     "Hole",
+    "InsensitiveStiffness",
     "LeastEnergy",
+    "LeastMass",
     "LeastPeakPower",
     "LeastRubber",
+    "LeastSize",
     "Limit",
     "LimitState",
     "MachinedCam",
@@ -105,6 +115,7 @@ __all__ = [
     "OneBatch",
     "OneSidedSpring",
     "OverTravel",
+    "ParetoFront",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
@@ -154,6 +165,7 @@ __all__ = [
     "machined_cam",
     "motor_and_gear",
     "motor_cycle",
+    "pareto",
     "read_band",
     "read_job",
     "read_target",
