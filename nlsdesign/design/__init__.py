@@ -51,6 +51,7 @@ from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
+from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
@@ -128,6 +129,7 @@ __all__ = [
     "TaskGoal",
     "TaskProblem",
     "TaskTarget",
+    "ToleranceQuantile",
     "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
@@ -135,6 +137,7 @@ __all__ = [
     "TorqueWithin",
     "Trim",
     "TrimEffect",
+    "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
     "cam_from_profile",
