@@ -43,7 +43,7 @@ FAR_OFF = PowerTorque(coefficient=4.0, exponent=1.5, angle=0.9)
 
 
 def own_torque(machine: Assembly = MACHINE) -> TabulatedTorque:
-    """The root of the goal for a cam as it is declared; only the pretension is free, and it stays."""
+    """What the spring gives without deviations, as a target: then the spreads make most of the error."""
     angles = np.linspace(0.0, FAR_OFF.last_angle, 60)
     torques = equilibrium_torque(flatten(machine), None, angles)
     return TabulatedTorque(angles=tuple(angles), torques=(0.0, *torques[1:]))
