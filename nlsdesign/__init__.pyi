@@ -55,6 +55,7 @@ from .design import equilibrium_torque as equilibrium_torque
 from .design import motor_and_gear as motor_and_gear
 from .design import read_target as read_target
 from .design import read_task as read_task
+from .design import tolerance_analysis as tolerance_analysis
 from .design import write_drawings as write_drawings
 from .discrepancy import diagnose as diagnose
 from .discrepancy import effects as effects

@@ -29,7 +29,7 @@ from .drawing.machined_cam import (
 from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
-from .optimisation.checks import torque_check, torque_sensitivity
+from .optimisation.checks import torque_check
 from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
 from .optimisation.front import FrontPoint, ParetoFront
@@ -51,11 +51,12 @@ from .optimisation.limits import (
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
 from .optimisation.pareto import pareto
-from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
+from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
@@ -140,6 +141,7 @@ __all__ = [
     "TaskGoal",
     "TaskProblem",
     "TaskTarget",
+    "ToleranceQuantile",
     "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
@@ -147,6 +149,7 @@ __all__ = [
     "TorqueWithin",
     "Trim",
     "TrimEffect",
+    "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
     "UnmakeablePart",

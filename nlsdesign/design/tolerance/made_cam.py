@@ -86,7 +86,8 @@ class MadeCam:
     @cached_property
     def _slopes(self) -> Floats:
         """P' without errors at the angles."""
-        first = self.table(self.angles, 1)
+        # Within the change of sides at angle zero the slope is none of the contour's.
+        first = self.table(np.maximum(self.angles, self.angles[1]), 1)
         slopes: Floats = first / (1.0 + first / np.sqrt(self.anchor**2 - self.lever_arms**2))
         return slopes
 
