@@ -40,7 +40,6 @@ from .control import ClosedLoop as ClosedLoop
 from .control import torque_controller as torque_controller
 from .deck import load_deck as load_deck
 from .design import ExponentialTorque as ExponentialTorque
-from .design import MachinedOneSidedCam as MachinedOneSidedCam
 from .design import MachinedTwoSidedCam as MachinedTwoSidedCam
 from .design import MaximumCamRadius as MaximumCamRadius
 from .design import MaximumStrain as MaximumStrain

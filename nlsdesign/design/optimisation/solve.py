@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
-from ...errors import ConvergenceError, InfeasibleError, NlsError, ValueRangeError
+from ...errors import ConvergenceError, InfeasibleError, NlsError
 from ...model import flatten
 from ...model.roles import series_cam
 from ...processes import parallel_map
@@ -22,7 +22,7 @@ from .problem import contour_names
 from .program import Solution
 from .result import Alternative, CamDesign
 from .settings import DesignSettings
-from .stock import StockChoice, combinations
+from .stock import StockChoice, combinations, require_once
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
@@ -89,12 +89,7 @@ def design_cam(
     """
     choices = [each for each in free or () if isinstance(each, StockChoice)]
     names = None if free is None else tuple(each for each in free if isinstance(each, str))
-    for each in choices:
-        if each.chosen in (names or ()):
-            raise ValueRangeError(
-                f"free: '{each.chosen}'", "is free and offered from a stock at once",
-                next_step="leave its name or its stock out",
-            )  # fmt: skip
+    require_once(names or (), choices)
     wanted = Wanted(target, names, tuple(keep), spring, tuple(goals))
     if not choices:
         return wanted.designed(actuator, settings)
