@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ValueRangeError
+from ..errors import NlsError, ValueRangeError
 from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
 from .units import parse_number
 
@@ -72,10 +72,16 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
             settings=_with_progress(job, steps.note),
         )
     files = _written(designed, out)
+    remarks: list[str] = []
+    if designed.met:
+        with steps.step("drawings"):
+            files += _drawn(designed, job, deck_name, out, remarks)
     if as_json:
-        show_json({**_numbers(designed), "files": files})
+        show_json({**_numbers(designed), "remarks": remarks, "files": files})
     else:
         _show(designed, files)
+        for remark in remarks:
+            click.echo(remark)
     sys.exit(0 if designed.met else 1)
 
 
@@ -137,11 +143,11 @@ def _with_progress(job: DesignJob, note: Callable[[str], None]) -> Any:
 
     done = [0]
 
-    def told() -> None:
+    def progress() -> None:
         done[0] += 1
         note(f"{done[0]} done")
 
-    return replace(job.settings, progress=told)
+    return replace(job.settings, progress=progress)
 
 
 def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Target:
@@ -167,7 +173,6 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     import json
 
     from ..components.assembly.deck_writer import write_deck
-    from ..design import write_drawings
     from ..figures import design_picture, limit_margins, tolerance_bars, torque_against_target, write_figures
     from ..writing import make_folder, write_text
 
@@ -185,10 +190,43 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
         pictures["margins"] = limit_margins(designed)
     if designed.tolerance is not None and designed.tolerance.causes:
         pictures["tolerance"] = tolerance_bars(designed.tolerance)
-    files = [model, numbers, *write_figures(out, pictures)]
-    if designed.met:
-        files += write_drawings(out, designed.contour, note=f"design {designed.fingerprint}")
-    return files
+    return [model, numbers, *write_figures(out, pictures)]
+
+
+def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remarks: list[str]) -> list[Path]:
+    """Write the drawings of the machined part, or of the contour alone where no part can be made of it."""
+    import numpy as np
+
+    from ..design import machined_cam, write_drawings
+    from ..figures import InspectionRow, TitleBlock, workshop_drawing, write_figures
+
+    note = f"design {designed.fingerprint}"
+    try:
+        machined = machined_cam(designed, job)
+        part = machined.part(designed.contour)
+    except NlsError as error:
+        # The contour is worth having even where hub, channel and cable do not fit it yet.
+        remarks.append(f"no machined part, only the line of the cable's centre: {error}")
+        return write_drawings(out, designed.contour, note=note)
+    check, curves = designed.check, designed.curves
+    angles = np.linspace(0.0, designed.target.last_angle, 11)
+    rows = [
+        InspectionRow(
+            float(angle),
+            float(np.interp(angle, check.angles, check.torques)),
+            float(np.interp(angle, curves.angles, curves.lever_arms)),
+            float(np.interp(angle, curves.angles, curves.forces)),
+        )
+        for angle in angles
+    ]
+    title = TitleBlock(title="cam", deck=deck_name, fingerprint=designed.fingerprint)
+    page = workshop_drawing(part, title=title, rows=rows)
+    files = write_drawings(out, designed.contour, machined=machined, note=note)
+    return [
+        *files,
+        *write_figures(out, {"drawing": page}),
+        *write_figures(out, {"drawing": page}, suffix=".pdf"),
+    ]
 
 
 def _numbers(designed: CamDesign) -> dict[str, Any]:

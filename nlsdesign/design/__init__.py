@@ -27,9 +27,12 @@ from .drawing.machined_cam import (
     MachinedTwoSidedCam,
 )
 from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
 from .optimisation.checks import torque_check
+from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
+from .optimisation.front import FrontPoint, ParetoFront
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -47,14 +50,18 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
+from .optimisation.pareto import pareto
 from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
+from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
+from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .statics.unmakeable import UnmakeablePart, unmakeable_parts
 from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
 from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
@@ -65,6 +72,7 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "BoltCircle",
+    "BothStrokes",
     "CamDesign",
     "CamFit",
     "CamPart",
@@ -76,13 +84,18 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "ElasticLaw",
+    "EnergyLost",
     "ExponentialTorque",
     "FerruleSeat",
+    "FrontPoint",
     "Goal",
     "Hole",
+    "InsensitiveStiffness",
     "LeastEnergy",
+    "LeastMass",
     "LeastPeakPower",
     "LeastRubber",
+    "LeastSize",
     "Limit",
     "LimitState",
     "MachinedCam",
@@ -103,6 +116,7 @@ __all__ = [
     "OneBatch",
     "OneSidedSpring",
     "OverTravel",
+    "ParetoFront",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
@@ -127,6 +141,7 @@ __all__ = [
     "TaskGoal",
     "TaskProblem",
     "TaskTarget",
+    "ToleranceQuantile",
     "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
@@ -134,8 +149,10 @@ __all__ = [
     "TorqueWithin",
     "Trim",
     "TrimEffect",
+    "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
+    "UnmakeablePart",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
@@ -148,8 +165,10 @@ __all__ = [
     "equilibrium_torque",
     "fingerprint",
     "job_of",
+    "machined_cam",
     "motor_and_gear",
     "motor_cycle",
+    "pareto",
     "read_band",
     "read_job",
     "read_target",
@@ -158,6 +177,7 @@ __all__ = [
     "scan_gear_ratio",
     "tolerance_analysis",
     "torque_check",
+    "unmakeable_parts",
     "walking_task",
     "write_drawings",
 ]

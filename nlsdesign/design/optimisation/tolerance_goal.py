@@ -13,7 +13,7 @@ derivatives are exact.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -21,11 +21,14 @@ import numpy as np
 from scipy.special import ndtri
 
 from ...errors import ArrangementError, ValueRangeError
+from ...quantity import Quantity
 from ...symbolic import Expression
+from ..curves.numbers import in_si, plain
 from ..tolerance.causes import AnchorCause, Cause, NumberCause, ProfileCause, WaveCause
 from ..tolerance.declared_spreads import SpreadRules, spring_causes
 from .design_point import DesignPoint
 from .goals import Goal
+from .limits import Bound, Limit
 
 _LEAST = 1e-12
 """Addend of sizes that may vanish, relative to the square of the largest torque."""
@@ -88,13 +91,14 @@ class ToleranceQuantile(Goal):
             If a spread is given for a name that does not exist.
         """
         sensitivities = _Sensitivities(design)
-        causes = spring_causes(design.model, design.cam.drive, self.rules)
-        rows = [sensitivities.row(cause) for cause in causes]
+        rows = _rows(design, sensitivities, self.rules)
         trims = (design.cam.pretension,) if self.trims is None else self.trims
         tangents = [sensitivities.tangent(name) for name in trims]
         least = _LEAST * design.target.largest**2
         weights, errors = _weights(design), design.torque_errors
-        left = ca.horzcat(*[row for row in rows if not row.is_zero()])
+        if not rows:
+            return ca.dot(weights, errors**2)
+        left = ca.horzcat(*rows)
         for tangent in _orthogonal(tangents, weights):
             along = (weights * tangent).T @ left / (ca.dot(weights, tangent**2) + least)
             left = left - tangent @ along
@@ -104,6 +108,76 @@ class ToleranceQuantile(Goal):
         peaked = self.rules.reading.fourth_moment - 3.0
         variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + peaked * ca.sumsqr(ca.diag(gram))
         return _quantile(mean, variance + least**2, float(ndtri(self.share)))
+
+
+@dataclass(frozen=True)
+class TrimRoom(Limit):
+    """Room for the trim: the number as set on most springs stays between two ends.
+
+    What is set after assembly differs from spring to spring with a standard deviation that follows to first
+    order from the spreads; ``deviations`` of them are kept free on both sides. Source: definition.
+
+    Parameters
+    ----------
+    name
+        Full name of the number that is trimmed.
+    lowest, highest
+        Ends in the unit of the number.
+    deviations
+        Standard deviations of the trim that are kept free. Soft springs need more than the first order says,
+        so that 2 leave room for about 93 % of them.
+    rules
+        How declared spreads are read.
+
+    Raises
+    ------
+    ValueRangeError
+        If the ends are in the wrong order, or the deviations are negative.
+    """
+
+    name: str
+    lowest: Quantity | float
+    highest: Quantity | float
+    deviations: float = 3.0
+    rules: SpreadRules = field(default_factory=SpreadRules)
+
+    def __post_init__(self) -> None:
+        in_si("deviations", self.deviations, "1", maximum=10.0)
+        if not plain(self.lowest) < plain(self.highest):
+            raise ValueRangeError(
+                f"TrimRoom for '{self.name}' from {self.lowest} to {self.highest}", "has no room",
+                next_step="give a lowest below the highest",
+            )  # fmt: skip
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield both sides.
+
+        Raises
+        ------
+        ArrangementError
+            If the number cannot be trimmed.
+        UnitError
+            If an end is given in a unit of something else.
+        """
+        sensitivities, weights = _Sensitivities(design), _weights(design)
+        tangent = sensitivities.tangent(self.name)
+        rows = _rows(design, sensitivities, self.rules)
+        along = ca.vertcat(ca.SX(0), *[ca.dot(weights, tangent * row) for row in rows])
+        least = _LEAST * design.target.largest**2
+        away = self.deviations * ca.sqrt(ca.sumsqr(along) + least**2) / (ca.dot(weights, tangent**2) + least)
+        number, unit = design.parameters[self.name], design.model.variable(self.name).unit
+        shown = design.shown_units[self.name]
+        for end, upper in ((self.lowest, False), (self.highest, True)):
+            value = in_si(f"TrimRoom of {self.name}", end, unit)
+            expression = number + away if upper else number - away
+            words = f"{self.name} as trimmed"
+            yield Bound("TrimRoom", words, expression, value, upper, shown, max(abs(value), 1e-3))
+
+
+def _rows(design: DesignPoint, sensitivities: _Sensitivities, rules: SpreadRules) -> list[Expression]:
+    causes = spring_causes(design.model, design.cam.drive, rules)
+    rows = [sensitivities.row(cause) for cause in causes]
+    return [row for row in rows if not row.is_zero()]
 
 
 def _weights(design: DesignPoint) -> Expression:
