@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
+from nlsdesign.design import CamDesign, CamPart, Cause, MachinedCam, ToleranceResult
 from nlsdesign.errors import ValueRangeError
 from nlsdesign.report import FigureSection, Section, TableSection
 
@@ -145,7 +145,7 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             caption="95 % of the springs stay below.",
             means=f"95 % of {len(result.errors)} made springs are within {1e3 * built.value:.0f} mN·m rms as "
             f"built{after}. {advice(result)}",
-            assumed="; ".join(dict.fromkeys(c.cause.source for c in result.causes if c.cause.assumed)),
+            assumed="; ".join(dict.fromkeys(_reason(c.cause) for c in result.causes if c.cause.assumed)),
         ),
         FigureSection(
             "Torque of made springs",
@@ -162,6 +162,10 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             folded=True,
         ),
     ]
+
+
+def _reason(cause: Cause) -> str:
+    return cause.source.removeprefix("assumed: ")
 
 
 def advice(result: ToleranceResult) -> str:

@@ -16,11 +16,8 @@ import nlsdesign as nls
 from nlsdesign.components import (
     Fixed,
     GearedMotor,
-    LinearElastic,
-    Rounded,
-    StrainStiffening,
+    NeoHooke,
     TwoSidedCam,
-    ViscousMaterial,
 )
 from nlsdesign.design import CamDesign, DesignSettings, Limit
 from nlsdesign.report import Chapter, TableSection
@@ -77,17 +74,18 @@ def designed(actuator: nls.Assembly, free: Sequence[str], keep: Sequence[Limit],
 
 
 def spring_of_2014() -> nls.Assembly:
-    """Return the spring of 2014: the moduli printed in 2015, up to 9 mm and with rounded knots."""
-    modulus = nls.quantity(
-        (0.92, 0.58, 0.74, 0.77), "MPa", source="Austin, Schepelmann, Geyer, IROS 2015, printed parameters"
-    )
-    law = StrainStiffening(modulus=modulus, knots=(0.0, 0.016, 0.0848, 0.212), contact=Rounded(width=0.01))
-    relaxing = nls.series(
-        spring=LinearElastic(modulus=nls.quantity(0.58, "MPa")),
-        dashpot=ViscousMaterial(viscosity=nls.quantity(411.0, "Pa*s")),
-    )
+    """Return the spring of 2014: two pieces of PMC-770, neo-Hookean, no relaxation; anchor at 25 mm."""
+    law = NeoHooke(
+        shear_modulus=nls.quantity(
+            0.8456, "MPa", spread=0.15,
+            source="one constant fitted to Schepelmann, Geberth, Geyer, ICRA 2014, Fig. 3, to a stretch of 3",
+        )
+    )  # fmt: skip
+    size = "Schepelmann, Geberth, Geyer, ICRA 2014"
     rubber = nls.specimen(
-        area=nls.quantity(1.0, "cm^2"), rest_length=nls.quantity(12.5, "mm"), stiff=law, relaxing=relaxing
+        area=nls.quantity(1.0, "cm^2", source=size),
+        rest_length=nls.quantity(12.5, "mm", source=size),
+        law=law,
     )
     arm = nls.quantity((10.0,) * 12, "mm", source="assumed: a start; the contour is designed")
     cam = TwoSidedCam(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.design import ClampScrew, DesignSettings, MachinedOneSidedCam, RestLengthRange
+from nlsdesign.design import DesignSettings, FerruleSeat, MachinedOneSidedCam, RestLengthRange
 from nlsdesign.report import Chapter, FileSection
 
 from ._designed import MadeCam, design_sections, make_cam, tolerance_sections, with_machined_contour
@@ -26,8 +26,8 @@ KEEP = (
 MACHINED = MachinedOneSidedCam(
     cable_radius=nls.quantity(0.6, "mm", source="half the diameter of the declared cable"),
     hub_bore=nls.quantity(4.0, "mm", source="assumed: shaft of a joint of this size"),
-    lead_in=nls.quantity(10.0, "mm", source="assumed: room for the clamp"),
-    cable_end=ClampScrew(diameter=nls.quantity(2.05, "mm", source="assumed: core hole of M2.5")),
+    lead_in=nls.quantity(10.0, "mm", source="assumed: room for the ferrule"),
+    cable_end=FerruleSeat(diameter=nls.quantity(3.0, "mm", source="assumed: ferrule for this cable")),
 )
 AT_REST = {
     "spring.pretension": nls.quantity(
