@@ -10,9 +10,17 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.design import CamDesign, CamPart, Cause, MachinedCam, ToleranceResult
 from nlsdesign.errors import ValueRangeError
-from nlsdesign.report import FigureSection, Section, TableSection
+from nlsdesign.report import FigureSection, FileSection, Section, TableSection
 
 INSPECTED = 8  # rows of the torque table on the drawing
+DRAWINGS = {
+    "cam.dxf": "edges for the machine: lines and arcs, in millimetres",
+    "cam.svg": "picture of the part at scale 1:1",
+    "cam.csv": "lines and arcs as a table",
+    "cam_centre_line.csv": "curve of the cable's centre line",
+    "sheet.svg": "page for the workshop, with dimensions and torque table",
+    "sheet.pdf": "the same as PDF",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +139,16 @@ def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
             "declared cable and rubber.",
         ),
     ]
+
+
+def drawing_section(cam: MadeCam) -> Section:
+    """List the drawings, with the cable that they are for."""
+    return FileSection(
+        "Drawings of the cam as it is made",
+        {path: DRAWINGS.get(path.name, "drawing of the cam") for path in cam.files},
+        caption=f"For a cable of {2e3 * cam.part.number('cable_radius'):.2g} mm: edge under the cable, "
+        "run-out, seat of the ferrule, bore.",
+    )
 
 
 def tolerance_sections(result: ToleranceResult) -> list[Section]:

@@ -89,7 +89,7 @@ def spring_of_2014() -> nls.Assembly:
     )
     arm = nls.quantity((10.0,) * 12, "mm", source="assumed: a start; the contour is designed")
     cam = TwoSidedCam(
-        lever_arm=arm, last_angle=nls.quantity(60.0, "deg"), elements=2.0,
+        lever_arm=arm, last_angle=nls.quantity(60.0, "deg"), elements=nls.quantity(2.0, "1"),
         anchor_distance=nls.quantity(25.0, "mm"),
     )  # fmt: skip
     motor = GearedMotor(
@@ -107,28 +107,33 @@ def _use(design: CamDesign, limit: str) -> list[float]:
 def write(out: Path, results: Results) -> None:
     """Write the report."""
     labels = {
-        "2014, pretension free": results.fixed_rubber,
-        "2014, pretension and rubber free": results.free_rubber,
-        "2015, pretension and section free": results.free_section,
-        "2015, rest length free too": results.free_section_and_length,
+        "2014, fixed rubber": results.fixed_rubber,
+        "2014, free rubber": results.free_rubber,
+        "2015, fixed length": results.free_section,
+        "2015, free length": results.free_section_and_length,
     }
     rows = tuple(
         (
             label,
-            "yes" if each.met else "no",
-            f"{1e3 * each.rms:.3g}",
+            "met" if each.met else "missed",
+            1e3 * each.rms,
             f"{each.curves.forces.max():.0f}",
             f"{1e3 * each.contour.radii.max():.1f}",
             f"{1e6 * each.rubber_volume:.1f}",
-            ", ".join(each.active_limits) or "none",
         )
         for label, each in labels.items()
     )
-    heads = ("design", "meets its target", "error, mN·m rms", "cable, N", "cam, mm", "rubber, cm³", "sits on")
+    heads = ("design", "target", "error, mN·m", "cable, N", "cam, mm", "rubber, cm³")
     sections = [section for label, each in labels.items() for section in design_sections(each, of=label)]
     nls.write_report(
         out / "report.html",
-        TableSection("Side by side", heads, rows),
+        TableSection(
+            "Side by side",
+            heads,
+            rows,
+            caption="Rms error; 5 N·m at 53° in all four. Fixed rubber "
+            "has the declared section and rest length, fixed length the declared rest length alone.",
+        ),
         Chapter("The designs"),
         *sections,
         title="Joint design of cam, pretension and rubber",

@@ -11,9 +11,16 @@ from pathlib import Path
 
 import nlsdesign as nls
 from nlsdesign.design import DesignSettings, FerruleSeat, MachinedOneSidedCam, RestLengthRange
-from nlsdesign.report import Chapter, FileSection
+from nlsdesign.report import Chapter
 
-from ._designed import MadeCam, design_sections, make_cam, tolerance_sections, with_machined_contour
+from ._designed import (
+    MadeCam,
+    design_sections,
+    drawing_section,
+    make_cam,
+    tolerance_sections,
+    with_machined_contour,
+)
 
 RUBBER = "spring.cable.rope.rubber"
 FREE = ("spring.cam.contour", f"{RUBBER}.area", f"{RUBBER}.rest_length")
@@ -88,7 +95,7 @@ def write(out: Path, results: Results) -> None:
             f"{1e3 * cam.tolerance.nominal_rms:.0f} mN·m rms that no contour removes.",
         ),
         *tolerance_sections(cam.tolerance),
-        FileSection("Drawings", dict.fromkeys(cam.files, "drawing of the cam")),
+        drawing_section(cam),
         title="A one-sided cam for a finger",
         abstract="Soft when it touches, stiff when it holds; a tendon that pulls to one side only.",
     )

@@ -54,7 +54,7 @@ def design_picture(design: CamDesign) -> Figure:
         panel.set_ylim(low, high + 2.0)
     figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * _MM) + 1.2)
     _dimension_radius(axes[0], design, low + 0.02 * (wide - left) * _MM)
-    axes[1].set_xlabel("distance from the centre in mm")
+    axes[1].set_xlabel(f"distance from the centre in mm{_rubber_note(design)}")
     radius = float(design.contour.radii.max()) * _MM
     return described(
         figure,
@@ -199,6 +199,14 @@ def _pieces(design: CamDesign) -> list[tuple[float, float]]:
     ]
 
 
+def _rubber_note(design: CamDesign) -> str:
+    pieces = _pieces(design)
+    if not pieces:
+        return ""
+    length, area = pieces[0]
+    return f"; rubber unstretched {length * _MM:.1f} mm, {area * _MM**2:.1f} mm² (drawn square)"
+
+
 def _rubber_words(design: CamDesign) -> str:
     pieces = _pieces(design)
     if not pieces:
@@ -208,19 +216,12 @@ def _rubber_words(design: CamDesign) -> str:
 
 
 def _dimension_radius(axes: Axes, design: CamDesign, y: float) -> None:
-    """Dimension the largest radius of the cam, the distance of the anchor and the unstretched rubber."""
+    """Dimension the largest radius of the cam and the distance of the anchor."""
     contour, radius = design.contour, float(design.contour.radii.max()) * _MM
     anchor = float(_end_of_cable(contour, radius / _MM)[0]) * _MM
     _dimension(axes, 0.0, radius, y, f"R {radius:.1f}")
     if contour.anchor_distance * _MM == anchor:
         _dimension(axes, 0.0, -anchor, y, f"anchor {anchor:.1f}")
-    pieces = _pieces(design)
-    if pieces:
-        length, area = pieces[0]
-        axes.annotate(
-            f"rubber, unstretched {length * _MM:.1f} mm, {area * _MM**2:.1f} mm² (drawn square)",
-            (axes.get_xlim()[1], y), fontsize=7.5, color=INK.light, ha="right",
-        )  # fmt: skip
 
 
 def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> None:

@@ -24,7 +24,7 @@ from nlsdesign.report import (
     verdict_sections,
 )
 
-from .._designed import design_sections, tolerance_sections
+from .._designed import design_sections, drawing_section, tolerance_sections
 from .loop_report import loop_sections
 from .observer import STIFFER, WIDER
 from .results import ActuatorResults, Results
@@ -129,28 +129,13 @@ def chapter_of_design(results: Results) -> list[Section]:
         means="The contact point moves outwards, so the lever arm grows and the spring stiffens.",
         assumed="Rubber at rest.",
     )
-    drawings = {path: _DRAWINGS.get(path.name, "drawing of the cam") for path in cam.files}
     return [
         head,
         moved,
         *design_sections(cam.design),
         *tolerance_sections(cam.tolerance),
-        FileSection(
-            "Drawings of the cam as it is made", drawings,
-            caption=f"For a cable of {2e3 * cam.part.number('cable_radius'):.2g} mm: edge under the cable, "
-            "channel between the halves, run-out, seat of the ferrule, bore.",
-        ),
+        drawing_section(cam),
     ]  # fmt: skip
-
-
-_DRAWINGS = {
-    "cam.dxf": "edges for the machine: lines and arcs, in millimetres",
-    "cam.svg": "picture of the part at scale 1:1",
-    "cam.csv": "lines and arcs as a table",
-    "cam_centre_line.csv": "curve of the cable's centre line",
-    "sheet.svg": "page for the workshop, with dimensions and torque table",
-    "sheet.pdf": "the same as PDF",
-}
 
 
 def figure_sections(results: Results) -> list[Section]:
