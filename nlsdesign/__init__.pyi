@@ -40,6 +40,7 @@ from .control import ClosedLoop as ClosedLoop
 from .control import torque_controller as torque_controller
 from .deck import load_deck as load_deck
 from .design import ExponentialTorque as ExponentialTorque
+from .design import MachinedTwoSidedCam as MachinedTwoSidedCam
 from .design import MaximumCamRadius as MaximumCamRadius
 from .design import MaximumStrain as MaximumStrain
 from .design import MaximumStress as MaximumStress

@@ -15,7 +15,7 @@ from .units import parse_number
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
-    from ..design import CamDesign, DesignJob, Target, ToleranceResult
+    from ..design import CamDesign, DesignJob, Target
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _DRAWS = 1000
@@ -48,7 +48,7 @@ _DRAWS = 1000
 @spring_option
 @out_option("out/design")
 @json_option
-def design(deck_name: str, out: Path, as_json: bool, draws: int, **given: Any) -> None:
+def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     """Design cam and rubber for a torque curve; exit status 1 if the design misses its target.
 
     Limits of the declared cable and rubber hold unless one of the same kind is given.
@@ -71,15 +71,17 @@ def design(deck_name: str, out: Path, as_json: bool, draws: int, **given: Any) -
             goals=job.goals,
             settings=_with_progress(job, steps.note),
         )
-    tolerances: ToleranceResult | str = "left out"
-    if draws:
-        with steps.step("tolerance"):
-            tolerances = _tolerance(designed, draws, given["seed"] or 0)
-    files = _written(designed, tolerances, out)
+    files = _written(designed, out)
+    remarks: list[str] = []
+    if designed.met:
+        with steps.step("drawings"):
+            files += _drawn(designed, job, deck_name, out, remarks)
     if as_json:
-        show_json({**_numbers(designed, tolerances), "files": files})
+        show_json({**_numbers(designed), "remarks": remarks, "files": files})
     else:
-        _show(designed, tolerances, files)
+        _show(designed, files)
+        for remark in remarks:
+            click.echo(remark)
     sys.exit(0 if designed.met else 1)
 
 
@@ -129,7 +131,8 @@ def _as_text(given: dict[str, Any]) -> str:
 def _searched(job: DesignJob, given: dict[str, Any]) -> DesignJob:
     from dataclasses import replace
 
-    changes: dict[str, Any] = {name: given[name] for name in ("starts", "seed") if given[name] is not None}
+    names = ("starts", "seed", "draws")
+    changes: dict[str, Any] = {name: given[name] for name in names if given[name] is not None}
     if given["largest_error"] is not None:
         changes["largest_error"] = parse_number(given["largest_error"], "1").number
     return replace(job, settings=replace(job.settings, **changes))
@@ -165,31 +168,18 @@ def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Tar
     return curve.target
 
 
-def _tolerance(designed: CamDesign, draws: int, seed: int) -> ToleranceResult | str:
-    """Return the tolerance analysis, or why there is none: the design stands without it."""
-    from ..design import tolerance_analysis
-
-    try:
-        return tolerance_analysis(
-            designed.actuator, target=designed.target, name=designed.drive, draws=draws, seed=seed
-        )
-    except NlsError as error:
-        return str(error)
-
-
-def _written(designed: CamDesign, tolerances: ToleranceResult | str, out: Path) -> list[Path]:
+def _written(designed: CamDesign, out: Path) -> list[Path]:
     """Write deck, result and pictures; drawings for the workshop only of a design that meets its target."""
     import json
 
     from ..components.assembly.deck_writer import write_deck
-    from ..design import write_drawings
     from ..figures import design_picture, limit_margins, tolerance_bars, torque_against_target, write_figures
     from ..writing import make_folder, write_text
 
     make_folder(out)
     model, numbers = out / "model.toml", out / "design.json"
     write_deck(designed.actuator, model)
-    content = {**_numbers(designed, tolerances), "rows": designed.rows()}
+    content = {**_numbers(designed), "rows": designed.rows()}
     write_text(numbers, json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n")
     curve = {"design": (designed.check.angles, designed.check.torques)}
     pictures: dict[str, Any] = {
@@ -198,18 +188,51 @@ def _written(designed: CamDesign, tolerances: ToleranceResult | str, out: Path) 
     }
     if designed.limits:
         pictures["margins"] = limit_margins(designed)
-    if not isinstance(tolerances, str) and tolerances.causes:
-        pictures["tolerance"] = tolerance_bars(tolerances)
-    files = [model, numbers, *write_figures(out, pictures)]
-    if designed.met:
-        files += write_drawings(out, designed.contour, note=f"design {designed.fingerprint}")
-    return files
+    if designed.tolerance is not None and designed.tolerance.causes:
+        pictures["tolerance"] = tolerance_bars(designed.tolerance)
+    return [model, numbers, *write_figures(out, pictures)]
 
 
-def _numbers(designed: CamDesign, tolerances: ToleranceResult | str) -> dict[str, Any]:
-    spread: Any = tolerances
-    if not isinstance(tolerances, str):
-        spread = {f"{100 * q.share:g} %": q.value for q in tolerances.quantiles}
+def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remarks: list[str]) -> list[Path]:
+    """Write the drawings of the machined part, or of the contour alone where no part can be made of it."""
+    import numpy as np
+
+    from ..design import machined_cam, write_drawings
+    from ..figures import InspectionRow, TitleBlock, workshop_drawing, write_figures
+
+    note = f"design {designed.fingerprint}"
+    try:
+        machined = machined_cam(designed, job)
+        part = machined.part(designed.contour)
+    except NlsError as error:
+        # The contour is worth having even where hub, channel and cable do not fit it yet.
+        remarks.append(f"no machined part, only the line of the cable's centre: {error}")
+        return write_drawings(out, designed.contour, note=note)
+    check, curves = designed.check, designed.curves
+    angles = np.linspace(0.0, designed.target.last_angle, 11)
+    rows = [
+        InspectionRow(
+            float(angle),
+            float(np.interp(angle, check.angles, check.torques)),
+            float(np.interp(angle, curves.angles, curves.lever_arms)),
+            float(np.interp(angle, curves.angles, curves.forces)),
+        )
+        for angle in angles
+    ]
+    title = TitleBlock(title="cam", deck=deck_name, fingerprint=designed.fingerprint)
+    page = workshop_drawing(part, title=title, rows=rows)
+    files = write_drawings(out, designed.contour, machined=machined, note=note)
+    return [
+        *files,
+        *write_figures(out, {"drawing": page}),
+        *write_figures(out, {"drawing": page}, suffix=".pdf"),
+    ]
+
+
+def _numbers(designed: CamDesign) -> dict[str, Any]:
+    spread = {}
+    if designed.tolerance is not None:
+        spread = {f"{100 * q.share:g} %": q.value for q in designed.tolerance.quantiles}
     return {
         "met": designed.met,
         "torque_error_rms": designed.rms,
@@ -223,13 +246,11 @@ def _numbers(designed: CamDesign, tolerances: ToleranceResult | str) -> dict[str
     }
 
 
-def _show(designed: CamDesign, tolerances: ToleranceResult | str, files: Iterable[Path]) -> None:
+def _show(designed: CamDesign, files: Iterable[Path]) -> None:
     limits = (("limit", str(state)) for state in designed.limits)
     show_table("Design", ("what", "value"), [*designed.rows(), *limits])
-    if isinstance(tolerances, str):
-        click.echo(f"tolerance: {tolerances}")
-    else:
-        show_table("Tolerance", ("what", "value"), tolerances.rows())
+    if designed.tolerance is not None:
+        show_table("Tolerance", ("what", "value"), designed.tolerance.rows())
     click.echo("written: " + ", ".join(str(path) for path in files))
     if not designed.met:
         click.echo("no drawings are written of a design that misses its target")

@@ -27,8 +27,9 @@ from .drawing.machined_cam import (
     MachinedTwoSidedCam,
 )
 from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
-from .optimisation.checks import torque_check, torque_sensitivity
+from .optimisation.checks import torque_check
 from .optimisation.defaults import safe_limits
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
@@ -47,7 +48,7 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
-from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
@@ -56,6 +57,7 @@ from .statics.contour import Contour, contour_from_curvature, contour_from_lever
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .statics.unmakeable import UnmakeablePart, unmakeable_parts
 from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
 from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
@@ -111,7 +113,6 @@ __all__ = [
     "QuantileEstimate",
     "RestLengthRange",
     "RubberStock",
-    "Sensitivity",
     "SeparateModuli",
     "SmoothContour",
     "SpreadReading",
@@ -140,6 +141,7 @@ __all__ = [
     "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
+    "UnmakeablePart",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
@@ -152,6 +154,7 @@ __all__ = [
     "equilibrium_torque",
     "fingerprint",
     "job_of",
+    "machined_cam",
     "motor_and_gear",
     "motor_cycle",
     "read_band",
@@ -162,7 +165,7 @@ __all__ = [
     "scan_gear_ratio",
     "tolerance_analysis",
     "torque_check",
-    "torque_sensitivity",
+    "unmakeable_parts",
     "walking_task",
     "write_drawings",
 ]

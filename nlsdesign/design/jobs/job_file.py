@@ -52,6 +52,8 @@ class DesignJob:
         Of the search.
     tolerance, drawing
         The tables of those names, as read.
+    deck
+        The whole file with the places of its names.
     """
 
     path: Path
@@ -63,6 +65,7 @@ class DesignJob:
     settings: DesignSettings
     tolerance: Mapping[str, Any]
     drawing: Mapping[str, Any]
+    deck: Deck
 
 
 def read_job(path: Path | str) -> DesignJob:
@@ -154,6 +157,7 @@ def job_of(text: str, file: Path) -> DesignJob:
         settings=_settings(deck),
         tolerance=_table(deck, "tolerance"),
         drawing=_table(deck, "drawing"),
+        deck=deck,
     )
 
 
@@ -185,7 +189,7 @@ def _target(deck: Deck) -> Target | TaskTarget:
     if name == "file":
         return read_target(deck.path.parent / str(given))
     if name == "TaskTarget":
-        task: TaskTarget = _built(deck, TaskTarget, given, deck.place("target.TaskTarget"))
+        task: TaskTarget = built(deck, TaskTarget, given, deck.place("target.TaskTarget"))
         return task
     (target,) = _objects(deck, "target", Target)  # type: ignore[type-abstract]
     return target
@@ -203,10 +207,28 @@ def _of_kinds(deck: Deck, key: str, base: type[Asked], table: Mapping[str, Any])
         if name not in known:
             raise unknown_name(place, name, known)
         for fields in given if isinstance(given, list) else [given]:
-            yield _built(deck, known[name], fields, place)
+            yield built(deck, known[name], fields, place)
 
 
-def _built(deck: Deck, kind: type, given: object, place: str) -> Any:
+def built(deck: Deck, kind: type, given: object, place: str) -> Any:
+    """Return the object of a table.
+
+    Parameters
+    ----------
+    deck
+        The file.
+    kind
+        A dataclass.
+    given
+        Its fields by name.
+    place
+        For messages.
+
+    Raises
+    ------
+    NlsError
+        If a field is missing, unknown or refused.
+    """
     if not isinstance(given, Mapping):
         raise DeckError(
             place, f"{given!r} is not a table", next_step='write it as {field = "number unit", ...}'
@@ -232,9 +254,13 @@ def _built(deck: Deck, kind: type, given: object, place: str) -> Any:
 def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
     allowed = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
     if isinstance(raw, Mapping):
-        inner = next((each for each in allowed if dataclasses.is_dataclass(each)), None)
-        if isinstance(inner, type):
-            return _built(deck, inner, raw, place)
+        kinds_of = [each for each in allowed if isinstance(each, type) and dataclasses.is_dataclass(each)]
+        named = [each for each in kinds_of if each.__name__ in raw]
+        if named:
+            return built(deck, named[0], raw[named[0].__name__], place)
+        records = [each for each in kinds_of if each is not Quantity]
+        if len(records) == 1:
+            return built(deck, records[0], raw, place)
         if Limit in typing.get_args(hint):
             return tuple(_of_kinds(deck, place, Limit, raw))
         base = next(

@@ -141,7 +141,8 @@ class _Wanted:
 
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
         """Return the best design over all combinations of a stock, with what became of the others."""
-        hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, progress=_no_word)
+        hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
+        hasty = replace(hasty, progress=_no_word)
 
         def one(number: int) -> tuple[Alternative, NlsError | None]:
             label, assembly = options[number]
