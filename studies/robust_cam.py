@@ -109,7 +109,7 @@ def trim_within_strain(design: CamDesign) -> Trim:
 
 
 def _designed(goals: Sequence[Goal]) -> CamDesign:
-    settings = DesignSettings(look_for_size_ranges=False, look_for_remedies=False, =0)
+    settings = DesignSettings(look_for_size_ranges=False, look_for_remedies=False, draws=0)
     return nls.design_cam(
         actuator(), target=TARGET, free=list(FREE), keep=LIMITS, goals=goals, settings=settings
     )
