@@ -116,7 +116,7 @@ class _Wanted:
 
     def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
         """Return the design of one assembly."""
-        model = flatten(_with_smooth_cables(actuator))
+        model = flatten(with_smooth_cables(actuator))
         names = series_cam(model, self.spring)
         free = contour_names(names)[:1] if self.free is None else self.free
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
@@ -172,11 +172,16 @@ def _no_word() -> None:
     """Say nothing: progress is told for each combination."""
 
 
-def _with_smooth_cables(actuator: Assembly) -> Assembly:
+def with_smooth_cables(actuator: Assembly) -> Assembly:
     """Return the assembly with every cable that goes slack in its smooth form, which an optimiser can follow.
 
     Within the range of a design the cable is taut, where the two forms agree; the finished design is measured
     on the assembly as it is declared.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
     """
     for path, part in actuator.walk():
         if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
