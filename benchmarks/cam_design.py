@@ -39,8 +39,9 @@ from nlsdesign.design.optimisation.defaults import safe_limits, with_defaults
 from nlsdesign.design.optimisation.design_search import Question, Search
 from nlsdesign.design.optimisation.limits import Limit
 from nlsdesign.design.optimisation.program import Rows
-from nlsdesign.design.optimisation.solve import GOALS, USUAL, with_smooth_cables
+from nlsdesign.design.optimisation.solve import GOALS, USUAL
 from nlsdesign.design.optimisation.starts import starts
+from nlsdesign.design.statics.smooth_cables import with_smooth_cables
 from nlsdesign.model.roles import series_cam
 
 Floats = NDArray[np.float64]

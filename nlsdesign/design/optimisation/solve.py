@@ -115,7 +115,6 @@ class Wanted:
     spring: str | None
     goals: tuple[Goal, ...]
 
-<<<<<<< HEAD
     def question(self, actuator: Assembly, settings: DesignSettings) -> tuple[Question, tuple[str, ...]]:
         """Return the question for one assembly, and the names of what is free.
 
@@ -132,10 +131,6 @@ class Wanted:
             If the structure does not say which spring is meant.
         """
         # The finished design is measured on the assembly as it is declared.
-=======
-    def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
-        """Return the design of one assembly."""
->>>>>>> bench
         model = flatten(with_smooth_cables(actuator))
         names = series_cam(model, self.spring)
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
@@ -213,26 +208,6 @@ def _no_word() -> None:
     """Say nothing: progress is told for each combination."""
 
 
-<<<<<<< HEAD
-=======
-def with_smooth_cables(actuator: Assembly) -> Assembly:
-    """Return the assembly with every cable that goes slack in its smooth form, which an optimiser can follow.
-
-    Within the range of a design the cable is taut, where the two forms agree; the finished design is measured
-    on the assembly as it is declared.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    """
-    for path, part in actuator.walk():
-        if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
-            actuator = actuator.with_part(path, part.smooth())
-    return actuator
-
-
->>>>>>> bench
 def _best(outcomes: Sequence[Solution]) -> int:
     solved = [i for i, outcome in enumerate(outcomes) if outcome.solved]
     if not solved:
