@@ -143,11 +143,11 @@ def _with_progress(job: DesignJob, note: Callable[[str], None]) -> Any:
 
     done = [0]
 
-    def told() -> None:
+    def progress() -> None:
         done[0] += 1
         note(f"{done[0]} done")
 
-    return replace(job.settings, progress=told)
+    return replace(job.settings, progress=progress)
 
 
 def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Target:

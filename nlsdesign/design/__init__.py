@@ -30,7 +30,9 @@ from .jobs.job_file import DesignJob, job_of, read_job
 from .jobs.machined import machined_cam
 from .jobs.task_target import TaskTarget
 from .optimisation.checks import torque_check
+from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
+from .optimisation.front import FrontPoint, ParetoFront
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -48,8 +50,10 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
+from .optimisation.pareto import pareto
 from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
+from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
@@ -68,6 +72,7 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "BoltCircle",
+    "BothStrokes",
     "CamDesign",
     "CamFit",
     "CamPart",
@@ -79,13 +84,18 @@ __all__ = [
     "DesignJob",
     "DesignSettings",
     "ElasticLaw",
+    "EnergyLost",
     "ExponentialTorque",
     "FerruleSeat",
+    "FrontPoint",
     "Goal",
     "Hole",
+    "InsensitiveStiffness",
     "LeastEnergy",
+    "LeastMass",
     "LeastPeakPower",
     "LeastRubber",
+    "LeastSize",
     "Limit",
     "LimitState",
     "MachinedCam",
@@ -106,6 +116,7 @@ __all__ = [
     "OneBatch",
     "OneSidedSpring",
     "OverTravel",
+    "ParetoFront",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
@@ -157,6 +168,7 @@ __all__ = [
     "machined_cam",
     "motor_and_gear",
     "motor_cycle",
+    "pareto",
     "read_band",
     "read_job",
     "read_target",

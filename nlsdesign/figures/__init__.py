@@ -23,6 +23,7 @@ from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .trade_off import pareto_front
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "observer_error",
     "observer_stability",
     "over_time",
+    "pareto_front",
     "significant",
     "stability_over_angle",
     "styled",

@@ -78,8 +78,10 @@ def read_job(path: Path | str) -> DesignJob:
 
     Raises
     ------
+    DeckError
+        If the file cannot be read.
     NlsError
-        As for :func:`job_of`, or if the file cannot be read.
+        As for :func:`job_of`.
     """
     file = Path(path)
     try:
@@ -226,8 +228,12 @@ def built(deck: Deck, kind: type, given: object, place: str) -> Any:
 
     Raises
     ------
+    DeckError
+        If it is no table, or a field is missing.
+    UnknownNameError
+        If there is no such field.
     NlsError
-        If a field is missing, unknown or refused.
+        If a field is refused.
     """
     if not isinstance(given, Mapping):
         raise DeckError(

@@ -68,6 +68,8 @@ class TaskTarget:
 
         Raises
         ------
+        ValueRangeError
+            If the body mass is missing, or a number is out of range.
         NlsError
             If the task cannot be read, the motor declares too little, or no spring keeps its limits.
         """

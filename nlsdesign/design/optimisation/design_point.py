@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import casadi as ca
@@ -15,6 +16,7 @@ from ...model.structure import CamNames
 from ...symbolic import Expression
 from ..curves.target import Target
 from ..statics.equilibrium import ElasticLaw
+from ..statics.relaxing_law import RelaxingLaw, relaxing_law
 
 
 def anchor_of(cam: CamNames) -> str:
@@ -74,6 +76,8 @@ class DesignPoint:
         All parameters of the flat model by name; symbols where they are free.
     element
         What one element does at an extension in m.
+    through_centre
+        Whether the cable passes through the centre, so that both signs of the angle stretch the rubber alike.
     shown_units
         Unit in which each parameter is shown.
     model
@@ -98,9 +102,15 @@ class DesignPoint:
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
+    through_centre: bool
     shown_units: Mapping[str, str]
     model: FlatModel
     law: ElasticLaw
+
+    @cached_property
+    def relaxing(self) -> RelaxingLaw:
+        """Law of one element with its inner states free."""
+        return relaxing_law(self.model, self.cam.drive)
 
     @property
     def elements(self) -> Expression:

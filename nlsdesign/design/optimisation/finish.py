@@ -152,7 +152,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
     search, problem, best = solved.search, solved.search.problem, solved.best
     contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
-    limits = tuple(_state(problem, bound, best.point) for bound in search.bounds)
+    limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
     tolerance, remarks = _tolerance(solved)
     return CamDesign(
         target=design.target,
@@ -292,7 +292,18 @@ def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tupl
     return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
 
 
-def _state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+    """Return how a design stands to a limit.
+
+    Parameters
+    ----------
+    problem
+        Its problem.
+    bound
+        One side of the limit.
+    point
+        Shape (variables,), scaled.
+    """
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale

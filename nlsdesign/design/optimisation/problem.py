@@ -312,6 +312,7 @@ def _design(
         torque_errors=parameters[cam.elements] * shape.lever_arms * forces - wanted,
         parameters=parameters,
         element=element,
+        through_centre=shape.through_centre,
         shown_units={v.name: _SHOWN.get(v.unit, v.unit) for v in law.parameters},
         model=model,
         law=law,

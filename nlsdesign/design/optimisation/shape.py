@@ -18,7 +18,7 @@ import numpy as np
 
 from ...model import FlatModel
 from ...symbolic import Expression
-from ..statics.declared_cam import contour_of_cam
+from ..statics.declared_cam import contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
 from .program import Rows
 from .variables import DesignVariable
@@ -33,7 +33,7 @@ _LEAST_CLEARANCE = 0.02
 
 
 class Shape(NamedTuple):
-    """Columns over the nodes of a contour, and what must hold for it to be one."""
+    """Columns over the nodes of a contour, what must hold for it to be one, and where its cable passes."""
 
     directions: Expression
     angles: Expression
@@ -43,6 +43,7 @@ class Shape(NamedTuple):
     extensions: Expression
     lever_arm_slopes: Expression
     rows: tuple[Rows, ...]
+    through_centre: bool
 
 
 class ContourVariables(NamedTuple):
@@ -99,7 +100,7 @@ def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[
     )
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     return variables, Shape(
-        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows
+        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows, True
     )
 
 
@@ -119,7 +120,9 @@ def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
     p, slopes, arcs, directions = _support(variables, arm.value, ca.SX(last_angle))
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     rows = (Rows(p / size, 0.0, ca.inf),)
-    return variables, Shape(directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows)
+    return variables, Shape(
+        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False
+    )
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
@@ -143,7 +146,7 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
     return Shape(
         ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
         ca.SX(contour.radii_of_curvature), ca.SX(extensions).T,
-        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (),
+        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), declared_cam(cam).through_centre,
     )  # fmt: skip
 
 
