@@ -8,11 +8,19 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
+from nlsdesign.design import CamDesign, CamPart, Cause, MachinedCam, ToleranceResult
 from nlsdesign.errors import ValueRangeError
-from nlsdesign.report import FigureSection, Section, TableSection
+from nlsdesign.report import FigureSection, FileSection, Section, TableSection
 
 INSPECTED = 8  # rows of the torque table on the drawing
+DRAWINGS = {
+    "cam.dxf": "edges for the machine: lines and arcs, in millimetres",
+    "cam.svg": "picture of the part at scale 1:1",
+    "cam.csv": "lines and arcs as a table",
+    "cam_centre_line.csv": "curve of the cable's centre line",
+    "sheet.svg": "page for the workshop, with dimensions and torque table",
+    "sheet.pdf": "the same as PDF",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +141,16 @@ def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
     ]
 
 
+def drawing_section(cam: MadeCam) -> Section:
+    """List the drawings, with the cable that they are for."""
+    return FileSection(
+        "Drawings of the cam as it is made",
+        {path: DRAWINGS.get(path.name, "drawing of the cam") for path in cam.files},
+        caption=f"For a cable of {2e3 * cam.part.number('cable_radius'):.2g} mm: edge under the cable, "
+        "run-out, seat of the ferrule, bore.",
+    )
+
+
 def tolerance_sections(result: ToleranceResult) -> list[Section]:
     """Show what the spreads do, and what to trim, measure and tighten."""
     head, *rows = result.table()
@@ -145,7 +163,7 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             caption="95 % of the springs stay below.",
             means=f"95 % of {len(result.errors)} made springs are within {1e3 * built.value:.0f} mN·m rms as "
             f"built{after}. {advice(result)}",
-            assumed="; ".join(dict.fromkeys(c.cause.source for c in result.causes if c.cause.assumed)),
+            assumed="; ".join(dict.fromkeys(_reason(c.cause) for c in result.causes if c.cause.assumed)),
         ),
         FigureSection(
             "Torque of made springs",
@@ -162,6 +180,10 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             folded=True,
         ),
     ]
+
+
+def _reason(cause: Cause) -> str:
+    return cause.source.removeprefix("assumed: ")
 
 
 def advice(result: ToleranceResult) -> str:

@@ -10,10 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import nlsdesign as nls
-from nlsdesign.design import ClampScrew, DesignSettings, MachinedOneSidedCam, RestLengthRange
-from nlsdesign.report import Chapter, FileSection
+from nlsdesign.design import DesignSettings, FerruleSeat, MachinedOneSidedCam, RestLengthRange
+from nlsdesign.report import Chapter
 
-from ._designed import MadeCam, design_sections, make_cam, tolerance_sections, with_machined_contour
+from ._designed import (
+    MadeCam,
+    design_sections,
+    drawing_section,
+    make_cam,
+    tolerance_sections,
+    with_machined_contour,
+)
 
 RUBBER = "spring.cable.rope.rubber"
 FREE = ("spring.cam.contour", f"{RUBBER}.area", f"{RUBBER}.rest_length")
@@ -26,8 +33,8 @@ KEEP = (
 MACHINED = MachinedOneSidedCam(
     cable_radius=nls.quantity(0.6, "mm", source="half the diameter of the declared cable"),
     hub_bore=nls.quantity(4.0, "mm", source="assumed: shaft of a joint of this size"),
-    lead_in=nls.quantity(10.0, "mm", source="assumed: room for the clamp"),
-    cable_end=ClampScrew(diameter=nls.quantity(2.05, "mm", source="assumed: core hole of M2.5")),
+    lead_in=nls.quantity(10.0, "mm", source="assumed: room for the ferrule"),
+    cable_end=FerruleSeat(diameter=nls.quantity(3.0, "mm", source="assumed: ferrule for this cable")),
 )
 AT_REST = {
     "spring.pretension": nls.quantity(
@@ -88,7 +95,7 @@ def write(out: Path, results: Results) -> None:
             f"{1e3 * cam.tolerance.nominal_rms:.0f} mN·m rms that no contour removes.",
         ),
         *tolerance_sections(cam.tolerance),
-        FileSection("Drawings", dict.fromkeys(cam.files, "drawing of the cam")),
+        drawing_section(cam),
         title="A one-sided cam for a finger",
         abstract="Soft when it touches, stiff when it holds; a tendon that pulls to one side only.",
     )

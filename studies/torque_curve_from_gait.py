@@ -3,33 +3,54 @@
 An actuator carries a twentieth of the torque of hip, knee or ankle of a person of 75 kg. The motor is that of
 the deck ``one_sided_cable_drive``; its gear ratio is free. Rigid drive, best linear spring and best curve are
 each taken at their own best ratio, so that the spring is not credited with what a gear would have done.
+
+For the ankle a cam and its rubber are designed too, and the heat is computed with the torque that this spring
+has instead of the curve that was asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import nlsdesign as nls
 from nlsdesign import figures
+from nlsdesign.components import Rounded, StrainStiffening
 from nlsdesign.design import (
+    CamDesign,
+    DesignSettings,
     LeastPeakPower,
     MotorAndGear,
+    MotorCycle,
+    RestLengthRange,
+    TabulatedTorque,
+    Target,
     Task,
     TaskCurve,
     TaskProblem,
     curve_for_task,
     motor_and_gear,
+    motor_cycle,
     scan_gear_ratio,
     walking_task,
 )
-from nlsdesign.report import FigureSection, TableSection, TextSection
+from nlsdesign.report import Chapter, FigureSection, TableSection, TextSection
+
+from ._designed import design_sections, tolerance_sections, with_machined_contour
+from ._published import declared_actuator
 
 BODY_MASS = nls.quantity(75.0, "kg")
 SHARE = 0.05
 RATIOS = tuple(float(ratio) for ratio in range(20, 121, 10))
 COARSE = (20.0, 40.0, 80.0)
+FREE = ("spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length")
+KEEP = (
+    nls.MaximumCamRadius(nls.quantity(25.0, "mm", source="assumed: room at a shank")),
+    RestLengthRange(8e-3, 100e-3),
+)
+ANCHOR = nls.quantity(40.0, "mm", spread=0.005, source="assumed: clear of the cam, bored within 0.2 mm")
+CORNERS = nls.quantity(0.02, "1", source="assumed: rubber has no corners; the fitted law has them")
 
 
 @dataclass(frozen=True)
@@ -47,6 +68,8 @@ class Results:
     knee_heat_curve_J: float
     hip_heat_rigid_J: float
     hip_heat_curve_J: float
+    ankle_design_error_mNm_rms: float
+    ankle_heat_designed_J: float
     numbers = property(asdict, doc="The results by name.")
 
 
@@ -88,7 +111,9 @@ def main(out: Path, fast: bool = False) -> Results:
     power = curve_for_task(
         tasks["ankle"], drive.geared(ankle.ratio), TaskProblem(goal=LeastPeakPower(), pieces=24)
     )
-    write(out, joints.values(), power)
+    design = designed_ankle(ankle.curve.target, 200 if fast else 1000)
+    motor = motor_cycle(tasks["ankle"], drive.geared(ankle.ratio), spring=curve_of(design))
+    write(out, joints.values(), power, AnkleSpring(design, motor))
     return Results(
         ankle_gear_ratio=ankle.ratio,
         ankle_heat_rigid_J=ankle.rigid_heat,
@@ -101,7 +126,38 @@ def main(out: Path, fast: bool = False) -> Results:
         knee_heat_curve_J=joints["knee"].curve.best.heat,
         hip_heat_rigid_J=joints["hip"].rigid_heat,
         hip_heat_curve_J=joints["hip"].curve.best.heat,
+        ankle_design_error_mNm_rms=1e3 * design.rms,
+        ankle_heat_designed_J=motor.heat,
     )
+
+
+@dataclass(frozen=True)
+class AnkleSpring:
+    """The spring that was designed for the ankle, and its motor over a stride."""
+
+    design: CamDesign
+    motor: MotorCycle
+
+
+def designed_ankle(target: Target, draws: int) -> CamDesign:
+    """Return cam and rubber for the curve of the ankle, on the published actuator's arrangement.
+
+    The corners of its rubber's law are rounded: a corner is a jump of the stiffness, which the motor would
+    have to answer by a jump of its speed.
+    """
+    law = "spring.rubber.stiff"
+    actuator = with_machined_contour(declared_actuator(), ANCHOR)
+    stiff = actuator.element(law)
+    assert isinstance(stiff, StrainStiffening)
+    actuator = actuator.with_part(law, replace(stiff, contact=Rounded(width=CORNERS)))
+    settings = DesignSettings(draws=draws, look_for_size_ranges=False)
+    return nls.design_cam(actuator, target=target, free=FREE, keep=KEEP, settings=settings)
+
+
+def curve_of(design: CamDesign) -> TabulatedTorque:
+    """Return the torque that a designed spring has, as a curve for the motor's cycle."""
+    check = design.check
+    return TabulatedTorque(angles=tuple(check.angles), torques=tuple(check.torques))
 
 
 def joint_of(name: str, task: Task, drive: MotorAndGear, ratios: Iterable[float]) -> Joint:
@@ -110,8 +166,10 @@ def joint_of(name: str, task: Task, drive: MotorAndGear, ratios: Iterable[float]
     return Joint(name, {ratio: curve for ratio, curve in curves.items() if isinstance(curve, TaskCurve)})
 
 
-def write(out: Path, joints: Iterable[Joint], power: TaskCurve) -> None:
+def write(out: Path, joints: Iterable[Joint], power: TaskCurve, ankle: AnkleSpring) -> None:
     """Write the report."""
+    joints = list(joints)
+    asked = joints[0].curve.best.heat
     rows = tuple(
         (joint.name, joint.ratio, joint.rigid_heat, joint.linear_heat, joint.curve.best.heat)
         for joint in joints
@@ -162,6 +220,14 @@ def write(out: Path, joints: Iterable[Joint], power: TaskCurve) -> None:
         *drawn,
         TextSection("Least peak power at the ankle", drawing=str(power)),
         *scans,
+        Chapter(
+            "A spring for the ankle",
+            "Cam, pretension and rubber designed for the ankle's curve, on the arrangement of the published "
+            f"actuator and within what cable and rubber bear. With the torque that this spring has the motor "
+            f"turns {ankle.motor.heat:.3f} J of a stride into heat; with the curve itself {asked:.3f} J.",
+        ),
+        *design_sections(ankle.design, of="ankle"),
+        *(tolerance_sections(ankle.design.tolerance) if ankle.design.tolerance is not None else []),
         title="Torque curves from walking",
         abstract="A twentieth of the joint torques of a person of 75 kg at natural speed, Bovi et al. 2011.",
     )

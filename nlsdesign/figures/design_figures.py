@@ -41,18 +41,20 @@ def design_picture(design: CamDesign) -> Figure:
     """
     last = float(design.contour.angles[-1])
     reach = float(design.contour.radii.max())
-    length, area = next(iter(_pieces(design)), (0.0, 0.0))
+    length, _ = next(iter(_pieces(design)), (0.0, 0.0))
     wide = _end_of_cable(design.contour, reach)[0] + length + float(design.curves.extensions.max()) + 8e-3
-    tall = max(1.2 * reach, 0.6 * float(np.sqrt(area)) + 0.5 * reach)
     left = -wide if np.isfinite(design.contour.anchor_distance) else -1.3 * reach
-    height = (WIDTH - 0.8) * 2.6 * tall / (wide - left)
-    figure, axes = panels(2, 1, height=2.0 * height + 1.2, sharex=True)
+    figure, axes = panels(2, 1, height=4.0, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         _draw(panel, design, angle)
+    low, high = (pick([end(panel) for panel in axes]) for pick, end in ((min, _lowest), (max, _highest)))
+    low -= 0.08 * (wide - left) * _MM  # room for the dimensions
+    for panel in axes:
         panel.set_xlim(left * _MM, wide * _MM)
-        panel.set_ylim(-1.6 * tall * _MM, 1.0 * tall * _MM)
-    _dimension_radius(axes[0], design, -1.3 * tall * _MM)
-    axes[1].set_xlabel("distance from the centre in mm")
+        panel.set_ylim(low, high + 2.0)
+    figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * _MM) + 1.2)
+    _dimension_radius(axes[0], design, low + 0.02 * (wide - left) * _MM)
+    axes[1].set_xlabel(f"distance from the centre in mm{_rubber_note(design)}")
     radius = float(design.contour.radii.max()) * _MM
     return described(
         figure,
@@ -82,16 +84,24 @@ def limit_margins(design: CamDesign) -> Figure:
     axes.axvline(1.0, color=INK.light, linewidth=1.0)
     for place, state, share in zip(places, states, used, strict=True):
         axes.annotate(
-            _words(state), (min(float(share), 1.2), place), (4, 0), textcoords="offset points", fontsize=8,
-            va="center", color=INK.light,
+            _words(state), (max(min(float(share), 1.2), 1.0), place), (6, 0), textcoords="offset points",
+            fontsize=8, va="center", color=INK.light,
         )  # fmt: skip
     axes.set_yticks(places, [f"{state.of} ({'≤' if state.upper else '≥'})" for state in states])
     axes.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0], ["0", "25 %", "50 %", "75 %", "limit"])
-    axes.set_xlim(0.0, 1.75)
+    axes.set_xlim(0.0, 1.55)
     axes.grid(visible=False, axis="y")
     axes.set_title("Use of each limit")
     binding = ", ".join(dict.fromkeys(state.of for state in states if state.active)) or "none"
     return described(figure, f"Bars of {len(states)} limits; the design sits on: {binding}.")
+
+
+def _lowest(axes: Axes) -> float:
+    return float(axes.dataLim.y0)
+
+
+def _highest(axes: Axes) -> float:
+    return float(axes.dataLim.y1)
 
 
 def _used(state: LimitState) -> float:
@@ -189,28 +199,29 @@ def _pieces(design: CamDesign) -> list[tuple[float, float]]:
     ]
 
 
+def _rubber_note(design: CamDesign) -> str:
+    pieces = _pieces(design)
+    if not pieces:
+        return ""
+    length, area = pieces[0]
+    return f"; rubber unstretched {length * _MM:.1f} mm, {area * _MM**2:.1f} mm² (drawn square)"
+
+
 def _rubber_words(design: CamDesign) -> str:
     pieces = _pieces(design)
     if not pieces:
         return "not a declared piece"
     length, area = pieces[0]
-    return f"{length * _MM:.1f} mm long and {area * _MM**2:.0f} mm² thick"
+    return f"{length * _MM:.1f} mm long with a section of {area * _MM**2:.0f} mm²"
 
 
 def _dimension_radius(axes: Axes, design: CamDesign, y: float) -> None:
-    """Dimension the largest radius of the cam, the distance of the anchor and the unstretched rubber."""
+    """Dimension the largest radius of the cam and the distance of the anchor."""
     contour, radius = design.contour, float(design.contour.radii.max()) * _MM
     anchor = float(_end_of_cable(contour, radius / _MM)[0]) * _MM
     _dimension(axes, 0.0, radius, y, f"R {radius:.1f}")
     if contour.anchor_distance * _MM == anchor:
         _dimension(axes, 0.0, -anchor, y, f"anchor {anchor:.1f}")
-    pieces = _pieces(design)
-    if pieces:
-        length, area = pieces[0]
-        axes.annotate(
-            f"rubber, unstretched {length * _MM:.1f} mm, {area * _MM**2:.1f} mm² (drawn square)",
-            (anchor + 4.0, y), fontsize=7.5, color=INK.light,
-        )  # fmt: skip
 
 
 def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> None:

@@ -22,10 +22,13 @@ class EquationsSection(Section):
         From :func:`nlsdesign.model.equations.equations`.
     caption
         What they describe.
+    folded
+        Whether they are closed until the reader opens them.
     """
 
     equations: Equations
     caption: str = ""
+    folded: bool = False
     template: ClassVar[str] = "equations.html"
 
     def content(self, place: PagePosition) -> Mapping[str, Any]:
@@ -33,4 +36,4 @@ class EquationsSection(Section):
         from .mathml import equation_rows
 
         states, signals = equation_rows(self.equations)
-        return {"states": states, "signals": signals, "caption": self.caption}
+        return {"states": states, "signals": signals, "caption": self.caption, "folded": self.folded}
