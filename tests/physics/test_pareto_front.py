@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from nlsdesign.design import (
     AreaRange,
@@ -127,6 +128,7 @@ def test_no_design_nearby_is_better_in_both(first: type, second: type, which: tu
     """200 neighbours that miss no limit by more than 0.02 %: scattered, and between a point and the next."""
     front = front_of(first, second)
     designs = designs_of(front)
+    assert len(designs) >= 6, str(front)
     draw = np.random.default_rng(11)
     for number, (design, values) in enumerate(zip(designs, front.values, strict=True)):
         feasible = 0
@@ -161,6 +163,55 @@ def scattered(design: Design, other: Design, draw: np.random.Generator) -> Desig
         float(np.clip(between(design.area, other.area), 20e-6, 300e-6)),
         float(np.clip(between(design.length, other.length) * (1 + scale * abs(draw.normal())), 8e-3, 40e-3)),
     )
+
+
+def test_another_optimiser_finds_nothing_better() -> None:
+    """SLSQP with differences on the equations of this file: least rubber of no larger size."""
+    front = front_of(LeastRubber, LeastSize)
+    for number in (3,):
+        design, values = designs_of(front)[number], front.values[number]
+        better = improved(design, values[1])
+        now = worth(better, slack=2e-4)
+        assert now.radius <= values[1] * (1 + 2e-4)
+        assert now.volume > values[0] * (1 - 2e-3), f"point {number}: {now.volume / values[0]}"
+
+
+def improved(design: Design, radius: float) -> Design:
+    """Return the design with the least rubber near another, of no larger radius, as SLSQP finds it."""
+    sizes = np.concatenate([design.radii, design[2:], [design.nodes[-1]]])
+
+    def design_at(x: np.ndarray) -> Design:
+        v = x * sizes
+        nodes = design.nodes / design.nodes[-1] * v[-1]
+        return Design(nodes, v[:-5], *(float(each) for each in v[-5:-1]))
+
+    @np.errstate(invalid="ignore")
+    def margins(x: np.ndarray) -> np.ndarray:
+        d = design_at(x)
+        contour = contour_from_curvature(
+            d.nodes, d.radii, first_slope=d.first, anchor_distance=25e-3, refine=20
+        )
+        cable = contour.arc_lengths + contour.free_lengths
+        strain = (d.pretension + cable - cable[0]) / d.length
+        torque = 2.0 * contour.lever_arms * d.area * 0.8456e6 * (1 + strain - (1 + strain) ** -2)
+        errors = (torque - TARGET.torque(np.minimum(contour.angles, TARGET.last_angle)))[::20]
+        rms = np.sqrt(np.trapezoid(errors**2, contour.angles[::20]) / TARGET.last_angle)
+        return np.concatenate([
+            1.0 - contour.radii[::20] / radius,
+            [1.0 - rms / 0.05, 1.0 - strain[-1], contour.angles[-1] / TARGET.last_angle - 1.0],
+        ])  # fmt: skip
+
+    # Within 3 %, where SLSQP does not lose its way.
+    lowest = np.concatenate([1e-3 / design.radii, [0.0, 0.0, 20e-6 / design.area, 8e-3 / design.length, 0.0]])
+    highest = np.full(len(sizes), np.inf)
+    highest[-4:-1] = 8e-3 / design.pretension, 300e-6 / design.area, 40e-3 / design.length
+    lower, upper = np.maximum(lowest, 0.97), np.minimum(highest, 1.03)
+    begin = np.clip(np.ones(len(sizes)), lower, upper)
+    result = minimize(
+        lambda x: x[-3] * x[-2], begin, method="SLSQP", bounds=list(zip(lower, upper, strict=True)),
+        constraints={"type": "ineq", "fun": margins}, options={"maxiter": 25, "ftol": 1e-6},
+    )  # fmt: skip
+    return design_at(result.x)
 
 
 def test_least_rubber_is_bounded_by_the_energy_it_can_hold() -> None:

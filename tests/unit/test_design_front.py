@@ -67,7 +67,7 @@ def test_every_point_meets_the_target_as_the_settings_ask() -> None:
     for number in range(len(front().points)):
         assert front().design(number).met
     values = front().values
-    assert values.shape[1] == 2
+    assert values.shape == (4, 2)
     assert np.all(np.diff(values[:, 0]) > 0.0)
     assert np.all(np.diff(values[:, 1]) < 0.0)
 

@@ -122,7 +122,7 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
         values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
         error = _largest(basis @ values - wanted, dense > 20.0 * width)
         cam = TwoSidedCam(
-            lever_arm=self.part.lever_arm.with_value(significant(values), _SOURCE),
+            lever_arm=_row(self.part.lever_arm, values),
             last_angle=self.part.last_angle.with_value(float(angles[-1]), _SOURCE),
             changeover=self.part.changeover,
             anchor_distance=self.part.anchor_distance,
@@ -158,7 +158,7 @@ class _OneSided(DeclaredCam[OneSidedCam]):
         error = _largest(basis @ values - wanted, dense > 2.0 * width)
         cam = replace(
             self.part,
-            lever_arm=self.part.lever_arm.with_value(significant(values), _SOURCE),
+            lever_arm=_row(self.part.lever_arm, values),
             last_angle=self.part.last_angle.with_value(float(angles[-1]), _SOURCE),
         )
         return CamFit(cam, error)
@@ -206,7 +206,7 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         error = _largest(basis @ values - wanted, dense > 20.0 * width)
         cam = replace(
             self.part,
-            support=self.part.support.with_value(significant(values), _SOURCE),
+            support=_row(self.part.support, values),
             last_direction=self.part.last_direction.with_value(end, _SOURCE),
         )
         return CamFit(cam, error, ("support", "last_direction"))
@@ -343,6 +343,11 @@ def _lever_arms(row: Quantity, last: Quantity, at: Floats) -> Floats:
 def _dense(angles: Floats, lever_arms: Floats, count: int) -> tuple[Floats, Floats]:
     dense = np.linspace(0.0, angles[-1], max(_SAMPLES_PER_VALUE * count, len(angles)))
     return dense, make_interp_spline(angles, lever_arms, k=3)(dense)
+
+
+def _row(old: Quantity, values: Floats) -> Quantity:
+    """Return designed control values; the spread of those before was of another cam, made another way."""
+    return replace(old.with_value(significant(values), _SOURCE), spread=0.0)
 
 
 def _jumps(wanted: Floats) -> bool:
