@@ -62,6 +62,7 @@ class DesignProblem:
     scalars: tuple[DesignVariable, ...]
     contour: ContourVariables | None
     sizes: StartSizes
+    states: Expression
 
     @property
     def vector(self) -> Expression:
@@ -125,6 +126,9 @@ class DesignProblem:
             Scaled values by name; what is missing starts as it does by itself.
         """
         point = np.array([values.get(v.name, v.start) for v in self.variables])
+        if self.states.shape[0]:
+            first = len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
+            point[first : first + self.states.shape[0]] = self.evaluate(self.states, point)
         errors = self.structure[-1].expression / _ERROR_SCALE
         point[len(point) - errors.shape[0] :] += self.evaluate(errors, point)
         return point
@@ -185,12 +189,13 @@ def design_problem(
     return _lifted(
         DesignProblem(
             law=law,
-            variables=(*scalars.values(), *(contour.all() if contour else ())),
+            variables=(*scalars.values(), *(contour.all() if contour else ()), *shape.states),
             design=_design(law, target, shape, parameters),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
             sizes=sizes,
+            states=shape.state_values,
         )
     )
 
