@@ -40,6 +40,7 @@ from .control import ClosedLoop as ClosedLoop
 from .control import torque_controller as torque_controller
 from .deck import load_deck as load_deck
 from .design import ExponentialTorque as ExponentialTorque
+from .design import MachinedTwoSidedCam as MachinedTwoSidedCam
 from .design import MaximumCamRadius as MaximumCamRadius
 from .design import MaximumStrain as MaximumStrain
 from .design import MaximumStress as MaximumStress
@@ -47,8 +48,13 @@ from .design import MinimumRadiusOfCurvature as MinimumRadiusOfCurvature
 from .design import PowerTorque as PowerTorque
 from .design import PretensionRange as PretensionRange
 from .design import RestLengthRange as RestLengthRange
+from .design import curve_for_task as curve_for_task
 from .design import design_cam as design_cam
 from .design import equilibrium_torque as equilibrium_torque
+from .design import motor_and_gear as motor_and_gear
+from .design import read_target as read_target
+from .design import read_task as read_task
+from .design import tolerance_analysis as tolerance_analysis
 from .design import write_drawings as write_drawings
 from .discrepancy import diagnose as diagnose
 from .discrepancy import effects as effects

@@ -11,7 +11,9 @@ from nlsdesign import figures
 from nlsdesign.analysis import Chart
 from nlsdesign.design import (
     ExponentialTorque,
+    FrontPoint,
     MotorAndGear,
+    ParetoFront,
     Task,
     TaskCurve,
     ToleranceResult,
@@ -119,6 +121,16 @@ def against_measured() -> figures.Figure:
     )
 
 
+def front() -> ParetoFront:
+    """Three goals; nothing to make whole designs from."""
+    size = np.linspace(6.5e-3, 10.5e-3, 7)
+    points = tuple(
+        FrontPoint((2.6e-6 * (10.5e-3 / r) ** 1.3, float(r), 0.02 + 3.0 * float(r)), (), (), ()) for r in size
+    )
+    goals = ("rubber volume", "cam radius", "energy lost per cycle")
+    return ParetoFront(TARGET, goals, ("cm^3", "mm", "%"), points[::-1], (), ())
+
+
 @functools.cache
 def task_curve() -> TaskCurve:
     """A joint that swings like a pendulum with a second harmonic in its torque."""
@@ -161,6 +173,7 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         unit="N*m",
         name="block load",
     ),
+    "pareto_front": lambda: figures.pareto_front(front()),
     "motor_over_task": lambda: figures.motor_over_task(task_curve()),
     "curve_of_task": lambda: figures.curve_of_task(task_curve()),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),

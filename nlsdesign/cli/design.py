@@ -1,86 +1,256 @@
-"""``nlsdesign design``: a cam, and rubber with it, for a target torque curve."""
+"""``nlsdesign design``: a cam, and rubber with it, for a target torque curve or a task."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import NlsError, ValueRangeError
 from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
-from .units import Number
+from .units import parse_number
+
+if TYPE_CHECKING:
+    from ..components.assembly.named_parts import Assembly
+    from ..design import CamDesign, DesignJob, Target
+
+_LINE = "repeatable; a line as in a design file, for instance"
+_DRAWS = 1000
 
 
 @click.command()
 @deck_option
-@click.option("--maximum", type=Number("N*m"), required=True, help='Torque at the end, for instance "5 N·m".')
-@click.option("--angle", type=Number("deg"), required=True, help='Angle at the end, for instance "53 deg".')
 @click.option(
-    "--shape", type=float, default=1.0, show_default=True, help="Exponent c of the target in 1/rad."
-)
+    "--task", "task_file", type=click.Path(path_type=Path, dir_okay=False), default=None,
+    help="Design file (TOML) with target, free names, limits, goals, stock.",
+)  # fmt: skip
+@click.option("--target", default=None, help="Target curve: 'PowerTorque = {coefficient = 4.35, ...}'.")
 @click.option(
-    "--free",
-    multiple=True,
-    help="Quantity that may change, e.g. spring.cam.contour; by default the contour alone; repeatable.",
+    "--target-file", type=click.Path(path_type=Path, dir_okay=False), default=None,
+    help="Target curve as CSV with units in its heads.",
+)  # fmt: skip
+@click.option("--maximum", default=None, help='Exponential target: torque at the end, e.g. "5 N·m".')
+@click.option("--angle", default=None, help='Exponential target: angle at the end, e.g. "53 deg".')
+@click.option("--shape", type=float, default=1.0, help="Exponential target: exponent c in 1/rad.")
+@click.option(
+    "--free", multiple=True, help="Quantity that may change, e.g. spring.cam.contour, which is the default."
 )
+@click.option("--limit", multiple=True, help=f"Limit; {_LINE} 'MaximumCamRadius = {{radius = \"20 mm\"}}'.")
+@click.option("--goal", multiple=True, help=f"Goal; {_LINE} 'TorqueError = {{}}'.")
+@click.option("--stock", multiple=True, help=f"Stock; {_LINE} '\"spring.cam.elements\" = [1, 2, 4]'.")
+@click.option("--starts", type=int, default=None, help="Number of starting points.")
+@click.option("--seed", type=int, default=None, help="Seed of the starts after the fourth, and of the draws.")
+@click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
+@click.option("--draws", type=int, default=_DRAWS, show_default=True, help="Draws of the tolerance; 0: none.")
 @spring_option
-@click.option(
-    "--minimum-radius",
-    type=Number("mm"),
-    default="1 mm",
-    show_default=True,
-    help="Smallest radius of curvature.",
-)
-@click.option(
-    "--maximum-radius", type=Number("mm"), default="20 mm", show_default=True, help="Largest cam radius."
-)
-@click.option(
-    "--maximum-strain", type=Number("1"), default="1", show_default=True, help="Largest strain of the rubber."
-)
 @out_option("out/design")
 @json_option
 def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
-    """Design the cam for tau(angle) = maximum * (exp(c angle) - 1) / (exp(c end) - 1)."""
-    from ..components.assembly.deck_writer import declare, write_deck
+    """Design cam and rubber for a torque curve; exit status 1 if the design misses its target.
+
+    Limits of the declared cable and rubber hold unless one of the same kind is given.
+    """
+    from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
-    from ..design import (
-        ExponentialTorque,
-        Limit,
-        MaximumCamRadius,
-        MaximumStrain,
-        MinimumRadiusOfCurvature,
-        design_cam,
-        write_drawings,
-    )
+    from ..design import design_cam
     from ..progress import Steps
+
+    actuator, job = declare(load_deck(deck_name)), _job(**given)
+    steps = Steps()
+    target = _target_of(job, actuator, out, steps)
+    with steps.step("design"):
+        designed = design_cam(
+            actuator,
+            target=target,
+            free=job.free,
+            spring=given["spring"] or job.spring,
+            keep=job.keep,
+            goals=job.goals,
+            settings=_with_progress(job, steps.note),
+        )
+    files = _written(designed, out)
+    remarks: list[str] = []
+    if designed.met:
+        with steps.step("drawings"):
+            files += _drawn(designed, job, deck_name, out, remarks)
+    if as_json:
+        show_json({**_numbers(designed), "remarks": remarks, "files": files})
+    else:
+        _show(designed, files)
+        for remark in remarks:
+            click.echo(remark)
+    sys.exit(0 if designed.met else 1)
+
+
+def _job(**given: Any) -> DesignJob:
+    """Return what is asked for, from a design file or from the options."""
+    from ..design import job_of, read_job
+
+    options = ("target", "target_file", "maximum", "angle", "free", "limit", "goal", "stock")
+    if given["task_file"] is not None:
+        doubled = [f"--{name.replace('_', '-')}" for name in options if given[name]]
+        if doubled:
+            raise ValueRangeError(
+                ", ".join(doubled), "stand beside --task, which says all that",
+                next_step="write them into the design file, or leave --task out",
+            )  # fmt: skip
+        return _searched(read_job(given["task_file"]), given)
+    return _searched(job_of(_as_text(given), Path("command line")), given)
+
+
+def _as_text(given: dict[str, Any]) -> str:
+    """Return the options as the text of a design file."""
+    quoted = ", ".join(f'"{name}"' for name in given["free"])
+    lines = [f"free = [{quoted}]"] if quoted else []
+    targets = []
+    if given["target"]:
+        targets.append(str(given["target"]))
+    if given["target_file"]:
+        targets.append(f"file = '{given['target_file'].absolute()}'")
+    if given["maximum"] or given["angle"]:
+        if not (given["maximum"] and given["angle"]):
+            raise ValueRangeError(
+                "--maximum and --angle",
+                "belong together",
+                next_step='give --maximum "5 N·m" --angle "53 deg"',
+            )
+        for name, unit in (("maximum", "N*m"), ("angle", "deg")):
+            parse_number(given[name], unit)
+        targets.append(
+            f'ExponentialTorque = {{maximum = "{given["maximum"]}", angle = "{given["angle"]}", '
+            f"shape = {given['shape']}}}"
+        )
+    for head, rows in (("target", targets), *((f"{k}s", given[k]) for k in ("limit", "goal"))):
+        lines += [f"[{head}]", *rows]
+    return "\n".join([*lines, "[stock]", *given["stock"]]) + "\n"
+
+
+def _searched(job: DesignJob, given: dict[str, Any]) -> DesignJob:
+    from dataclasses import replace
+
+    names = ("starts", "seed", "draws")
+    changes: dict[str, Any] = {name: given[name] for name in names if given[name] is not None}
+    if given["largest_error"] is not None:
+        changes["largest_error"] = parse_number(given["largest_error"], "1").number
+    return replace(job, settings=replace(job.settings, **changes))
+
+
+def _with_progress(job: DesignJob, note: Callable[[str], None]) -> Any:
+    from dataclasses import replace
+
+    done = [0]
+
+    def progress() -> None:
+        done[0] += 1
+        note(f"{done[0]} done")
+
+    return replace(job.settings, progress=progress)
+
+
+def _target_of(job: DesignJob, actuator: Assembly, out: Path, steps: Any) -> Target:
+    """Return the target; one that follows from a task is worked out, shown and drawn first."""
+    from ..design import Target, TaskTarget
+    from ..figures import curve_of_task, motor_over_task, write_figures
+    from ..model import flatten
     from ..writing import make_folder
 
-    keep: list[Limit] = [
-        MinimumRadiusOfCurvature(given["minimum_radius"]),
-        MaximumCamRadius(given["maximum_radius"]),
-        MaximumStrain(given["maximum_strain"]),
-    ]
-    target = ExponentialTorque(maximum=given["maximum"], angle=given["angle"], shape=given["shape"])
-    with Steps().step("design"):
-        designed = design_cam(
-            declare(load_deck(deck_name)),
-            target=target,
-            free=list(given["free"]) or None,
-            spring=given["spring"],
-            keep=keep,
-        )
+    if isinstance(job.target, Target):
+        return job.target
+    assert isinstance(job.target, TaskTarget)
+    with steps.step("curve for the task"):
+        curve = job.target.curve(flatten(actuator), job.path.parent)
     make_folder(out)
-    write_deck(designed.actuator, out / "model.toml")
-    files = [
-        out / "model.toml",
-        *write_drawings(out, designed.contour, note=f"design {designed.fingerprint}"),
+    write_figures(out, {"task_curve": curve_of_task(curve), "task_motor": motor_over_task(curve)})
+    click.echo(str(curve))
+    return curve.target
+
+
+def _written(designed: CamDesign, out: Path) -> list[Path]:
+    """Write deck, result and pictures; drawings for the workshop only of a design that meets its target."""
+    import json
+
+    from ..components.assembly.deck_writer import write_deck
+    from ..figures import design_picture, limit_margins, tolerance_bars, torque_against_target, write_figures
+    from ..writing import make_folder, write_text
+
+    make_folder(out)
+    model, numbers = out / "model.toml", out / "design.json"
+    write_deck(designed.actuator, model)
+    content = {**_numbers(designed), "rows": designed.rows()}
+    write_text(numbers, json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n")
+    curve = {"design": (designed.check.angles, designed.check.torques)}
+    pictures: dict[str, Any] = {
+        "picture": design_picture(designed),
+        "torque": torque_against_target(designed.target, curve),
+    }
+    if designed.limits:
+        pictures["margins"] = limit_margins(designed)
+    if designed.tolerance is not None and designed.tolerance.causes:
+        pictures["tolerance"] = tolerance_bars(designed.tolerance)
+    return [model, numbers, *write_figures(out, pictures)]
+
+
+def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remarks: list[str]) -> list[Path]:
+    """Write the drawings of the machined part, or of the contour alone where no part can be made of it."""
+    import numpy as np
+
+    from ..design import machined_cam, write_drawings
+    from ..figures import InspectionRow, TitleBlock, workshop_drawing, write_figures
+
+    note = f"design {designed.fingerprint}"
+    try:
+        machined = machined_cam(designed, job)
+        part = machined.part(designed.contour)
+    except NlsError as error:
+        # The contour is worth having even where hub, channel and cable do not fit it yet.
+        remarks.append(f"no machined part, only the line of the cable's centre: {error}")
+        return write_drawings(out, designed.contour, note=note)
+    check, curves = designed.check, designed.curves
+    angles = np.linspace(0.0, designed.target.last_angle, 11)
+    rows = [
+        InspectionRow(
+            float(angle),
+            float(np.interp(angle, check.angles, check.torques)),
+            float(np.interp(angle, curves.angles, curves.lever_arms)),
+            float(np.interp(angle, curves.angles, curves.forces)),
+        )
+        for angle in angles
     ]
-    if as_json:
-        values = {n: q.value for n, q in designed.values.items()}
-        show_json({"torque_error_rms": designed.rms, "values": values,
-                   "active_limits": designed.active_limits, "files": files})  # fmt: skip
-        return
-    show_table(
-        "Design", ("what", "value"), [*designed.rows(), *(("limit", str(state)) for state in designed.limits)]
-    )
+    title = TitleBlock(title="cam", deck=deck_name, fingerprint=designed.fingerprint)
+    page = workshop_drawing(part, title=title, rows=rows)
+    files = write_drawings(out, designed.contour, machined=machined, note=note)
+    return [
+        *files,
+        *write_figures(out, {"drawing": page}),
+        *write_figures(out, {"drawing": page}, suffix=".pdf"),
+    ]
+
+
+def _numbers(designed: CamDesign) -> dict[str, Any]:
+    spread = {}
+    if designed.tolerance is not None:
+        spread = {f"{100 * q.share:g} %": q.value for q in designed.tolerance.quantiles}
+    return {
+        "met": designed.met,
+        "torque_error_rms": designed.rms,
+        "miss": None if designed.miss is None else str(designed.miss),
+        "advice": [] if designed.miss is None else list(designed.miss.advice),
+        "values": {name: quantity.value for name, quantity in designed.values.items()},
+        "active_limits": list(designed.active_limits),
+        "largest_cable_force": float(designed.curves.forces.max()),
+        "energy": designed.curves.energy,
+        "rms_error_over_spreads": spread,
+    }
+
+
+def _show(designed: CamDesign, files: Iterable[Path]) -> None:
+    limits = (("limit", str(state)) for state in designed.limits)
+    show_table("Design", ("what", "value"), [*designed.rows(), *limits])
+    if designed.tolerance is not None:
+        show_table("Tolerance", ("what", "value"), designed.tolerance.rows())
     click.echo("written: " + ", ".join(str(path) for path in files))
+    if not designed.met:
+        click.echo("no drawings are written of a design that misses its target")

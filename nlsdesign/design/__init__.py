@@ -26,8 +26,13 @@ from .drawing.machined_cam import (
     MachinedOneSidedCam,
     MachinedTwoSidedCam,
 )
-from .optimisation.checks import torque_check, torque_sensitivity
+from .jobs.job_file import DesignJob, job_of, read_job
+from .jobs.machined import machined_cam
+from .jobs.task_target import TaskTarget
+from .optimisation.checks import torque_check
+from .optimisation.cycle_goals import BothStrokes, EnergyLost
 from .optimisation.defaults import safe_limits
+from .optimisation.front import FrontPoint, ParetoFront
 from .optimisation.goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .optimisation.limits import (
     AnchorDistance,
@@ -45,14 +50,18 @@ from .optimisation.limits import (
     RestLengthRange,
 )
 from .optimisation.limits_of_use import OverTravel, TorqueWithin
-from .optimisation.result import CamDesign, LimitState, Sensitivity, TorqueCheck
+from .optimisation.pareto import pareto
+from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
+from .optimisation.size_goals import InsensitiveStiffness, LeastMass, LeastSize
 from .optimisation.solve import design_cam
 from .optimisation.stock import RubberStock, Stock, StockChoice
+from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_curvature, contour_from_lever_arm
 from .statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from .statics.energy import CamProfile, energy_profile
 from .statics.equilibrium import ElasticLaw, elastic_law, equilibrium_torque
+from .statics.unmakeable import UnmakeablePart, unmakeable_parts
 from .tolerance.causes import Cause, NormalSpread, SpreadReading, UniformSpread, draw_deviations
 from .tolerance.declared_spreads import MaterialScatter, OneBatch, SeparateModuli, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
@@ -63,6 +72,7 @@ __all__ = [
     "AnchorDistance",
     "AreaRange",
     "BoltCircle",
+    "BothStrokes",
     "CamDesign",
     "CamFit",
     "CamPart",
@@ -71,15 +81,21 @@ __all__ = [
     "CauseEffect",
     "ClampScrew",
     "Contour",
+    "DesignJob",
     "DesignSettings",
     "ElasticLaw",
+    "EnergyLost",
     "ExponentialTorque",
     "FerruleSeat",
+    "FrontPoint",
     "Goal",
     "Hole",
+    "InsensitiveStiffness",
     "LeastEnergy",
+    "LeastMass",
     "LeastPeakPower",
     "LeastRubber",
+    "LeastSize",
     "Limit",
     "LimitState",
     "MachinedCam",
@@ -100,6 +116,7 @@ __all__ = [
     "OneBatch",
     "OneSidedSpring",
     "OverTravel",
+    "ParetoFront",
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
@@ -107,7 +124,6 @@ __all__ = [
     "QuantileEstimate",
     "RestLengthRange",
     "RubberStock",
-    "Sensitivity",
     "SeparateModuli",
     "SmoothContour",
     "SpreadReading",
@@ -124,6 +140,8 @@ __all__ = [
     "TaskCycle",
     "TaskGoal",
     "TaskProblem",
+    "TaskTarget",
+    "ToleranceQuantile",
     "ToleranceResult",
     "TorqueBand",
     "TorqueCheck",
@@ -131,8 +149,10 @@ __all__ = [
     "TorqueWithin",
     "Trim",
     "TrimEffect",
+    "TrimRoom",
     "TwoBranchSpring",
     "UniformSpread",
+    "UnmakeablePart",
     "cam_from_profile",
     "contour_from_curvature",
     "contour_from_lever_arm",
@@ -144,16 +164,20 @@ __all__ = [
     "energy_profile",
     "equilibrium_torque",
     "fingerprint",
+    "job_of",
+    "machined_cam",
     "motor_and_gear",
     "motor_cycle",
+    "pareto",
     "read_band",
+    "read_job",
     "read_target",
     "read_task",
     "safe_limits",
     "scan_gear_ratio",
     "tolerance_analysis",
     "torque_check",
-    "torque_sensitivity",
+    "unmakeable_parts",
     "walking_task",
     "write_drawings",
 ]

@@ -14,6 +14,7 @@ from .before_after import (
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
+from .design_figures import design_picture, limit_margins
 from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
@@ -22,6 +23,7 @@ from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
+from .trade_off import pareto_front
 from .workshop_drawing import InspectionRow, TitleBlock, workshop_drawing
 
 __all__ = [
@@ -47,9 +49,11 @@ __all__ = [
     "curve_of_task",
     "curves",
     "described",
+    "design_picture",
     "gap_bars",
     "held_out_series",
     "inline_svg",
+    "limit_margins",
     "loop_area",
     "metric_note",
     "motor_over_task",
@@ -57,6 +61,7 @@ __all__ = [
     "observer_error",
     "observer_stability",
     "over_time",
+    "pareto_front",
     "significant",
     "stability_over_angle",
     "styled",

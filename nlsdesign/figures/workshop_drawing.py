@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..design import CamPart
 from ..errors import ValueRangeError
 from ..quantity import Quantity, with_unit
-from .page import THICK, THIN, Page
+from .sheet import THICK, THIN, Sheet
 from .style import GRID, MUTED, SURFACE, VERMILLION, described, styled
 
 Floats = NDArray[np.float64]
@@ -120,8 +120,8 @@ def workshop_drawing(part: CamPart, *, title: TitleBlock, rows: Sequence[Inspect
             f"torque table of {len(rows)} rows", f"at most {_MOST_ROWS} fit on the page",
             next_step="take fewer angles",
         )  # fmt: skip
-    page = Page(_WIDTH, _HEIGHT)
-    page.box(_BORDER, _BORDER, _WIDTH - 2 * _BORDER, _HEIGHT - 2 * _BORDER)
+    page = Sheet(_WIDTH, _HEIGHT)
+    page.box(_BORDER, _BORDER, width=_WIDTH - 2 * _BORDER, height=_HEIGHT - 2 * _BORDER)
     view = _View(part)
     _main_view(page, view)
     _dimensions(page, view)
@@ -176,7 +176,7 @@ class _View:
         return result
 
 
-def _main_view(page: Page, view: _View) -> None:
+def _main_view(page: Sheet, view: _View) -> None:
     part = view.part
     if part.base_radius:
         _circle(page, view.at(np.zeros(2)), view.scale * _MM * part.base_radius, linewidth=THICK)
@@ -200,8 +200,8 @@ def _main_view(page: Page, view: _View) -> None:
         _circle(page, axis, circle, linewidth=THIN, linestyle=_AXIS, edgecolor=MUTED.light)
 
 
-def _dimensions(page: Page, view: _View) -> None:
-    part, every = view.part, np.vstack(view.outlines)
+def _dimensions(page: Sheet, view: _View) -> None:
+    every = np.vstack(view.outlines)
     size = every.max(axis=0) - every.min(axis=0)
     left, bottom = (float(value) for value in view.at(view.low))
     ends = [
@@ -209,22 +209,32 @@ def _dimensions(page: Page, view: _View) -> None:
         for axis in (0, 1)
         for index in (every[:, axis].argmin(), every[:, axis].argmax())
     ]
-    page.measure(ends[0], ends[1], _length(size[0]), away=bottom - 9.0)
-    page.measure(ends[2], ends[3], _length(size[1]), away=left - 12.0, upright=True)
+    page.measure(ends[0], ends[1], text=_length(size[0]), away=bottom - 9.0)
+    page.measure(ends[2], ends[3], text=_length(size[1]), away=left - 12.0, upright=True)
     _named_holes(page, view)
+    _edge_ends(page, view)
+
+
+def _edge_ends(page: Sheet, view: _View) -> None:
+    """Say where the cable touches at the last angle, and what rounds the end; away from the dimensions."""
+    part = view.part
+    left, bottom = (float(value) for value in view.at(view.low))
     near = np.argmin(np.hypot(*(view.outlines[0] - part.centre_line[-1]).T))
     place = view.at(view.outlines[0][near])
+    right = place[0] > view.at((view.low + view.high) / 2)[0]
+    bends = [(place[0] + 5.0, bottom - 17.0), (place[0] + 5.0, bottom - 24.0)]
+    if not right:
+        bends = [(left - 2.0, bottom - 23.0), (left - 2.0, bottom - 15.0)]
     last, beyond = (math.degrees(part.number(name)) for name in ("last_angle", "over_travel"))
-    text = f"contact at {last:.4g}°,\nthen run-out {beyond:.3g}°"
-    page.pointer(place, (place[0] + 7.0, place[1] - 9.0), text)
+    page.pointer(place, bends[0], text=f"contact at {last:.4g}°,\nthen run-out {beyond:.3g}°")
     outline, corner = part.outlines[0], part.number("corner_radius")
-    found = np.flatnonzero(np.isclose(np.abs(outline.radii), corner, rtol=1e-6))
-    if len(found):
-        middle = view.at((outline.ends[0] + outline.ends[1])[found[0]] / 2)
-        page.pointer(middle, (place[0] + 7.0, bottom - 16.0), f"R{_length(corner)}, ends of the edge")
+    arcs = np.flatnonzero(np.isclose(np.abs(outline.radii), corner, rtol=1e-6))
+    if len(arcs):
+        middle = view.at((outline.ends[0] + outline.ends[1])[arcs[0]] / 2)
+        page.pointer(middle, bends[1], text=f"R{_length(corner)}, ends of the edge")
 
 
-def _named_holes(page: Page, view: _View) -> None:
+def _named_holes(page: Sheet, view: _View) -> None:
     """Diameters above the view: the rightmost to the right, the others to the left, the leftmost lowest."""
     part = view.part
     named: list[tuple[Floats, float, str]] = []
@@ -240,10 +250,10 @@ def _named_holes(page: Page, view: _View) -> None:
             )
         )
     for name, text in (("hub bore", "hub bore"), ("clamp hole", "for the clamp")):
-        found = [hole for hole in part.holes if hole.name == name]
-        if found:
-            hole = min(found, key=lambda hole: float(hole.centre[0]))
-            count = f"{len(found)} × " if len(found) > 1 else ""
+        these = [hole for hole in part.holes if hole.name == name]
+        if these:
+            hole = min(these, key=lambda hole: float(hole.centre[0]))
+            count = f"{len(these)} × " if len(these) > 1 else ""
             where = ", base only" if hole.base_only else ""
             named.append((hole.centre, hole.diameter, f"{count}Ø{_length(hole.diameter)} {text}{where}"))
     if part.base_radius:
@@ -256,10 +266,10 @@ def _named_holes(page: Page, view: _View) -> None:
         lean = np.array([0.5 if right else -0.6, math.sqrt(0.75) if right else 0.8])
         tip = view.at(centre + diameter / 2 * lean)
         height = top + 6.0 + (0.0 if right else 5.5 * number)
-        page.pointer(tip, (tip[0] + (6.0 if right else -5.0), height), text)
+        page.pointer(tip, (tip[0] + (6.0 if right else -5.0), height), text=text)
 
 
-def _side_view(page: Page, view: _View) -> None:
+def _side_view(page: Sheet, view: _View) -> None:
     """Plate seen from the right: lips and, with a groove, the base plate."""
     part = view.part
     left = 184.0
@@ -281,7 +291,7 @@ def _side_view(page: Page, view: _View) -> None:
     page.measure(
         np.array([left, low]),
         np.array([left + thick, low]),
-        _length(part.number("thickness")),
+        text=_length(part.number("thickness")),
         away=low - 9.0,
     )
     if rim:
@@ -289,11 +299,11 @@ def _side_view(page: Page, view: _View) -> None:
         top = view.at(np.array([0.0, lips]))[1]
         page.measure(
             np.array([left + floor, top]), np.array([left + thick, top]),
-            _length(part.number("groove_depth")), away=high + 6.0,
+            text=_length(part.number("groove_depth")), away=high + 6.0,
         )  # fmt: skip
 
 
-def _mouth_detail(page: Page, part: CamPart) -> None:
+def _mouth_detail(page: Sheet, part: CamPart) -> None:
     """The right mouth of the channel, with the widths there and inside."""
     x, y, radius = _DETAIL
     mouth = part.number("channel_length") / 2
@@ -309,16 +319,18 @@ def _mouth_detail(page: Page, part: CamPart) -> None:
         patch.set_clip_path(frame)
     half = _MM * scale * part.number("mouth_width") / 2
     text = f"{_length(part.number('mouth_width'))} at the mouth"
-    page.measure(np.array([x, y - half]), np.array([x, y + half]), text, away=x + radius + 3.0, upright=True)
+    page.measure(
+        np.array([x, y - half]), np.array([x, y + half]), text=text, away=x + radius + 3.0, upright=True
+    )
     half, at = _MM * scale * inside / 2, x - 0.75 * radius
     text = f"{_length(inside)} inside"
     page.measure(
-        np.array([at, y - half]), np.array([at, y + half]), text, away=x - radius - 3.0, upright=True
+        np.array([at, y - half]), np.array([at, y + half]), text=text, away=x - radius - 3.0, upright=True
     )
-    page.text(x, y - radius - 3.6, f"Mouths of the channel, {scale_text(scale)}", ha="center")
+    page.text(x, y - radius - 3.6, text=f"Mouths of the channel, {scale_text(scale)}", ha="center")
 
 
-def _notes(page: Page, part: CamPart, title: TitleBlock) -> None:
+def _notes(page: Sheet, part: CamPart, title: TitleBlock) -> None:
     tolerance = _MM * part.number("edge_tolerance")
     lines = [
         f"1  Edge under the cable: lines and arcs of {title.file}, profile ± {tolerance:.3g} mm over the",
@@ -337,11 +349,11 @@ def _notes(page: Page, part: CamPart, title: TitleBlock) -> None:
         "*  Size assumed, or without a source.",
     ]
     x = 84.0 if "mouth_width" in part.numbers else 14.0
-    page.text(x, 13.0, "\n".join(lines), va="bottom", linespacing=1.45)
+    page.text(x, 13.0, text="\n".join(lines), va="bottom", linespacing=1.45)
 
 
 def _column(
-    page: Page, part: CamPart, rows: Sequence[InspectionRow], title: TitleBlock, scale: float
+    page: Sheet, part: CamPart, rows: Sequence[InspectionRow], title: TitleBlock, scale: float
 ) -> None:
     top, right = _HEIGHT - _BORDER, _WIDTH - _BORDER
     width = right - _COLUMN
@@ -357,12 +369,12 @@ def _column(
             for r in rows
         ]
         top = page.table(
-            (_COLUMN, top), (0.21 * width, 0.30 * width, 0.25 * width, 0.24 * width), [head, *cells]
+            (_COLUMN, top), (0.21 * width, 0.30 * width, 0.25 * width, 0.24 * width), rows=[head, *cells]
         )
     known = [(text, part.numbers[name]) for name, text in _SIZES if name in part.numbers]
     sizes = [(f"{text}{' *' if number.assumed else ''}", _value(number)) for text, number in known]
     sizes.append(("Edge drawn within", f"{1e6 * part.number('edge_deviation'):.2g} µm"))
-    page.table((_COLUMN, top), (0.66 * width, 0.34 * width), [("Size", "Value"), *sizes])
+    page.table((_COLUMN, top), (0.66 * width, 0.34 * width), rows=[("Size", "Value"), *sizes])
     block = [
         ("Part", title.title),
         ("Deck", title.deck),
@@ -374,19 +386,21 @@ def _column(
     row, low = 5.2, _BORDER
     for number, (name, text) in enumerate(reversed(block)):
         base = low + number * row
-        page.box(_COLUMN, base, width, row)
-        page.text(_COLUMN + 1.2, base + 1.6, name, color=MUTED.light)
+        page.box(_COLUMN, base, width=width, height=row)
+        page.text(_COLUMN + 1.2, base + 1.6, text=name, color=MUTED.light)
         longest = int(0.72 * width / 1.45)
         shown = text if len(text) <= longest else text[: longest - 1] + "…"
-        page.text(_COLUMN + 0.26 * width, base + 1.6, shown, weight="bold" if name == "Part" else "normal")
+        page.text(
+            _COLUMN + 0.26 * width, base + 1.6, text=shown, weight="bold" if name == "Part" else "normal"
+        )
 
 
-def _circle(page: Page, centre: Floats, radius: float, **look: Any) -> None:
+def _circle(page: Sheet, centre: Floats, radius: float, **look: Any) -> None:
     style: dict[str, Any] = {"facecolor": "none", "edgecolor": "#1c2127", **look}
     page.axes.add_patch(Circle((float(centre[0]), float(centre[1])), radius, **style))
 
 
-def _cross(page: Page, centre: Floats, reach: float) -> None:
+def _cross(page: Sheet, centre: Floats, reach: float) -> None:
     for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
         page.line(centre - step, centre + step, color=MUTED.light, width=0.3)
 

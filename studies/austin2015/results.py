@@ -8,12 +8,48 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.analysis import Chart
-from nlsdesign.design import CamDesign
 from nlsdesign.discrepancy import Verdict
 
+from .._designed import MadeCam
 from .figures import FigureComparison
 from .observer import ObserverComparison
 from .torque_loop import TorqueLoop
+from .tracking import Following, tracking_numbers
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorResults:
+    """What follows from one actuator, the published or the designed.
+
+    Parameters
+    ----------
+    actuator, model
+        As declared, and flattened.
+    chart
+        Observability and stability over the cam angle.
+    observers
+        Minimal and published form on the bench.
+    following
+        Closed torque loop on sines of the wanted torque.
+    loop
+        Generated code and the co-simulated torque loop.
+    """
+
+    actuator: nls.Assembly
+    model: nls.FlatModel
+    chart: Chart
+    observers: ObserverComparison
+    following: tuple[Following, ...]
+    loop: TorqueLoop
+
+    @property
+    def rank_at_zero(self) -> float:
+        """Rank of the observability matrix at angle zero."""
+        return float(self.chart["observability.rank"][len(self.chart.at) // 2])
+
+    def followed(self, proportional: float, frequency: float) -> Following:
+        """Return the run of the torque loop with a gain at a frequency in Hz."""
+        return next(r for r in self.following if (r.proportional, r.frequency) == (proportional, frequency))
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,44 +58,49 @@ class Results:
 
     Parameters
     ----------
-    actuator, model
-        As declared, and flattened.
-    design
-        Cam, pretension and rubber for the torque curve of 2014.
+    published, designed
+        The published actuator, and the one with the designed spring in its place.
+    cam
+        Cam, pretension and rubber for the torque curve of 2014, and the part as it is made.
     figures
-        Model against the figures of the paper.
-    chart
-        Observability and stability over the cam angle.
-    observers
-        Minimal and published form on the bench.
-    loop
-        Generated code and the closed torque loop.
+        Published actuator against the figures of the paper.
     verdict
-        Of the diagnosis of the bench records.
+        Of the diagnosis of the bench records of the published actuator.
     """
 
-    actuator: nls.Assembly
-    model: nls.FlatModel
-    design: CamDesign
+    published: ActuatorResults
+    designed: ActuatorResults
+    cam: MadeCam
     figures: FigureComparison
-    chart: Chart
-    observers: ObserverComparison
-    loop: TorqueLoop
     verdict: Verdict
+
+    @property
+    def both(self) -> dict[str, ActuatorResults]:
+        """Both actuators by name."""
+        return {"published": self.published, "designed": self.designed}
 
     @property
     def numbers(self) -> dict[str, float]:
         """The claimed numbers, by name with unit."""
-        figures, observers = self.figures, self.observers
-        return {
-            "design_torque_error_mNm_rms": 1e3 * self.design.rms,
+        figures, tolerance, curves = self.figures, self.cam.tolerance, self.cam.design.curves
+        numbers = {
+            "design_torque_error_mNm_rms": 1e3 * self.cam.design.rms,
+            "design_cable_force_N": float(np.max(curves.forces)),
+            "design_quantile_mNm_rms": 1e3 * tolerance.quantiles[-1].value,
+            "design_quantile_after_trim_mNm_rms": 1e3 * tolerance.trims[0].quantiles[-1].value,
             "fig8_rms_error_Nm": figures.agreement.rmse,
             "fig8_mean_relative_error_percent": figures.agreement.relative,
             "fig8_hooke_mean_relative_error_percent": figures.hooke_agreement.relative,
             "fig1_loop_area_model_over_paper": figures.loops["45°"].area_ratio,
-            "observability_rank_at_zero": float(self.chart["observability.rank"][len(self.chart.at) // 2]),
-            "cosimulation_difference_Nm": float(np.max(np.abs(self.loop.difference))),
             "verdict_held_out_error_over_noise": self.verdict.held_out_ratio,
-            "observer_minimal_error_mNm_rms": 1e3 * observers.error(observers.minimal_estimate),
-            "observer_published_error_mNm_rms": 1e3 * observers.error(observers.published_estimate),
         }
+        for name, each in self.both.items():
+            difference = float(np.max(np.abs(each.loop.difference)))
+            numbers |= {
+                f"{name}_rank_at_zero": each.rank_at_zero,
+                f"{name}_cosimulation_difference_Nm": difference,
+                f"{name}_nominal_error_minimal_form_mNm_rms": 1e3 * each.observers.minimal_error,
+                f"{name}_nominal_error_published_form_mNm_rms": 1e3 * each.observers.published_error,
+                f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
+            }
+        return numbers | tracking_numbers({name: each.following for name, each in self.both.items()})

@@ -57,6 +57,29 @@ def test_what_the_cam_takes_up_of_the_cable_is_the_integral_of_the_lever_arm(anc
     assert length - length[0] == pytest.approx(taken, abs=1e-9 if anchor < 1.0 else 1e-8)
 
 
+def test_a_parallel_cable_is_the_limit_of_a_far_anchor() -> None:
+    near, far, parallel = wavy(1e3), wavy(1e5), wavy(np.inf)
+    for quantity in ("angles", "taken_lengths", "points", "arc_lengths"):
+        once, twice, limit = (getattr(contour, quantity) for contour in (near, far, parallel))
+        assert np.all(np.isfinite(limit))
+        # What is missing falls with the distance.
+        assert np.abs(twice - limit).max() <= 0.011 * np.abs(once - limit).max() + 1e-12, quantity
+        assert np.abs(twice - limit).max() < 1e-6, quantity
+    for angle in (0.0, 0.7, -0.7):
+        contact, beyond = parallel.cable(angle)
+        assert contact == pytest.approx(far.cable(angle)[0], abs=1e-6)
+        assert beyond[1] == contact[1], "the cable is not parallel to the x axis"
+        assert beyond[0] > 5 * parallel.radii.max()
+
+
+@pytest.mark.parametrize("anchor", [*ANCHORS, np.inf])
+def test_the_length_taken_up_is_the_integral_of_the_lever_arm_one_sided_too(anchor: float) -> None:
+    angles = np.linspace(0.0, 1.2, 400)
+    contour = contour_from_lever_arm(angles, 6e-3 + 5e-3 * angles**2, anchor_distance=anchor)
+    wanted = 6e-3 * contour.angles + 5e-3 * contour.angles**3 / 3
+    assert contour.taken_lengths == pytest.approx(wanted, abs=2e-8)
+
+
 @pytest.mark.parametrize("anchor", ANCHORS)
 def test_radius_of_curvature_is_that_of_circles_through_three_points(anchor: float) -> None:
     contour = wavy(anchor, refine=160)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 
 from nlsdesign.design import (
     BoltCircle,
@@ -113,6 +114,28 @@ def test_a_cable_on_the_machined_edge_gives_the_claimed_torque(name: str, tmp_pa
         # The arcs of the edge are within half a micrometre, what they were made from within less.
         assert laid == pytest.approx(arms, abs=2e-3)
     assert len(strings(text)) == (1 if name.startswith("one") else 2)
+
+
+@pytest.mark.parametrize("anchor", [22e-3, math.inf])
+def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_curve(
+    anchor: float, tmp_path: Path
+) -> None:
+    part = MachinedTwoSidedCam(cable_radius=CABLE).part(sharp(anchor))
+    stated = 1e3 * part.number("edge_deviation")
+    assert stated <= 1e-3
+    *_, file = write_drawings(tmp_path, sharp(anchor), machined=MachinedTwoSidedCam(cable_radius=CABLE))
+    edge = max(polylines_of(file.read_text(encoding="utf-8"), "EDGE"), key=lambda item: -item[:, 1].mean())
+    drawn = offset_points(edge, 0.0, step=4e-5)
+    # dx = ρ·t·dφ from the mouth at 7 mm, less the radius of the cable along the normal.
+    phi = np.linspace(0.0, 1.3, 40001)
+    rho = np.interp(phi, np.linspace(0.0, 1.3, 9), [4.0, 1.0, 9.0, 12.0, 2.0, 6.0, 6.0, 3.0, 8.0])
+    place = np.array([7.0, 0.0]) + np.column_stack(
+        [cumulative_simpson(rho * f, x=phi, initial=0.0) for f in (np.cos(phi), -np.sin(phi))]
+    )
+    wanted = (place - 0.25 * np.column_stack([np.sin(phi), np.cos(phi)]))[::200]
+    away = [np.min(np.hypot(*(drawn - point).T)) for point in wanted]
+    # Drawn points are up to 0.5 µm apart, so the nearest of them may lie 0.25 µm further along.
+    assert max(np.sqrt(np.maximum(np.square(away) - 0.25e-3**2, 0.0))) < 1.05 * stated
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import nnls
+from scipy.optimize import minimize, nnls
 
 from nlsdesign.design import (
+    LeastEnergy,
     LeastPeakPower,
     MotorAndGear,
     OddSpring,
@@ -227,6 +228,40 @@ def test_peak_power_against_every_linear_spring() -> None:
     assert curve.linear.peak_power == pytest.approx(by_trying, rel=0.01)
     assert curve.best.peak_power < 0.98 * by_trying
     assert curve.bound is None
+
+
+def test_peak_power_against_another_solver() -> None:
+    """The same unknowns and samples in SLSQP, from the spring of least energy: it finds nothing better."""
+    problem = TaskProblem(goal=LeastPeakPower(), pieces=16)
+    program = problem.program(WALKING["ankle"], DRIVE)
+    start = LeastEnergy().best(program).unknowns
+    (a, b), (c, d) = (program.affine()[name] for name in ("torque", "speed"))
+    a, b, c, d = a[::2] * start, b[::2], c[::2] * start, d[::2]
+
+    def power(x: np.ndarray) -> np.ndarray:
+        return (a @ x[:-1] + b) * (c @ x[:-1] + d)
+
+    def slope(x: np.ndarray) -> np.ndarray:
+        along = a * (c @ x[:-1] + d)[:, None] + c * (a @ x[:-1] + b)[:, None]
+        return np.column_stack([along, np.zeros(len(b))])
+
+    last = np.eye(len(start) + 1)[-1]
+    deflection = program.affine()["deflection"][0][::2] * start
+    rows = np.column_stack([deflection, np.zeros(len(deflection))])
+    first = np.append(np.ones(len(start)), np.max(np.abs(power(np.append(np.ones(len(start)), 0.0)))))
+    theirs = minimize(
+        lambda x: x[-1], first, jac=lambda x: last, method="SLSQP", options={"maxiter": 300},
+        bounds=[(program.floor / each, None) for each in start] + [(0.0, None)],
+        constraints=[
+            {"type": "ineq", "fun": lambda x: x[-1] - power(x), "jac": lambda x: last - slope(x)},
+            {"type": "ineq", "fun": lambda x: x[-1] + power(x), "jac": lambda x: last + slope(x)},
+            {"type": "ineq", "fun": lambda x: np.pi / 2 - rows @ x, "jac": lambda x: -rows},
+            {"type": "ineq", "fun": lambda x: np.pi / 2 + rows @ x, "jac": lambda x: rows},
+        ],
+    )  # fmt: skip
+    assert theirs.fun < 0.97 * first[-1], "it went somewhere"
+    ours = program.motor(problem.goal.best(program).unknowns).peak_power
+    assert ours <= 1.01 * theirs.fun
 
 
 def test_a_limit_is_kept_and_costs_heat() -> None:

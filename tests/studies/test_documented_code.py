@@ -37,7 +37,7 @@ def test_the_code_in_the_other_documents_runs(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for document in sorted((root / "docs").glob("*.md")):
+    for document in sorted((root / "docs").rglob("*.md")):
         shown = document.read_text(encoding="utf-8").count("```python")
         assert len(run_blocks(document)) == shown, document.name
 

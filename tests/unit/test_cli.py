@@ -82,16 +82,9 @@ def test_unknown_deck_names_the_nearest(run: Run) -> None:
 
 
 def test_infeasible_limits_are_named(run: Run, tmp_path: Path) -> None:
-    words = [
-        "--maximum",
-        "5 N*m",
-        "--angle",
-        "53 deg",
-        "--minimum-radius",
-        "30 mm",
-        "--maximum-radius",
-        "5 mm",
-    ]
+    words = ["--maximum", "5 N*m", "--angle", "53 deg"]
+    words += ["--limit", 'MinimumRadiusOfCurvature = {radius = "30 mm"}']
+    words += ["--limit", 'MaximumCamRadius = {radius = "5 mm"}']
     status, _, err = run("design", "--deck", DECK, *words)
     assert status == 2
     assert "MinimumRadiusOfCurvature" in err
@@ -103,6 +96,46 @@ def test_number_without_unit_is_refused(run: Run) -> None:
     status, _, err = run("design", "--deck", DECK, "--maximum", "5", "--angle", "53 deg")
     assert status == 2
     assert "has no unit" in err
+
+
+def test_a_design_that_misses_is_no_success(run: Run, tmp_path: Path) -> None:
+    """The contour alone cannot give the published actuator 5 N·m: the rubber would tear."""
+    words = [
+        "--target",
+        'PowerTorque = {coefficient = 3.4, exponent = 1.0, angle = "50 deg"}',
+        "--draws",
+        "0",
+    ]
+    words += ["--free", "spring.cam.contour", "--free", "spring.pretension", "--out", "o"]
+    status, out, err = run("design", "--deck", "austin2015_as_printed", *words)
+    assert status == 1, err
+    assert "MISSES ITS TARGET" in out
+    assert "what would help" in out
+    assert "no drawings are written" in out
+    assert not list((tmp_path / "o").glob("*.dxf"))
+    assert json.loads((tmp_path / "o" / "design.json").read_text(encoding="utf-8"))["met"] is False
+
+
+def test_a_design_file_is_followed_and_a_part_drawn(run: Run, tmp_path: Path) -> None:
+    text = """
+    free = ["spring.cam.contour", "spring.pretension", "spring.rubber.area", "spring.rubber.rest_length"]
+    [target]
+    ExponentialTorque = {maximum = "5 N*m", angle = "53 deg", shape = 1.0}
+    [limits]
+    MaximumCamRadius = {radius = "18 mm"}
+    [drawing]
+    thickness = "6 mm"
+    """
+    (tmp_path / "job.toml").write_text(text, encoding="utf-8")
+    call = ["design", "--deck", "austin2015_as_printed", "--task", "job.toml", "--draws", "0", "--out", "o"]
+    status, out, err = run(*call)
+    assert status == 0, err
+    assert "meets its target" in out
+    names = {path.name for path in (tmp_path / "o").iterdir()}
+    assert {"model.toml", "cam.dxf", "drawing.pdf", "picture.svg", "margins.svg", "design.json"} <= names
+    status, _, err = run(*call, "--maximum", "5 N*m")
+    assert status == 2
+    assert "--maximum: stand beside --task" in err
 
 
 def test_unknown_study_is_named(run: Run) -> None:

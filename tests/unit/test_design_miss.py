@@ -31,7 +31,7 @@ from nlsdesign.quantity import degrees, quantity
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, actuator
 
 LINE = PowerTorque(coefficient=3.4, exponent=1.0, angle=degrees(50.0))
-QUICK = DesignSettings(look_for_size_ranges=False)
+QUICK = DesignSettings(look_for_size_ranges=False, draws=0)
 
 
 def test_a_miss_says_how_far_where_why_and_what_to_free() -> None:
@@ -77,7 +77,7 @@ def test_a_number_without_influence_is_refused_by_name() -> None:
 
 
 def test_a_conflict_says_which_number_to_free() -> None:
-    """With 3 mm of pretension on 12.5 mm the strain begins at 0.24; nothing but the pretension is to blame."""
+    """With 3 mm of pretension on 12.5 mm the strain begins at 0.24: only the pretension is to blame."""
     keep = [MinimumRadiusOfCurvature(1e-3), MaximumCamRadius(20e-3), MaximumStrain(0.2)]
     tight = actuator(CONCAVE, pretension=3e-3)
     with pytest.raises(InfeasibleError, match=r"free spring\.pretension \(to ") as caught:
@@ -102,7 +102,7 @@ def test_declared_strength_and_cable_are_limits_unless_others_are_asked_for() ->
     looser = [MaximumCamRadius(20e-3), MaximumCableTension(1000.0)]
     other = design_cam(published, target=TARGET, free=free, keep=looser, settings=QUICK)
     assert [state.bound for state in other.limits if state.limit == "MaximumCableTension"] == [1000.0]
-    bare = DesignSettings(defaults=(), look_for_size_ranges=False)
+    bare = DesignSettings(defaults=(), look_for_size_ranges=False, draws=0)
     unlimited = design_cam(published, target=TARGET, free=PRETENSION, keep=[], settings=bare)
     assert unlimited.limits == ()
     assert any("MaximumCableTension" in remark for remark in unlimited.remarks)
@@ -110,7 +110,7 @@ def test_declared_strength_and_cable_are_limits_unless_others_are_asked_for() ->
 
 def test_starts_are_reproducible_by_seed() -> None:
     def run(seed: int) -> list[float]:
-        settings = DesignSettings(starts=6, seed=seed, look_for_size_ranges=False)
+        settings = DesignSettings(starts=6, seed=seed, look_for_size_ranges=False, draws=0)
         design = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=KEEP, settings=settings)
         return [start.cost for start in design.starts]
 
@@ -188,7 +188,7 @@ def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
 
 
 def test_a_torque_band_is_a_limit() -> None:
-    """The least mean square error has a peak of 47 mN·m; a band of 40 mN·m cuts it off."""
+    """The least mean square error peaks at 47 mN·m; a band of 40 mN·m cuts it off, at the nodes."""
     angles = np.linspace(0.0, TARGET.last_angle, 60)
     wide = TorqueBand(
         angles=tuple(angles),
@@ -197,9 +197,9 @@ def test_a_torque_band_is_a_limit() -> None:
     )
     keep = [*KEEP, TorqueWithin(wide)]
     design = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=keep, settings=QUICK)
-    assert np.max(np.abs(design.check.errors)) < 0.0415
+    assert np.max(np.abs(design.check.errors)) < 0.045
     free = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=QUICK)
-    assert np.max(np.abs(free.check.errors)) > 0.045
+    assert np.max(np.abs(free.check.errors)) > 0.0465
     short = TorqueBand(angles=(0.0, 0.3, 0.5), lower=(0.0, 0.0, 0.0), upper=(1.0, 2.0, 3.0))
     with pytest.raises(ValueRangeError, match="ends before the target does"):
         design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=[TorqueWithin(short)])

@@ -196,15 +196,27 @@ def test_step_holds_the_solids_in_millimetres(tmp_path: Path, contour: Contour) 
     number = r"(-?[\d.]+(?:E[-+]?\d+)?)"
     points = np.array(re.findall(rf"CARTESIAN_POINT\('',\({number},{number},{number}\)\)", flat), dtype=float)
     assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((0.0, 4.0))
-    radii = {round(float(item), 3) for item in re.findall(rf"=CIRCLE\('',#\d+,{number}\)", flat)}
+    entities = dict(re.findall(r"#(\d+)=([^;]*);", flat))
+    circles = []
+    for text_of in entities.values():
+        if circle := re.fullmatch(rf"CIRCLE\('',#(\d+),{number}\)", text_of):
+            place = re.match(r"AXIS2_PLACEMENT_3D\('',#(\d+)", entities[circle[1]])
+            if place is None:  # a circle in the plane of a face's own parameters
+                continue
+            centre = re.findall(number, entities[place[1]].partition("(")[2].partition("(")[2])
+            circles.append([float(item) for item in (*centre, circle[2])])
+    rows = np.array(circles)
     for outline in polylines_of(dxf.read_text(encoding="utf-8"), "EDGE"):
         for (x, y, bulge), (x1, y1, _) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
             for height in (0.0, 4.0):
                 assert np.min(np.linalg.norm(points - [x, y, height], axis=1)) < 1e-5
             if bulge:
-                radius = math.hypot(x1 - x, y1 - y) * (1 + bulge**2) / 4 / abs(bulge)
-                assert min(abs(radius - item) for item in radii) < 2e-3 * max(1.0, radius)
-    assert 0.8 in radii, "no bolt hole"
+                half, middle = complex(x1 - x, y1 - y) / 2, complex(x + x1, y + y1) / 2
+                centre_of = middle + 1j * half * (1 - bulge**2) / (2 * bulge)
+                radius = abs(half) * (1 + bulge**2) / (2 * abs(bulge))
+                wanted = [centre_of.real, centre_of.imag, radius]
+                assert np.min(np.abs(rows[:, [0, 1, 3]] - wanted).max(axis=1)) < 2e-3 * max(1.0, radius)
+    assert np.count_nonzero(np.abs(rows[:, 3] - 0.8) < 1e-9) >= 4, "no bolt holes"
     again = write_drawings(tmp_path, contour, machined=machined, formats=["step"], name="cam")[0]
     assert again.read_text(encoding="ascii") == text
 
@@ -250,6 +262,10 @@ REFUSED: dict[str, tuple[type[NlsError], str, Making]] = {
     "cable": (
         ValueRangeError, r"cable radius 3 mm: the cable is thicker than the sharpest radius.*2\.6 mm",
         lambda two, one: MachinedTwoSidedCam(cable_radius=mm(3)).part(two),
+    ),
+    "corner": (
+        ValueRangeError, r"radius of 0\.01 mm at its sharpest: is a corner within its tolerance of 0\.02",
+        lambda two, one: MachinedTwoSidedCam(cable_radius=mm(2.59), channel_clearance=0.0).part(two),
     ),
     "unit": (
         ValueRangeError, r"was 'mm' meant", lambda two, one: MachinedTwoSidedCam(cable_radius=0.25),

@@ -6,10 +6,12 @@ import math
 import re
 import xml.etree.ElementTree as ET
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from nlsdesign import figures
 from nlsdesign.design import (
@@ -33,6 +35,21 @@ TITLE = figures.TitleBlock(
 ROWS = [figures.InspectionRow(degrees(a), 0.05 * a, 2e-4 * a, 20.0 + a) for a in (0.0, 20.0, 40.0, 53.0)]
 
 
+def long() -> CamPart:
+    """As wide at 5:1 as there is room for the view."""
+    bare = contour_from_curvature(
+        [0.0, 0.5, 1.0, 1.5], [14e-3, 12e-3, 8e-3, 2e-3], first_slope=2e-3, anchor_distance=math.inf
+    )
+    # The same curve 4 mm higher.
+    contour = replace(
+        bare,
+        lever_arms=bare.lever_arms + 4e-3 * np.cos(bare.directions),
+        slopes=bare.slopes - 4e-3 * np.sin(bare.directions),
+    )
+    seat = FerruleSeat(diameter=1.5e-3)
+    return MachinedOneSidedCam(cable_radius=CABLE, lead_in=8e-3, cable_end=seat).part(contour)
+
+
 def two_sided(*, groove: bool = False) -> CamPart:
     nodes = np.linspace(0.0, 1.35, 8)
     radii = 1e-3 * np.array([2.6, 4.0, 9.0, 12.6, 12.0, 8.0, 6.0, 5.0])
@@ -43,17 +60,24 @@ def two_sided(*, groove: bool = False) -> CamPart:
             cable_radius=CABLE, bolts=bolts, cable_end=FerruleSeat(diameter=1.5e-3)
         ).part(contour)
     return MachinedTwoSidedCam(
-        cable_radius=CABLE, bolts=bolts, groove_depth=1.5e-3, hub_bore=3e-3, cable_end=ClampScrew(diameter=1e-3)
+        cable_radius=CABLE, bolts=bolts, groove_depth=1.5e-3, hub_bore=3e-3,
+        cable_end=ClampScrew(diameter=1e-3),
     ).part(contour)  # fmt: skip
 
 
-def one_sided() -> CamPart:
-    angles = np.linspace(0.0, 1.2, 100)
-    contour = contour_from_lever_arm(angles, 6e-3 + 3e-3 * angles**2, anchor_distance=math.inf)
+def one_sided(last: float = 1.2) -> CamPart:
+    angles = np.linspace(0.0, last, 100)
+    contour = contour_from_lever_arm(angles, 6e-3 + 4e-3 * (angles / last) ** 2, anchor_distance=math.inf)
     return MachinedOneSidedCam(cable_radius=CABLE, hub_bore=4e-3).part(contour)
 
 
-PARTS = {"two-sided": two_sided(), "groove": two_sided(groove=True), "one-sided": one_sided()}
+PARTS = {
+    "two-sided": two_sided(),
+    "groove": two_sided(groove=True),
+    "one-sided": one_sided(),
+    "wound": one_sided(3.5),
+    "long": long(),
+}
 
 
 def texts_of(file: Path) -> list[str]:
@@ -91,8 +115,9 @@ def test_the_page_is_a4_and_the_view_true_to_its_stated_scale(name: str, tmp_pat
 def test_the_page_says_what_the_workshop_needs(name: str, tmp_path: Path) -> None:
     texts = texts_of(written(tmp_path, name, ".svg"))
     joined = "\n".join(texts)
-    for wanted in ("Cam <A> & co", "austin2015_figure_consistent", "0123456789ab", "Ø0.5 mm", "53.0", "2.650",
-                   "10.600", "73.0", "torque in N·m", "Run-out beyond last angle *", "± 0.02 mm", "lip.dxf"):  # fmt: skip
+    for wanted in ("Cam <A> & co", "austin2015_figure_consistent", "0123456789ab", "Ø0.5 mm", "53.0",
+                   "2.650", "10.600", "73.0", "torque in N·m", "Run-out beyond last angle *", "± 0.02 mm",
+                   "lip.dxf"):  # fmt: skip
         assert wanted in joined, wanted
     outline = np.vstack([item.polygon() for item in PARTS[name].outlines])
     for size in 1e3 * np.ptp(outline, axis=0):
@@ -101,6 +126,8 @@ def test_the_page_says_what_the_workshop_needs(name: str, tmp_path: Path) -> Non
         "two-sided": ["0.5 at the mouth", "0.6 inside", "4 × Ø1.6 through, on Ø13"],
         "groove": ["Ø3 hub bore, base only", "2 × Ø1 for the clamp", "1.5"],
         "one-sided": ["Ø4 hub bore", "Lead-in"],
+        "long": ["Ferrule seat *", "5:1, A4, mm"],
+        "wound": ["contact at 200.5°,", "then run-out 10°"],
     }
     for line in wanted_here[name]:
         assert line in texts
@@ -109,7 +136,7 @@ def test_the_page_says_what_the_workshop_needs(name: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("name", PARTS)
 def test_no_two_texts_and_no_text_and_frame_overlap(name: str) -> None:
     page = figures.workshop_drawing(PARTS[name], title=TITLE, rows=ROWS)
-    renderer = page.canvas.get_renderer()  # type: ignore[attr-defined]
+    renderer = FigureCanvasAgg(page).get_renderer()
     boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in page.axes[0].texts]
     width, height = page.canvas.get_width_height()
     for index, (one, box) in enumerate(boxes):

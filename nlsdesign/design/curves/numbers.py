@@ -5,7 +5,12 @@ from __future__ import annotations
 from ...errors import UnitError, ValueRangeError
 from ...quantity import Quantity, degrees, same_dimension, with_unit
 
-_SLIPS = {"m": (("mm", 1e-3), ("cm", 1e-2)), "m^2": (("mm^2", 1e-6), ("cm^2", 1e-4)), "Pa": (("MPa", 1e6),)}
+_SLIPS = {
+    "m": (("mm", 1e-3), ("cm", 1e-2)),
+    "m^2": (("mm^2", 1e-6), ("cm^2", 1e-4)),
+    "Pa": (("MPa", 1e6),),
+    "kg/m^3": (("g/cm^3", 1e3),),
+}
 
 
 def in_si(

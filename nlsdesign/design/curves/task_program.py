@@ -197,22 +197,43 @@ def least_energy(program: TaskProgram) -> TaskOptimum:
     diagonal = np.diag(hessian)
     unit = 1.0 / np.sqrt(np.maximum(diagonal, 1e-12 * np.max(diagonal)))
     scale = max(float(np.max(np.abs(gradient * unit))), 1e-300)
-    y = ca.MX.sym("y", size)
+    scaled, slope = hessian * np.outer(unit, unit) / scale, gradient * unit / scale
+    held = np.zeros(len(offset), dtype=bool)  # most limits are far away: a row comes in when it is passed
+    while True:
+        solution = _solved((scaled, slope), (matrix[held] * unit, offset[held]), program.floor / unit)
+        if solution is None:
+            raise conflict(program)
+        unknowns = np.maximum(solution[0] * unit, program.floor)
+        size_of_rows = np.abs(offset + matrix @ unknowns)
+        peaks = (size_of_rows >= np.roll(size_of_rows, 1)) & (size_of_rows >= np.roll(size_of_rows, -1))
+        passed = peaks & ~held & (size_of_rows > 1.0 + 1e-6)
+        if not np.any(passed):
+            break
+        held |= passed
+    prices = np.zeros(len(offset))
+    prices[held] = solution[1] * scale
+    paid = float(np.sum(np.abs(prices)) - prices @ offset)
+    return TaskOptimum(
+        unknowns, _lowest(hessian, gradient + matrix.T @ prices, program.floor) - paid + constant
+    )
+
+
+def _solved(
+    quadratic: tuple[Floats, Floats], rows: tuple[Floats, Floats], floor: Floats
+) -> tuple[Floats, Floats] | None:
+    """Return the optimum of ½·yᵀHy + gᵀy with y ≥ floor and rows between −1 and 1, and the rows' prices."""
+    (hessian, gradient), (matrix, offset) = quadratic, rows
+    y = ca.MX.sym("y", len(gradient))
     inside: Any = {
         "x": y,
-        "f": 0.5 * ca.bilin(ca.DM(hessian * np.outer(unit, unit) / scale), y, y)
-        + ca.dot(ca.DM(gradient * unit / scale), y),
-        "g": ca.DM(matrix * unit) @ y + ca.DM(offset),
+        "f": 0.5 * ca.bilin(ca.DM(hessian), y, y) + ca.dot(ca.DM(gradient), y),
+        "g": ca.DM(matrix) @ y + ca.DM(offset),
     }
     solver = ca.nlpsol("least_energy", "ipopt", inside, {**_QUIET, **_QUADRATIC})
-    solution = solver(x0=program.floor / unit, lbx=program.floor / unit, lbg=-1.0, ubg=1.0)
+    solution = solver(x0=floor, lbx=floor, lbg=-1.0, ubg=1.0)
     if not solver.stats()["success"]:
-        raise conflict(program)
-    unknowns = np.maximum(np.array(solution["x"]).ravel() * unit, program.floor)
-    prices = np.array(solution["lam_g"]).ravel() * scale
-    paid = float(np.sum(np.abs(prices)) - prices @ offset) if len(prices) else 0.0
-    slope = gradient + (matrix.T @ prices if len(prices) else 0.0)
-    return TaskOptimum(unknowns, _lowest(hessian, slope, program.floor) - paid + constant)
+        return None
+    return np.array(solution["x"]).ravel(), np.array(solution["lam_g"]).ravel()
 
 
 _QUIET: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}

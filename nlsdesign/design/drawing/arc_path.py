@@ -182,7 +182,7 @@ def joined(*paths: ArcPath, closed: bool = False) -> ArcPath:
     return ArcPath(np.array(points), np.array(bulges), closed=closed)
 
 
-def arc_along(start: Floats, tangent: Floats, end: Floats) -> float:
+def arc_along(start: Floats, end: Floats, *, tangent: Floats) -> float:
     """Return the bulge of the arc that leaves a point along a tangent and ends in another.
 
     Parameters
@@ -197,7 +197,7 @@ def arc_along(start: Floats, tangent: Floats, end: Floats) -> float:
     return math.tan(math.atan2(across, float(tangent @ chord)) / 2.0)
 
 
-def biarc(start: Floats, first: Floats, end: Floats, last: Floats) -> ArcPath:
+def biarc(start: Floats, end: Floats, *, first: Floats, last: Floats) -> ArcPath:
     """Return the two arcs that join two points with given tangents, without a corner between them.
 
     Parameters
@@ -220,7 +220,7 @@ def biarc(start: Floats, first: Floats, end: Floats, last: Floats) -> ArcPath:
     else:
         reach = square / (4.0 * float(chord @ last))
     middle = (start + end + reach * (first - last)) / 2.0
-    bulges = [arc_along(start, first, middle), -arc_along(end, -last, middle), 0.0]
+    bulges = [arc_along(start, middle, tangent=first), -arc_along(end, middle, tangent=-last), 0.0]
     return ArcPath(np.array([start, middle, end]), np.array(bulges))
 
 
@@ -278,8 +278,8 @@ def crossing(polygon: Floats) -> Floats | None:
         hit = np.flatnonzero((first * second < 0.0) & (third * fourth < 0.0))
         if len(hit):
             share = third[hit[0]] / (third[hit[0]] - fourth[hit[0]])
-            found: Floats = a + share * (b - a)
-            return found
+            place: Floats = a + share * (b - a)
+            return place
     return None
 
 

@@ -227,7 +227,7 @@ def svg_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
         ],
         '<path d="M -1.5 0 H 1.5 M 0 -1.5 V 1.5" stroke="#202020" stroke-width="0.1"/>',
     ]
-    return page(reach, body, ["Cam contour, no edge to be cut; mm, 1:1", note])
+    return page(reach, body, lines=["Cam contour, no edge to be cut; mm, 1:1", note])
 
 
 def dxf_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> str:

@@ -144,7 +144,7 @@ def _relief(mouth: Floats, direction: float, wall: float, tool_radius: float) ->
     radius = max(tool_radius, depth)
     start = mouth - [math.sqrt(4.0 * radius * depth - depth**2), depth]
     tangent = np.array([math.cos(direction), -math.sin(direction)])
-    return biarc(start, np.array([1.0, 0.0]), mouth, tangent)
+    return biarc(start, mouth, first=np.array([1.0, 0.0]), last=tangent)
 
 
 def _seat(radius: float, depth: float) -> ArcPath:

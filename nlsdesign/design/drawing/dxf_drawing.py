@@ -84,13 +84,11 @@ def contour_dxf(outlines: tuple[Floats, ...], *, lines: list[str]) -> str:
 
 
 def _part_lines(part: CamPart, note: str) -> list[str]:
-    size = {
-        name: f"{_MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness", "edge_deviation")
-    }
+    size = {name: f"{_MM * part.number(name):.4g} mm" for name in ("cable_radius", "thickness")}
     lines = [
         "Cam, machined edge; millimetres, 1:1",
         f"for a cable of radius {size['cable_radius']}, plate {size['thickness']}",
-        f"arcs within {size['edge_deviation']} of the exact edge",
+        f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
     ]
     if "groove_depth" in part.numbers:
         lines.append(f"edges milled {_MM * part.number('groove_depth'):.4g} mm deep, base disc below")

@@ -145,7 +145,7 @@ def _arcs(support: BPoly, phi: Floats, cable_radius: float) -> tuple[ArcPath, fl
 
 def _biarc_over(support: BPoly, first: float, last: float, cable_radius: float) -> tuple[ArcPath, float]:
     start, end = (_point(support, direction, cable_radius) for direction in (first, last))
-    path = biarc(start, _tangent(first), end, _tangent(last))
+    path = biarc(start, end, first=_tangent(first), last=_tangent(last))
     phi = np.linspace(first, last, _CHECKED)
     normals = np.column_stack([np.sin(phi), np.cos(phi)])
     tangents = normals[:, ::-1] * [1.0, -1.0]

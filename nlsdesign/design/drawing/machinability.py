@@ -96,6 +96,13 @@ def _check_backs(part: CamPart, lower: Floats) -> None:
 
 
 def _check_tool(part: CamPart) -> None:
+    sharpest, tolerance = part.number("sharpest_edge"), part.number("edge_tolerance")
+    if sharpest < tolerance:
+        raise ValueRangeError(
+            f"edge under the cable, with a radius of {_MM * sharpest:.3g} mm at its sharpest",
+            f"is a corner within its tolerance of {_MM * tolerance:.3g} mm",
+            next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
+        )
     tool = part.number("tool_radius")
     inner = np.concatenate([outline.radii for outline in part.outlines])
     # Edges are clockwise: a turn to the left is an inner corner.

@@ -50,10 +50,10 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
         f"Machined edge for a cable of radius {_MM * part.number('cable_radius'):.4g} mm, "
         f"plate {_MM * part.number('thickness'):.4g} mm; mm, 1:1"
     )
-    return page(reach, body, [text, note])
+    return page(reach, body, lines=[text, note])
 
 
-def page(reach: float, body: list[str], lines: list[str]) -> str:
+def page(reach: float, body: list[str], *, lines: list[str]) -> str:
     """Return a square page about the axis with some lines of text below.
 
     Parameters

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import casadi as ca
 
 from ...errors import ArrangementError
+from ...model import FlatModel
 from ...model.structure import CamNames
 from ...symbolic import Expression
 from ..curves.target import Target
+from ..statics.equilibrium import ElasticLaw
+from ..statics.relaxing_law import RelaxingLaw, relaxing_law
 
 
 def anchor_of(cam: CamNames) -> str:
@@ -72,8 +76,14 @@ class DesignPoint:
         All parameters of the flat model by name; symbols where they are free.
     element
         What one element does at an extension in m.
+    through_centre
+        Whether the cable passes through the centre, so that both signs of the angle stretch the rubber alike.
     shown_units
         Unit in which each parameter is shown.
+    model
+        Flat model of the actuator, with its numbers as they are declared.
+    law
+        Equilibrium law of one element.
     """
 
     cam: CamNames
@@ -92,7 +102,15 @@ class DesignPoint:
     torque_errors: Expression
     parameters: Mapping[str, Expression]
     element: Callable[[Expression], Stretched]
+    through_centre: bool
     shown_units: Mapping[str, str]
+    model: FlatModel
+    law: ElasticLaw
+
+    @cached_property
+    def relaxing(self) -> RelaxingLaw:
+        """Law of one element with its inner states free."""
+        return relaxing_law(self.model, self.cam.drive)
 
     @property
     def elements(self) -> Expression:

@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...errors import NlsError
 from ...model import FlatModel, flatten
 from ...quantity import Quantity, significant
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
-from .checks import torque_check, torque_sensitivity
+from ..tolerance.monte_carlo import tolerance_analysis
+from ..tolerance.tolerance_result import ToleranceResult
+from .checks import torque_check
 from .design_search import Search, carried_over
 from .limits import Bound
 from .problem import DesignProblem
@@ -149,7 +152,8 @@ def finished(solved: SolvedSearch) -> CamDesign:
     search, problem, best = solved.search, solved.search.problem, solved.best
     contour, fit = solved.contour_fit
     settings, design = search.question.settings, problem.design
-    limits = tuple(_state(problem, bound, best.point) for bound in search.bounds)
+    limits = tuple(limit_state(problem, bound, best.point) for bound in search.bounds)
+    tolerance, remarks = _tolerance(solved)
     return CamDesign(
         target=design.target,
         changes=tuple(solved.changes.items()),
@@ -159,9 +163,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         contour=contour,
         fit_error=0.0 if fit is None else fit.error,
         limits=limits,
-        sensitivity=torque_sensitivity(
-            solved.model, target=design.target, spring=_spring_of(solved.model, problem.law.cam.name)
-        ),
+        tolerance=tolerance,
         curves=_curves(problem, best.point),
         rubber_volume=float(problem.evaluate(design.rubber_volume, best.point)[0]),
         starts=tuple(
@@ -172,8 +174,28 @@ def finished(solved: SolvedSearch) -> CamDesign:
         if settings.look_for_size_ranges
         else (),
         miss=_miss(solved, limits),
-        remarks=_remarks(search),
+        remarks=(*_remarks(search), *remarks),
+        drive=problem.law.cam.drive,
     )
+
+
+def _tolerance(solved: SolvedSearch) -> tuple[ToleranceResult | None, tuple[str, ...]]:
+    """Return the tolerance analysis, or why there is none."""
+    settings = solved.search.question.settings
+    if not settings.draws:
+        return None, ()
+    try:
+        analysis = tolerance_analysis(
+            solved.changed,
+            target=solved.search.problem.design.target,
+            name=solved.search.problem.law.cam.drive,
+            draws=settings.draws,
+            seed=settings.seed,
+        )
+    except NlsError as error:
+        # The design stands without it; the reason is among its remarks.
+        return None, (f"no tolerance: {error}",)
+    return analysis, ()
 
 
 def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
@@ -270,7 +292,18 @@ def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tupl
     return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
 
 
-def _state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:
+    """Return how a design stands to a limit.
+
+    Parameters
+    ----------
+    problem
+        Its problem.
+    bound
+        One side of the limit.
+    point
+        Shape (variables,), scaled.
+    """
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale

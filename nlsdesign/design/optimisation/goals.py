@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -12,6 +13,16 @@ from .design_point import DesignPoint
 
 _LENGTH = 0.01
 """Typical radius of curvature in m; it only scales the roughness."""
+_FLOOR = 1e-6
+"""Rms error relative to the largest torque that keeps the root smooth where the error vanishes."""
+
+
+class GoalMeasure(NamedTuple):
+    """What a goal is about: a column in SI of which the largest counts, and the unit in which it is shown."""
+
+    what: str
+    expression: Expression
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -28,10 +39,24 @@ class Goal(ABC):
             The design in symbols.
         """
 
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return what the goal is about, as it is compared between designs; the cost by itself.
+
+        Parameters
+        ----------
+        design
+            The design in symbols.
+        """
+        return GoalMeasure(f"cost of {type(self).__name__}", ca.SX(self.cost(design)), "1")
+
 
 @dataclass(frozen=True)
 class TorqueError(Goal):
     """Mean over the angle of the squared torque error."""
+
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the rms torque error."""
+        return rms_of_mean_square("rms torque error", design.mean_square_error, design)
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return (rms error / 0.1 % of the largest torque)²."""
@@ -79,7 +104,26 @@ class LeastRubber(Goal):
     weight: float = 1e-3
     energy_density: float = 6e5
 
+    def measured(self, design: DesignPoint) -> GoalMeasure:
+        """Return the volume."""
+        return GoalMeasure("rubber volume", ca.SX(design.rubber_volume), "cm^3")
+
     def cost(self, design: DesignPoint) -> Expression:
         """Return weight · volume / typical volume."""
         needed = float(design.target.energy(design.target.last_angle)) / self.energy_density
         return self.weight * design.rubber_volume / needed
+
+
+def rms_of_mean_square(what: str, mean_square: Expression, design: DesignPoint) -> GoalMeasure:
+    """Return a mean square torque as its root, smooth where it vanishes.
+
+    Parameters
+    ----------
+    what
+        In words.
+    mean_square
+        In (N·m)².
+    design
+        The design in symbols.
+    """
+    return GoalMeasure(what, ca.sqrt(mean_square + (_FLOOR * design.target.largest) ** 2), "mN*m")

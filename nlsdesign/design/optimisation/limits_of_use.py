@@ -80,7 +80,13 @@ class TorqueWithin(Limit):
     band: TorqueBand
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
-        """Yield both edges, without angle zero, where a cable through the centre has no torque."""
+        """Yield both edges at the nodes of the contour, without angle zero, where there may be no torque.
+
+        Raises
+        ------
+        ValueRangeError
+            If the band ends before the target does.
+        """
         if self.band.last_angle < design.target.last_angle * (1 - 1e-9):
             raise ValueRangeError(
                 f"TorqueWithin: band up to {self.band.last_angle:.4g} rad",

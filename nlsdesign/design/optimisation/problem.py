@@ -42,7 +42,7 @@ class DesignProblem:
     law
         Equilibrium law of the element behind the cam.
     variables
-        All, in the order of the vector: single numbers, contour, torque errors.
+        All, in the order of the vector: single numbers, contour, states, torque errors.
     design
         The design in symbols.
     structure
@@ -53,6 +53,8 @@ class DesignProblem:
         The variables of the contour; ``None`` where it is given.
     sizes
         What starts are relative to.
+    states
+        Scaled values of the unknowns that the structure ties to the contour; they follow its variables.
     """
 
     law: ElasticLaw
@@ -81,15 +83,20 @@ class DesignProblem:
         return {v.name: float(value) for v, value in zip(self.variables, values, strict=True)}
 
     def chosen(self, point: Floats) -> dict[str, float]:
-        """Return the scaled values by name, without the torque errors, which follow from them.
+        """Return the scaled values by name, without states and torque errors, which follow from them.
 
         Parameters
         ----------
         point
             Shape (variables,) or longer, scaled.
         """
-        kept = len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
+        kept = self._chosen
         return {v.name: float(value) for v, value in zip(self.variables[:kept], point[:kept], strict=True)}
+
+    @property
+    def _chosen(self) -> int:
+        """Number of variables from which the others follow."""
+        return len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
 
     def evaluate(self, expression: Expression, point: Floats) -> Floats:
         """Return the value of an expression of the variables.
@@ -118,7 +125,7 @@ class DesignProblem:
         return self.completed(values)
 
     def completed(self, values: dict[str, float]) -> Floats:
-        """Return a point at which the equations of the torque errors hold.
+        """Return a point at which the equations of states and torque errors hold.
 
         Parameters
         ----------
@@ -127,8 +134,7 @@ class DesignProblem:
         """
         point = np.array([values.get(v.name, v.start) for v in self.variables])
         if self.states.shape[0]:
-            first = len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
-            point[first : first + self.states.shape[0]] = self.evaluate(self.states, point)
+            point[self._chosen : self._chosen + self.states.shape[0]] = self.evaluate(self.states, point)
         errors = self.structure[-1].expression / _ERROR_SCALE
         point[len(point) - errors.shape[0] :] += self.evaluate(errors, point)
         return point
@@ -190,7 +196,7 @@ def design_problem(
         DesignProblem(
             law=law,
             variables=(*scalars.values(), *(contour.all() if contour else ()), *shape.states),
-            design=_design(law, target, shape, parameters),
+            design=_design(model, law, target, shape, parameters),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
@@ -285,7 +291,9 @@ def _lifted(problem: DesignProblem) -> DesignProblem:
     )
 
 
-def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]) -> DesignPoint:
+def _design(
+    model: FlatModel, law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str, Expression]
+) -> DesignPoint:
     cam = law.cam
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
 
@@ -315,5 +323,8 @@ def _design(law: ElasticLaw, target: Target, shape: Shape, parameters: dict[str,
         torque_errors=parameters[cam.elements] * shape.lever_arms * forces - wanted,
         parameters=parameters,
         element=element,
+        through_centre=shape.through_centre,
         shown_units={v.name: _SHOWN.get(v.unit, v.unit) for v in law.parameters},
+        model=model,
+        law=law,
     )

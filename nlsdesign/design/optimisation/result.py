@@ -13,6 +13,7 @@ from ...quantity import Quantity, parse_unit, with_unit
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
+from ..tolerance.tolerance_result import ToleranceResult
 from .remedies import Remedies
 from .size_ranges import SizeRange
 
@@ -88,32 +89,6 @@ class TorqueCheck:
     def largest(self) -> float:
         """Largest magnitude of the error."""
         return float(np.max(np.abs(self.errors)))
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Torque error when the moduli of the rubber lie at the edges of their stated spread.
-
-    Parameters
-    ----------
-    rms
-        Largest rms error over all corners, in N·m.
-    corner
-        Relative deviation of each modulus there, by name.
-    """
-
-    rms: float
-    corner: tuple[tuple[str, float], ...]
-
-    def __str__(self) -> str:
-        if not self.corner:
-            return "no modulus has a stated spread"
-        signs = {deviation > 0.0 for _, deviation in self.corner}
-        where = (
-            "all moduli high" if signs == {True} else "all moduli low" if signs == {False} else "moduli mixed"
-        )
-        largest = max(abs(deviation) for _, deviation in self.corner)
-        return f"{1e3 * self.rms:.4g} mN·m rms at worst ({where}, spread up to {100 * largest:.3g} %)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,8 +225,9 @@ class CamDesign:
         Largest deviation of the declared lever arm from that of the contour, in m.
     limits
         State of every limit.
-    sensitivity
-        Torque error over the spread of the moduli.
+    tolerance
+        What the spreads of all numbers do to the torque error; ``None`` where it was not asked for, or where
+        the remarks say why there is none.
     curves
         What cam and rubber do over the angle.
     rubber_volume
@@ -268,6 +244,8 @@ class CamDesign:
         What a designer should know besides.
     alternatives
         All combinations of the stock that was offered.
+    drive
+        Path of the part that holds the cam.
     """
 
     target: Target
@@ -278,7 +256,7 @@ class CamDesign:
     contour: Contour
     fit_error: float
     limits: tuple[LimitState, ...]
-    sensitivity: Sensitivity
+    tolerance: ToleranceResult | None
     curves: DesignCurves
     rubber_volume: float
     starts: tuple[StartOutcome, ...]
@@ -287,6 +265,7 @@ class CamDesign:
     miss: Miss | None = None
     remarks: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
+    drive: str | None = None
 
     @property
     def met(self) -> bool:
@@ -354,7 +333,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
             "torque error",
             f"{1e3 * check.rms:.3g} mN·m rms ({share * check.rms:.2g} %), {1e3 * largest:.3g} mN·m at most",
         ),
-        ("over the spread", str(design.sensitivity)),
+        *_spread_rows(design),
         ("cable force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each cable"),
         *((f"strain of {path}", f"up to {100 * row.max():.4g} %") for path, row in curves.strains.items()),
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
@@ -386,6 +365,20 @@ def _starts(design: CamDesign) -> str:
         return text + "; no second one to compare with"
     ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
     return text + f"; the next best has {ratio:.4g} times the cost, {1e3 * others[0].rms:.3g} mN·m rms"
+
+
+def _spread_rows(design: CamDesign) -> list[tuple[str, str]]:
+    spread = design.tolerance
+    if spread is None:
+        return []
+    worst = spread.quantiles[-1]
+    below = f"{1e3 * worst.value:.4g} mN·m rms ({len(spread.errors)} draws)"
+    text = f"{100 * worst.share:g} % of made springs below {below}"
+    if spread.trims:
+        trim = spread.trims[0]
+        text += f", {1e3 * trim.quantiles[-1].value:.4g} after a trim of {trim.name}"
+    first = spread.measure_first
+    return [("over the spread", text), *([] if first is None else [("measure first", first)])]
 
 
 def _alternative(design: CamDesign, each: Alternative) -> str:

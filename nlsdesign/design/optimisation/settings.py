@@ -33,6 +33,8 @@ class DesignSettings:
         Whether the ranges of sizes that cost nothing are looked for, which takes as long as the design again.
     look_for_remedies
         Whether it is found out, at a miss, what to free.
+    draws
+        Number of made springs of the tolerance analysis, at least 20; zero for none.
     progress
         Called after each starting point, or after each combination of a stock.
 
@@ -53,6 +55,7 @@ class DesignSettings:
     defaults: Sequence[Limit] | None = None
     look_for_size_ranges: bool = True
     look_for_remedies: bool = True
+    draws: int = 200
     progress: Callable[[], None] = _quiet
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...model import FlatModel
 from ...symbolic import Expression
-from ..statics.declared_cam import contour_of_cam
+from ..statics.declared_cam import contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
 from .program import Rows
 from .variables import DesignVariable
@@ -33,7 +33,12 @@ _LEAST_CLEARANCE = 0.02
 
 
 class Shape(NamedTuple):
-    """Columns over the nodes of a contour, and what must hold for it to be one."""
+    """Columns over the nodes of a contour, what must hold for it to be one, and where its cable passes.
+
+    ``states`` are unknowns that the rows tie to the contour: p, p' and ∫ρ at each node, so that what is asked
+    of a node depends on a few unknowns only, and the derivatives are sparse; ``state_values`` are their
+    scaled values as they follow from the contour.
+    """
 
     directions: Expression
     angles: Expression
@@ -43,8 +48,9 @@ class Shape(NamedTuple):
     extensions: Expression
     lever_arm_slopes: Expression
     rows: tuple[Rows, ...]
-    states: tuple[DesignVariable, ...] = ()
-    state_values: Expression = ca.SX(0, 1)
+    through_centre: bool
+    states: tuple[DesignVariable, ...]
+    state_values: Expression
 
 
 class ContourVariables(NamedTuple):
@@ -64,7 +70,7 @@ class ContourVariables(NamedTuple):
 
 
 class _Support(NamedTuple):
-    """Columns of p, p' and ∫ρ over the nodes."""
+    """Columns of p, p' and ∫ρ over the nodes; the unknowns that they are, with what ties these down."""
 
     values: Expression
     slopes: Expression
@@ -106,17 +112,9 @@ def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[
     )
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     return variables, Shape(
-        directions,
-        angles,
-        p,
-        slope,
-        rho,
-        extensions,
-        slope * root / (root - slope),
-        rows,
-        support.states,
-        support.state_values,
-    )
+        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows, True,
+        support.states, support.state_values,
+    )  # fmt: skip
 
 
 def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
@@ -137,17 +135,9 @@ def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     rows = (support.rows, Rows(p / size, 0.0, ca.inf))
     return variables, Shape(
-        directions,
-        directions,
-        p,
-        slopes,
-        rho,
-        arcs - (slopes - slopes[0]),
-        slopes,
-        rows,
-        support.states,
-        support.state_values,
-    )
+        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False,
+        support.states, support.state_values,
+    )  # fmt: skip
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
@@ -171,7 +161,8 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
     return Shape(
         ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
         ca.SX(contour.radii_of_curvature), ca.SX(extensions).T,
-        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (),
+        ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), declared_cam(cam).through_centre,
+        (), ca.SX(0, 1),
     )  # fmt: skip
 
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...components.assembly.named_parts import Assembly
-from ...components.core.element import Element
-from ...errors import ConvergenceError, InfeasibleError, NlsError, ValueRangeError
+from ...errors import ConvergenceError, InfeasibleError, NlsError
 from ...model import flatten
 from ...model.roles import series_cam
 from ...processes import parallel_map
 from ..curves.target import Target
+from ..statics.smooth_cables import with_smooth_cables
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
 from .design_search import Question
@@ -22,7 +22,7 @@ from .problem import contour_names
 from .program import Solution
 from .result import Alternative, CamDesign
 from .settings import DesignSettings
-from .stock import StockChoice, combinations
+from .stock import StockChoice, combinations, require_once
 
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
@@ -89,13 +89,8 @@ def design_cam(
     """
     choices = [each for each in free or () if isinstance(each, StockChoice)]
     names = None if free is None else tuple(each for each in free if isinstance(each, str))
-    for each in choices:
-        if each.chosen in (names or ()):
-            raise ValueRangeError(
-                f"free: '{each.chosen}'", "is free and offered from a stock at once",
-                next_step="leave its name or its stock out",
-            )  # fmt: skip
-    wanted = _Wanted(target, names, tuple(keep), spring, tuple(goals))
+    require_once(names or (), choices)
+    wanted = Wanted(target, names, tuple(keep), spring, tuple(goals))
     if not choices:
         return wanted.designed(actuator, settings)
     design = wanted.chosen(combinations(actuator, choices), settings)
@@ -105,8 +100,14 @@ def design_cam(
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
-    """What is asked for, whatever the assembly."""
+class Wanted:
+    """What is asked for, whatever the assembly.
+
+    Parameters
+    ----------
+    target, free, keep, spring, goals
+        As :func:`design_cam`.
+    """
 
     target: Target
     free: tuple[str, ...] | None
@@ -114,11 +115,24 @@ class _Wanted:
     spring: str | None
     goals: tuple[Goal, ...]
 
-    def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
-        """Return the design of one assembly."""
+    def question(self, actuator: Assembly, settings: DesignSettings) -> tuple[Question, tuple[str, ...]]:
+        """Return the question for one assembly, and the names of what is free.
+
+        Parameters
+        ----------
+        actuator
+            Assembly with a cam spring.
+        settings
+            How the search is carried out.
+
+        Raises
+        ------
+        ArrangementError
+            If the structure does not say which spring is meant.
+        """
+        # The finished design is measured on the assembly as it is declared.
         model = flatten(with_smooth_cables(actuator))
         names = series_cam(model, self.spring)
-        free = contour_names(names)[:1] if self.free is None else self.free
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
         question = Question(
             model=model,
@@ -129,18 +143,40 @@ class _Wanted:
             goals=self.goals,
             settings=settings,
         )
+        return question, contour_names(names)[:1] if self.free is None else self.free
+
+    def designed(self, actuator: Assembly, settings: DesignSettings) -> CamDesign:
+        """Return the design of one assembly.
+
+        Parameters
+        ----------
+        actuator
+            Assembly with a cam spring.
+        settings
+            How the search is carried out.
+        """
+        question, free = self.question(actuator, settings)
         search = question.search(free)
         search.require_influence()
         outcomes = search.outcomes()
         if not any(outcome.solved for outcome in outcomes):
-            # Whether there is any cam at all is design out with softened limits.
+            # Whether there is any cam at all is found out with softened limits.
             outcomes.append(search.program.solve(feasible_point(search, free)))
         taken = _best(outcomes)
         return finished(narrowed(SolvedSearch(actuator, search, free, outcomes, taken, outcomes[taken])))
 
     def chosen(self, options: Sequence[tuple[str, Assembly]], settings: DesignSettings) -> CamDesign:
-        """Return the best design over all combinations of a stock, with what became of the others."""
-        hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, progress=_no_word)
+        """Return the best design over all combinations of a stock, with what became of the others.
+
+        Parameters
+        ----------
+        options
+            Combinations in words, each with its assembly.
+        settings
+            How the search is carried out.
+        """
+        hasty = replace(settings, look_for_size_ranges=False, look_for_remedies=False, draws=0)
+        hasty = replace(hasty, progress=_no_word)
 
         def one(number: int) -> tuple[Alternative, NlsError | None]:
             label, assembly = options[number]
@@ -170,23 +206,6 @@ class _Wanted:
 
 def _no_word() -> None:
     """Say nothing: progress is told for each combination."""
-
-
-def with_smooth_cables(actuator: Assembly) -> Assembly:
-    """Return the assembly with every cable that goes slack in its smooth form, which an optimiser can follow.
-
-    Within the range of a design the cable is taut, where the two forms agree; the finished design is measured
-    on the assembly as it is declared.
-
-    Parameters
-    ----------
-    actuator
-        As declared.
-    """
-    for path, part in actuator.walk():
-        if "unilateral contact" in part.phenomena and isinstance(part, Element) and not part.is_smooth:
-            actuator = actuator.with_part(path, part.smooth())
-    return actuator
 
 
 def _best(outcomes: Sequence[Solution]) -> int:

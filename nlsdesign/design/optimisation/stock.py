@@ -76,7 +76,13 @@ class Stock(StockChoice):
         return self.name
 
     def options(self, actuator: Assembly) -> Iterator[tuple[str, Assembly]]:
-        """Yield the assembly with each number."""
+        """Yield the assembly with each number.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such number.
+        """
         known = actuator.quantities()
         if self.name not in known:
             raise unknown_name("stock of", self.name, known)
@@ -121,6 +127,29 @@ class RubberStock(StockChoice):
         """Yield the assembly with each rubber."""
         for name in self.materials:
             yield f"{self.chosen} of {name}", with_rubber(actuator, material(name), piece=self.piece)
+
+
+def require_once(names: Sequence[str], choices: Sequence[StockChoice]) -> None:
+    """Refuse a number that is free and offered from a stock at once.
+
+    Parameters
+    ----------
+    names
+        That are free.
+    choices
+        Of the stock.
+
+    Raises
+    ------
+    ValueRangeError
+        If a name is in both.
+    """
+    for each in choices:
+        if each.chosen in names:
+            raise ValueRangeError(
+                f"free: '{each.chosen}'", "is free and offered from a stock at once",
+                next_step="leave its name or its stock out",
+            )  # fmt: skip
 
 
 def combinations(actuator: Assembly, choices: Sequence[StockChoice]) -> list[tuple[str, Assembly]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
@@ -65,6 +66,11 @@ class DeclaredCam(ABC, Generic[Made]):
     def through_centre(self) -> bool:
         """Whether the cable passes through the centre, so that the lever arm is zero at angle zero."""
 
+    @property
+    @abstractmethod
+    def anchor_distance(self) -> float:
+        """Distance of the anchor in m; infinite for a cable that stays parallel."""
+
     @abstractmethod
     def contour(self, last_angle: float | None, points: int) -> Contour:
         """Return the contour, without the change of sides or the onset near angle zero.
@@ -95,6 +101,10 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
     @property
     def through_centre(self) -> bool:
         return True
+
+    @property
+    def anchor_distance(self) -> float:
+        return self.part.anchor_distance.number
 
     def contour(self, last_angle: float | None, points: int) -> Contour:
         angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
@@ -128,6 +138,10 @@ class _OneSided(DeclaredCam[OneSidedCam]):
     def through_centre(self) -> bool:
         return False
 
+    @property
+    def anchor_distance(self) -> float:
+        return math.inf
+
     def contour(self, last_angle: float | None, points: int) -> Contour:
         angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
         # Beyond the onset the cable lies on the contour with the lever arm H(θ − w/2).
@@ -155,6 +169,10 @@ class _Anchored(DeclaredCam[AnchoredCam]):
     @property
     def through_centre(self) -> bool:
         return True
+
+    @property
+    def anchor_distance(self) -> float:
+        return self.part.anchor_distance.number
 
     def contour(self, last_angle: float | None, points: int) -> Contour:
         end, anchor = self.part.last_direction.number, self.part.anchor_distance.number

@@ -250,7 +250,7 @@ def _at_rest(
     symbols = model.symbols()
     names = [v.name for v in model.signals]
     movable = ca.vertcat(symbols.state, symbols.input)
-    handle, slope = _handle(symbols.signal[names.index(motion)], movable, motion)
+    handle, slope = handle_of(symbols.signal[names.index(motion)], movable, motion)
     inner = [i for i, v in enumerate(model.states) if v.name in states]
     angle = ca.SX.sym("angle")
     others = ca.vertcat(*[movable[i] for i in range(movable.shape[0]) if i not in (handle, *inner)])
@@ -259,12 +259,27 @@ def _at_rest(
     both = ca.substitute(both, old, new)
     at_rest = ca.vertcat(*[symbols.state[i] for i in inner])
     rates = ca.vertcat(*[both[len(names) + i] for i in inner])
-    signals = ca.substitute(both[: len(names)], at_rest, _resting_states(ca.SX(rates), ca.SX(at_rest)))
+    signals = ca.substitute(both[: len(names)], at_rest, resting_states(ca.SX(rates), ca.SX(at_rest)))
     return dict(zip(names, ca.vertsplit(signals), strict=True)), angle, symbols.parameter
 
 
-def _handle(angle: Expression, movable: Expression, motion: str) -> tuple[int, Expression]:
-    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio)."""
+def handle_of(angle: Expression, movable: Expression, motion: str) -> tuple[int, Expression]:
+    """Return the state or input that turns the spring, and the angle per unit of it (a gear has a ratio).
+
+    Parameters
+    ----------
+    angle
+        Of the spring.
+    movable
+        States and inputs, as a column.
+    motion
+        Name of the angle, for messages.
+
+    Raises
+    ------
+    ArrangementError
+        If no single state or input turns it.
+    """
     slopes = ca.SX(ca.jacobian(angle, movable))
     places = [i for i in range(movable.shape[0]) if not slopes[i].is_zero()]
     places.sort(key=lambda i: not ca.is_equal(slopes[i], ca.SX(1)))
@@ -276,8 +291,16 @@ def _handle(angle: Expression, movable: Expression, motion: str) -> tuple[int, E
     )  # fmt: skip
 
 
-def _resting_states(rates: Expression, states: Expression) -> Expression:
-    """Return the states at which the rates vanish; those that never move at rest stay at zero."""
+def resting_states(rates: Expression, states: Expression) -> Expression:
+    """Return the states at which the rates vanish; those that never move at rest stay at zero.
+
+    Parameters
+    ----------
+    rates
+        Derivatives of the states.
+    states
+        Symbols, as a column.
+    """
     moving = [i for i in range(states.shape[0]) if not rates[i].is_zero()]
     idle = [i for i in range(states.shape[0]) if i not in moving]
     result = ca.SX.zeros(states.shape)

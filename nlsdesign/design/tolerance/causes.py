@@ -31,6 +31,11 @@ def shown_unit(unit: str) -> str:
 class SpreadReading(ABC):
     """Base of the ways to read a declared spread: as what, and how numbers with it are drawn."""
 
+    @property
+    @abstractmethod
+    def fourth_moment(self) -> float:
+        """Mean of the fourth power of a deviation in units of the standard deviation."""
+
     @abstractmethod
     def deviation(self, spread: float) -> float:
         """Return the standard deviation that belongs to a spread, in the unit of the spread.
@@ -68,6 +73,11 @@ class SpreadReading(ABC):
 class NormalSpread(SpreadReading):
     """A spread is one standard deviation of a normal distribution, as in the prior of a fit."""
 
+    @property
+    def fourth_moment(self) -> float:
+        """3."""
+        return 3.0
+
     def deviation(self, spread: float) -> float:
         """Return the spread itself."""
         return spread
@@ -88,6 +98,11 @@ class UniformSpread(SpreadReading):
 
     Source: JCGM 2008, 4.3.7 (the standard deviation is the half width over √3).
     """
+
+    @property
+    def fourth_moment(self) -> float:
+        """9/5."""
+        return 1.8
 
     def deviation(self, spread: float) -> float:
         """Return spread/√3."""
@@ -118,6 +133,8 @@ class Cause(ABC):
         Unit in which both are shown.
     source
         Where the deviation comes from: declared, given, or assumed with a reason.
+    relative
+        Whether it is a share of the numbers, so that it grows with them.
     """
 
     name: str
@@ -125,6 +142,7 @@ class Cause(ABC):
     deviation: float
     unit: str
     source: str
+    relative: bool
 
     @property
     def assumed(self) -> bool:

@@ -193,14 +193,14 @@ def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: Sprea
     if given is not None:
         size = _read(name, given, first.unit if alone else "1", reading)
         share = size / (abs(first.start) or 1.0) if alone else size
-        amounts, source = [size] if alone else [share * v.start for v in rows], "given"
+        amounts, source, relative = [size] if alone else [share * v.start for v in rows], "given", not alone
     else:
         share = reading.deviation(max(v.spread for v in rows))
         amounts = [reading.deviation(v.spread) * v.start for v in rows]
-        source = f"declared: spread {100 * max(v.spread for v in rows):g} %"
+        source, relative = f"declared: spread {100 * max(v.spread for v in rows):g} %", True
         assumed = {cam.pretension: _PRETENSION, cam.anchor_distance: _ANCHOR}.get(name)
         if assumed is not None and amounts[0] == 0.0:
-            amounts, source = [assumed.deviation], assumed.source
+            amounts, source, relative = [assumed.deviation], assumed.source, False
     numbers = tuple((v.name, amount) for v, amount in zip(rows, amounts, strict=True))
     # Rows and moduli are shown as relative deviations, single numbers in their own unit.
     unit = shown_unit(first.unit) if alone else "1"
@@ -208,22 +208,22 @@ def _of_numbers(name: str, rows: Sequence[Variable], cam: CamNames, rules: Sprea
     if alone and first.unit == "1":
         shown = (1.0, share)
     if name == cam.anchor_distance:
-        return [AnchorCause(name, *shown, unit, source)]
+        return [AnchorCause(name, *shown, unit, source, relative)]
     if name.startswith(f"{cam.name}.") and name != cam.elements:
-        return [ProfileCause(name, *shown, unit, source, numbers)]
-    return [NumberCause(name, *shown, unit, source, numbers)]
+        return [ProfileCause(name, *shown, unit, source, relative, numbers)]
+    return [NumberCause(name, *shown, unit, source, relative, numbers)]
 
 
 def _of_the_edge(name: str, whole: _Assumed) -> list[Cause]:
     """Return the causes of a contour error; one of an edge is shared equally by an offset and two waves."""
     if not name.endswith(".contour"):
-        return [WaveCause(name, 0.0, whole.deviation, "mm", whole.source, 0)]
+        return [WaveCause(name, 0.0, whole.deviation, "mm", whole.source, False, 0)]
     size = whole.deviation / math.sqrt(3.0)
     causes: list[Cause] = []
     for order, (part, scale) in enumerate(
         [("offset", 1.0), ("half_wave", math.sqrt(2)), ("wave", math.sqrt(2))]
     ):
-        causes.append(WaveCause(f"{name}.{part}", 0.0, scale * size, "mm", whole.source, order))
+        causes.append(WaveCause(f"{name}.{part}", 0.0, scale * size, "mm", whole.source, False, order))
     return causes
 
 

@@ -36,6 +36,8 @@ from .causes import AnchorCause, Cause, ProfileCause, WaveCause
 
 Floats = NDArray[np.float64]
 
+_RUN_OUT = 101
+"""Nodes over the quarter turn beyond that, where the lever arm is held."""
 _NODES = 1500
 _NEAR_ZERO = 80
 _BEYOND = 1.3
@@ -86,7 +88,8 @@ class MadeCam:
     @cached_property
     def _slopes(self) -> Floats:
         """P' without errors at the angles."""
-        first = self.table(self.angles, 1)
+        # Within the change of sides at angle zero the slope is none of the contour's.
+        first = self.table(np.maximum(self.angles, self.angles[1]), 1)
         slopes: Floats = first / (1.0 + first / np.sqrt(self.anchor**2 - self.lever_arms**2))
         return slopes
 
@@ -255,9 +258,10 @@ def made_cam(law: ElasticLaw, cam: ca.Function, angles: Floats, causes: Sequence
     columns = ca.vertcat(*rows)
     both = ca.Function("rows", [angle, parameters], [columns, ca.jacobian(columns, angle)])
     end = _BEYOND * float(angles[-1])
-    nodes = np.unique(
-        np.concatenate([[0.0], np.geomspace(1e-7, end / _NODES, _NEAR_ZERO), np.linspace(0.0, end, _NODES)])
-    )
+    near, along = np.geomspace(1e-7, end / _NODES, _NEAR_ZERO), np.linspace(0.0, end, _NODES)
+    # An anchor that stands closer turns the cable farther around the cam, by a quarter turn at most.
+    run_out = np.linspace(end, end + np.pi / 2, _RUN_OUT)
+    nodes = np.unique(np.concatenate([[0.0], near, along, run_out]))
     values, slopes = (np.array(item, dtype=float) for item in both(nodes.reshape(1, -1), numbers))
     if anchored is not None and depends(arm, parameters[names.index(anchored)]):
         # Such a law holds for any contour: its lever arm has moved with the point of contact, Δ·√(D² − p²)/f.

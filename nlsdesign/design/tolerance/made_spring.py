@@ -20,6 +20,10 @@ from .made_cam import MadeCam, made_cam
 Floats = NDArray[np.float64]
 
 
+_LONG = 2000
+"""Number of instructions of a law from which on it is not written out for each angle."""
+
+
 @dataclass(frozen=True, eq=False)
 class MadeSpring:
     """The springs that are made from one design, over angle and stroke.
@@ -37,10 +41,12 @@ class MadeSpring:
         θ in rad, ascending from zero, shape (n,).
     targets
         Torque that is asked for, shape (n,), in N·m.
+    importance
+        Weight of the error that the target gives each angle, shape (n,).
     contour
         The made cam.
     force
-        ``casadi.Function`` (extensions (n,), moved numbers) -> forces (n,).
+        ``casadi.Function`` (extension, moved numbers) -> force of one element.
     moved
         Names of the moved numbers.
     numbers
@@ -53,6 +59,7 @@ class MadeSpring:
     causes: tuple[Cause, ...]
     angles: Floats
     targets: Floats
+    importance: Floats
     contour: MadeCam
     force: ca.Function = field(repr=False)
     moved: tuple[str, ...]
@@ -71,11 +78,10 @@ class MadeSpring:
 
     @cached_property
     def weights(self) -> Floats:
-        """Weights of the columns in the mean over angle and stroke; their sum is 1."""
+        """Weights of the columns in the mean over angle and stroke, as the target says; their sum is 1."""
         steps = np.diff(self.angles)
-        weights = (np.append(steps, 0.0) + np.insert(steps, 0, 0.0)) / (
-            2 * (self.angles[-1] - self.angles[0])
-        )
+        weights = self.importance * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+        weights = weights / np.sum(weights)
         result: Floats = np.tile(weights / 2, 2) if self.rubs else weights
         return result
 
@@ -84,6 +90,14 @@ class MadeSpring:
         """Torque without deviations, shape (columns,)."""
         result: Floats = self.torques(np.zeros((1, len(self.causes))))[0]
         return result
+
+    @cached_property
+    def _forces(self) -> ca.Function:
+        """The force at all angles, (extensions (n,), moved numbers) -> (n,)."""
+        stretch, numbers = ca.MX.sym("stretch", len(self.angles)), ca.MX.sym("numbers", len(self.moved))
+        mapped = self.force.map(len(self.angles))(stretch.T, numbers)
+        forces = ca.Function("forces", [stretch, numbers], [mapped.T])
+        return forces.expand() if self.force.n_instructions() < _LONG else forces
 
     @cached_property
     def _amounts(self) -> Floats:
@@ -148,7 +162,7 @@ class MadeSpring:
         numbers = np.clip(self.numbers + deviations @ self._amounts, self.ranges[:, 0], self.ranges[:, 1])
         column = {name: numbers[:, k, None] for k, name in enumerate(self.moved)}
         stretch = column[self.cam.pretension] + longer
-        forces = np.array(self.force(np.maximum(stretch, 0.0).T, numbers.T), dtype=float).T
+        forces = np.array(self._forces(np.maximum(stretch, 0.0).T, numbers.T), dtype=float).T
         # A slack cable does not push.
         torques = column[self.cam.elements] * arms * np.where(stretch >= 0.0, forces, 0.0)
         if not self.rubs:
@@ -167,17 +181,17 @@ class MadeSpring:
     def sensitivities(self) -> Floats:
         """Change of the torque per standard deviation of each cause, to first order, (causes, columns)."""
         place = {name: k for k, name in enumerate(self.moved)}
-        stretch, numbers = ca.SX.sym("stretch", len(self.angles)), ca.SX.sym("numbers", len(self.moved))
+        stretch, numbers = ca.SX.sym("stretch"), ca.SX.sym("numbers", len(self.moved))
         force = self.force.call([stretch, numbers])[0]
         slopes = ca.Function(
             "slopes", [stretch, numbers],
-            [force, ca.jtimes(force, stretch, ca.DM.ones(len(self.angles))), ca.jacobian(force, numbers)],
+            [force, ca.jacobian(force, stretch), ca.jacobian(force, numbers).T],
         )  # fmt: skip
         pretension, elements = (self.numbers[place[n]] for n in (self.cam.pretension, self.cam.elements))
         arms = self.contour.lever_arms
-        at = slopes(pretension + self.contour.extensions, self.numbers)
+        at = slopes((pretension + self.contour.extensions).reshape(1, -1), self.numbers)
         pull, stiffness = (np.array(item, dtype=float).ravel() for item in at[:2])
-        by_number = np.array(at[2], dtype=float).T
+        by_number = np.array(at[2], dtype=float)
         by_number[place[self.cam.pretension]] += stiffness
         by_number[place[self.cam.elements]] += pull / elements
         rows = []
@@ -236,11 +250,11 @@ def made_spring(
     guided = [name for guide in cam.guides for name in guide]
     moved = tuple(dict.fromkeys([cam.pretension, cam.elements, *guided, *named]))
     known = [model.parameters[place[name]] for name in moved]
-    stretch, numbers = ca.SX.sym("stretch", angles), ca.SX.sym("numbers", len(moved))
+    stretch, numbers = ca.SX.sym("stretch"), ca.SX.sym("numbers", len(moved))
     everything = ca.SX(law.numbers)
     for k, name in enumerate(moved):
         everything[place[name]] = numbers[k]
-    forces = [law.function.call([stretch[i], everything])[0] for i in range(angles)]
+    force = law.function.call([stretch, everything])[0]
     ranges = np.array([(v.minimum, v.maximum) for v in known])
     ranges[moved.index(cam.pretension), 0] = -np.inf  # below zero the cable is slack
     return MadeSpring(
@@ -248,8 +262,9 @@ def made_spring(
         causes=tuple(causes),
         angles=grid,
         targets=target.torque(grid),
+        importance=target.weight(grid),
         contour=made_cam(law, cam_function(model, spring), grid, causes),
-        force=ca.Function("force", [stretch, numbers], [ca.vertcat(*forces)]),
+        force=ca.Function("force", [stretch, numbers], [force]),
         moved=moved,
         numbers=np.array([v.start for v in known]),
         ranges=ranges,

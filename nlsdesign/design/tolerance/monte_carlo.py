@@ -14,6 +14,7 @@ from ...errors import ValueRangeError
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
 from ..curves.target import Target
+from ..statics.smooth_cables import with_smooth_cables
 from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit
 from .declared_spreads import SpreadRules, spring_causes
 from .made_spring import MadeSpring, made_spring
@@ -52,16 +53,14 @@ def tolerance_analysis(
 ) -> ToleranceResult:
     """Return what the spreads of all numbers do to the torque of a cam spring at rest, and what helps.
 
-    The made cam has a fixed contour: its errors, another anchor and another cable move the point of contact
-    (see ``made_cam``). Where the cable runs over guides with friction, the error is that of both strokes.
-    Each number deviates on its own, the moduli of one piece of rubber as ``rules`` say; elements that share
-    the torque are alike, as from one sheet. Deviations stop at the range of a number and where the anchor
-    would touch the cam.
+    The made cam has a fixed contour: its errors, another anchor and another cable move the point of contact.
+    Friction of guides counts on both strokes. Elements that share the torque are alike, as from one sheet.
+    Deviations stop at the range of a number and where the anchor would touch the cam.
 
     Parameters
     ----------
     spring
-        The actuator, as declared or flat.
+        The actuator; where it is declared, cables that go slack take their smooth form, which is quicker.
     target
         Torque curve.
     name
@@ -71,8 +70,7 @@ def tolerance_analysis(
     seed
         Of the draws; the same seed gives the same springs, also for another design with the same names.
     rules
-        How declared spreads are read: by default as standard deviations, moduli of one piece together, with
-        stated assumptions for pretension, anchor, contour and cable where nothing is declared.
+        How declared spreads are read; by default as standard deviations, the moduli of a piece together.
     trims
         What may be set after assembly; by default the pretension. Each is tried alone.
 
@@ -105,25 +103,36 @@ def tolerance_analysis(
     """
     _checked("draws", draws, _FEWEST, _MOST)
     _checked("seed", seed, 0, 2**63)
-    model = flatten(spring) if isinstance(spring, Assembly) else spring
+    model = flatten(with_smooth_cables(spring)) if isinstance(spring, Assembly) else spring
     rules, cam = rules or SpreadRules(), series_cam(model, name)
     chosen = [Trim(cam.pretension)] if trims is None else list(trims)
     columns = [trim.column(model, cam) for trim in chosen]
-    causes = spring_causes(model, name, rules)
-    everything = (*causes, *(column for column, _ in columns))
+    everything = (*spring_causes(model, name, rules), *(column for column, _ in columns))
     made = made_spring(model, name, target=target, causes=everything, angles=_ANGLES)
+    ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
+    return _analysed(made, ranges, target=target, reading=rules.reading, draws=draws, seed=seed)
+
+
+def _analysed(
+    made: MadeSpring,
+    ranges: Sequence[tuple[str, tuple[float, float]]],
+    *,
+    target: Target,
+    reading: SpreadReading,
+    draws: int,
+    seed: int,
+) -> ToleranceResult:
+    """Return the analysis of springs whose last causes are trims with these names and ranges."""
+    causes = made.causes[: len(made.causes) - len(ranges)]
     largest = np.max(np.abs(made.sensitivities), axis=1, initial=0.0)
     acting = [k for k in range(len(causes)) if largest[k] > 1e-9 * target.largest]
-    deviations = np.zeros((draws, len(everything)))
-    deviations[:, acting] = draw_deviations(
-        [causes[k] for k in acting], draws, seed=seed, reading=rules.reading
-    )
+    deviations = np.zeros((draws, len(made.causes)))
+    deviations[:, acting] = draw_deviations([causes[k] for k in acting], draws, seed=seed, reading=reading)
     touched = made.contour.deviating(made.causes, deviations)
     torques = made.torques(deviations, touched)
     errors = made.rms(torques)
-    ranges = [(trim.name, ends) for trim, (_, ends) in zip(chosen, columns, strict=True)]
     tried, best = _tried(made, deviations, touched, ranges)
-    effects = _effects(made, _WithLess(made, deviations, (touched, torques), best), acting, rules.reading)
+    effects = _effects(made, _WithLess(made, deviations, (touched, torques), best), acting, reading)
     return ToleranceResult(
         target=target,
         angles=made.angles,
@@ -134,7 +143,7 @@ def tolerance_analysis(
         band=_band(made, torques),
         causes=tuple(sorted(effects, key=lambda each: -each.share)),
         trims=tuple(sorted(tried, key=lambda each: each.quantiles[-1].value)),
-        without_effect=tuple(causes[k].name for k in range(len(causes)) if k not in acting),
+        without_effect=tuple(cause.name for k, cause in enumerate(causes) if k not in acting),
         held=made.held(deviations),
         seed=seed,
     )

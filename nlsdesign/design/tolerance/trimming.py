@@ -34,11 +34,6 @@ class Trim:
         Full name: the pretension, the distance of the anchor, or another single number behind the cam.
     lowest, highest
         Range of the adjustment in the unit of the number; that of the part where it is left out.
-
-    Raises
-    ------
-    ValueRangeError
-        If the range is empty.
     """
 
     name: str
@@ -61,6 +56,8 @@ class Trim:
             If the number does not exist or cannot be set.
         UnitError
             If the range is given in a unit of something else.
+        ValueRangeError
+            If the range is empty.
         """
         anchored = () if cam.anchor_distance is None else (cam.anchor_distance,)
         valid = (*cam.numbers, *anchored)
@@ -79,8 +76,8 @@ class Trim:
         size = 0.1 * abs(variable.start) or 1e-3
         name, unit, source = f"trim of {self.name}", variable.unit, "set after assembly"
         if self.name in anchored:
-            return AnchorCause(name, variable.start, size, unit, source), (ends[0], ends[1])
-        moved = NumberCause(name, variable.start, size, unit, source, ((self.name, size),))
+            return AnchorCause(name, variable.start, size, unit, source, False), (ends[0], ends[1])
+        moved = NumberCause(name, variable.start, size, unit, source, False, ((self.name, size),))
         return moved, (ends[0], ends[1])
 
 
@@ -149,47 +146,64 @@ def trimmed(
             f"'{cause.name}'", "does not change the torque at rest",
             next_step="trim the pretension, or another number that does",
         )  # fmt: skip
-    low, high = trim_range(spring, deviations, column=column, ends=ends)
-    if isinstance(cause, NumberCause) and touched is None:
-        touched = spring.contour.deviating(spring.causes, deviations)
-    # What moves the cam moves the points of contact too.
-    fixed = touched if isinstance(cause, NumberCause) else None
+    ends_of_each = trim_range(spring, deviations, column=column, ends=ends)
+    search = _TrimSearch(spring, deviations, column, touched)
+    place, torques, tangent, errors = search.settled(ends_of_each, start)
+    settings = cause.nominal + deviations @ _moves(spring, column) + cause.deviation * place
+    return Trimmed(settings, place, torques, tangent, errors)
 
-    def torques(rows: NDArray[np.intp], at: Floats) -> Floats:
-        changed = deviations[rows].copy()
-        changed[:, column] = at
-        return spring.torques(changed, None if fixed is None else (fixed[0][rows], fixed[1][rows]))
 
-    active = np.arange(len(deviations))
-    place = np.clip(0.0 if start is None else start.places, low, high)
-    current = torques(active, place)
-    tangent = np.tile(spring.sensitivities[column], (len(deviations), 1)) if start is None else start.tangents
-    tangent, best_place, best_torques, best_rms = (
-        tangent.copy(),
-        place.copy(),
-        current.copy(),
-        spring.rms(current),
-    )
-    for _ in range(_STEPS):
-        error = current[active] - spring.wanted
-        slope = tangent[active]
-        size = np.maximum(slope**2 @ spring.weights, 1e-300)
-        step = -((error * slope) @ spring.weights) / size
-        new = np.clip(place[active] + step, low[active], high[active])
-        moved = new - place[active]
-        after = torques(active, new)
-        usable = np.abs(moved) > _USABLE
-        tangent[active[usable]] = (after - current[active])[usable] / moved[usable, None]
-        place[active], current[active] = new, after
-        rms = spring.rms(after)
-        better = rms < best_rms[active]
-        chosen = active[better]
-        best_rms[chosen], best_place[chosen], best_torques[chosen] = rms[better], new[better], after[better]
-        active = active[np.abs(moved) > _SETTLED]
-        if not len(active):
-            break
-    settings = cause.nominal + deviations @ _moves(spring, column) + cause.deviation * best_place
-    return Trimmed(settings, best_place, best_torques, tangent, best_rms)
+class _TrimSearch:
+    """Springs with a trim in units of its cause."""
+
+    def __init__(
+        self, spring: MadeSpring, deviations: Floats, column: int, touched: tuple[Floats, Floats] | None
+    ) -> None:
+        self.spring, self.deviations, self.column = spring, deviations, column
+        # What moves the cam moves the points of contact too; all else leaves them where they are.
+        self.fixed: tuple[Floats, Floats] | None = None
+        if isinstance(spring.causes[column], NumberCause):
+            self.fixed = touched or spring.contour.deviating(spring.causes, deviations)
+
+    def torques(self, rows: NDArray[np.intp], at: Floats) -> Floats:
+        changed = self.deviations[rows].copy()
+        changed[:, self.column] = at
+        known = None if self.fixed is None else (self.fixed[0][rows], self.fixed[1][rows])
+        return self.spring.torques(changed, known)
+
+    def settled(
+        self, ends: tuple[Floats, Floats], start: Trimmed | None
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return places, torques, tangents and rms errors at the best places within the ends."""
+        spring, (low, high), count = self.spring, ends, len(self.deviations)
+        active = np.arange(count)
+        place = np.clip(0.0 if start is None else start.places, low, high)
+        current = self.torques(active, place)
+        tangent = np.tile(spring.sensitivities[self.column], (count, 1))
+        if start is not None:
+            tangent = start.tangents.copy()
+        best_place, best_torques, best_rms = place.copy(), current.copy(), spring.rms(current)
+        for _ in range(_STEPS):
+            slope = tangent[active]
+            size = np.maximum(slope**2 @ spring.weights, 1e-300)
+            step = (((spring.wanted - current[active]) * slope) @ spring.weights) / size
+            new = np.clip(place[active] + step, low[active], high[active])
+            moved, after = new - place[active], self.torques(active, new)
+            usable = np.abs(moved) > _USABLE
+            tangent[active[usable]] = (after - current[active])[usable] / moved[usable, None]
+            place[active], current[active] = new, after
+            rms = spring.rms(after)
+            better = rms < best_rms[active]
+            chosen = active[better]
+            best_rms[chosen], best_place[chosen], best_torques[chosen] = (
+                rms[better],
+                new[better],
+                after[better],
+            )
+            active = active[np.abs(moved) > _SETTLED]
+            if not len(active):
+                break
+        return best_place, best_torques, tangent, best_rms
 
 
 def trim_range(

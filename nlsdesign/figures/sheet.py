@@ -24,7 +24,7 @@ _ARROW = 2.2
 _GAP = 0.8
 
 
-class Page:
+class Sheet:
     """A page of a given size; (0, 0) is its lower left corner, lengths are mm on paper.
 
     Parameters
@@ -56,7 +56,7 @@ class Page:
         x, y = np.array(points, dtype=float).T
         self.axes.plot(x, y, linewidth=width, **{"color": INK.light, "solid_capstyle": "butt", **look})
 
-    def text(self, x: float, y: float, text: str, **look: Any) -> None:
+    def text(self, x: float, y: float, *, text: str, **look: Any) -> None:
         """Write text; by default from a point to the right, on its base line.
 
         Parameters
@@ -72,7 +72,7 @@ class Page:
         text = text.replace("$", r"\$")
         self.axes.text(x, y, text, **{"fontsize": TEXT, "color": INK.light, "va": "baseline", **look})
 
-    def box(self, x: float, y: float, width: float, height: float) -> None:
+    def box(self, x: float, y: float, *, width: float, height: float) -> None:
         """Draw the frame of a rectangle.
 
         Parameters
@@ -98,7 +98,7 @@ class Page:
         self.axes.add_patch(patch)
         return patch
 
-    def measure(self, start: Floats, end: Floats, text: str, *, away: float, upright: bool = False) -> None:
+    def measure(self, start: Floats, end: Floats, *, text: str, away: float, upright: bool = False) -> None:
         """Draw a dimension between two points, level or upright.
 
         Parameters
@@ -132,14 +132,14 @@ class Page:
             self._arrow(foot, direction * (-sign if outside else sign))
         middle = (low + high) / 2.0
         if level:
-            self.text(middle[0], middle[1] + 0.9, text, ha="center", va="bottom")
+            self.text(middle[0], middle[1] + 0.9, text=text, ha="center", va="bottom")
         elif outside:
-            self.text(high[0] + 1.0, high[1] + 3.0 * _ARROW, text, ha="left", va="center")
+            self.text(high[0] + 1.0, high[1] + 3.0 * _ARROW, text=text, ha="left", va="center")
         else:
             side, place = ("left", 0.9) if away > max(start[0], end[0]) else ("right", -0.9)
-            self.text(middle[0] + place, middle[1], text, ha=side, va="center", rotation=90)
+            self.text(middle[0] + place, middle[1], text=text, ha=side, va="center", rotation=90)
 
-    def pointer(self, tip: Floats, corner: Sequence[float], text: str) -> None:
+    def pointer(self, tip: Floats, corner: Sequence[float], *, text: str) -> None:
         """Draw an arrow from a text to what it speaks of.
 
         Parameters
@@ -159,15 +159,15 @@ class Page:
         self.text(
             bend[0] + 4.0 * side,
             bend[1],
-            text,
+            text=text,
             ha="left" if side > 0 else "right",
             va="center",
             linespacing=1.25,
         )
 
     def table(
-        self, place: tuple[float, float], widths: Sequence[float], rows: Sequence[Sequence[str]],
-        *, row: float = 4.3,
+        self, place: tuple[float, float], widths: Sequence[float], *,
+        rows: Sequence[Sequence[str]], row: float = 4.3,
     ) -> float:  # fmt: skip
         """Draw a table, its first row as a head, and return the height of its lower edge.
 
@@ -188,11 +188,11 @@ class Page:
             edge = x
             for column, (cell, width) in enumerate(zip(cells, widths, strict=True)):
                 at, side = (edge + 1.2, "left") if column == 0 else (edge + width - 1.2, "right")
-                self.text(at, base, cell, ha=side, weight="bold" if number == 0 else "normal")
+                self.text(at, base, text=cell, ha=side, weight="bold" if number == 0 else "normal")
                 edge += width
             self.line((x, top - (number + 1) * row), (edge, top - (number + 1) * row),
                       width=THIN if number == 0 else 0.2)  # fmt: skip
-        self.box(x, top - len(rows) * row, sum(widths), len(rows) * row)
+        self.box(x, top - len(rows) * row, width=sum(widths), height=len(rows) * row)
         return top - len(rows) * row
 
     def _arrow(self, tip: Floats, direction: Floats) -> None:

@@ -1,0 +1,347 @@
+"""A design file in TOML: target, what is free, limits, goals, stock, search; see :func:`read_job`."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ...deck import Deck, read_deck
+from ...errors import DeckError, NlsError, UnitError, unknown_name
+from ...quantity import Quantity, quantity
+from ..curves.compliance import SpringSymmetry
+from ..curves.target import Target
+from ..curves.target_files import read_target
+from ..curves.task_curve import TaskGoal
+from ..optimisation.goals import Goal
+from ..optimisation.limits import Limit
+from ..optimisation.settings import DesignSettings
+from ..optimisation.solve import GOALS
+from ..optimisation.stock import RubberStock, Stock, StockChoice
+from .task_target import TaskTarget
+
+Asked = TypeVar("Asked")
+
+_TABLES = ("spring", "free", "target", "limits", "goals", "stock", "search", "tolerance", "drawing")
+_SEARCH = ("starts", "seed", "largest_error")
+
+
+@dataclass(frozen=True, eq=False)
+class DesignJob:
+    """What is asked of a design.
+
+    Parameters
+    ----------
+    path
+        File that it was read from.
+    target
+        Torque curve, or the task that it follows from.
+    free
+        Names and stocks; ``None`` for the contour alone.
+    keep
+        Limits.
+    goals
+        What is made small.
+    spring
+        Path of the cam spring, where it was named.
+    settings
+        Of the search.
+    tolerance, drawing
+        The tables of those names, as read.
+    deck
+        The whole file with the places of its names.
+    """
+
+    path: Path
+    target: Target | TaskTarget
+    free: tuple[str | StockChoice, ...] | None
+    keep: tuple[Limit, ...]
+    goals: tuple[Goal, ...]
+    spring: str | None
+    settings: DesignSettings
+    tolerance: Mapping[str, Any]
+    drawing: Mapping[str, Any]
+    deck: Deck
+
+
+def read_job(path: Path | str) -> DesignJob:
+    """Read a design file; see :func:`job_of` for what stands in it.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    DeckError
+        If the file cannot be read.
+    NlsError
+        As for :func:`job_of`.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DeckError(
+            str(file), f"cannot be read: {error}", next_step="give a design file in TOML, UTF-8"
+        ) from None
+    return job_of(text, file)
+
+
+def job_of(text: str, file: Path) -> DesignJob:
+    """Read what is asked of a design.
+
+    Each limit and goal is a line ``Name = {field = "number unit"}`` under ``[limits]`` or ``[goals]``, with
+    the names and fields of the Python objects; the target is one such line under ``[target]``, or
+    ``file = "curve.csv"`` (beside the design file). Bare numbers are in SI.
+
+    Parameters
+    ----------
+    text
+        TOML.
+    file
+        Where it came from, for messages and for the files that it names.
+
+    Raises
+    ------
+    DeckError
+        If a table is of the wrong kind; file, line and column are named.
+    UnknownNameError
+        If there is no such table, limit, goal, target or field, with the nearest that exists.
+    NlsError
+        If a number is refused by what it is for, with its place.
+
+    Examples
+    --------
+    A file::
+
+        free = ["spring.cam.contour", "spring.pretension"]
+
+        [target]
+        ExponentialTorque = {maximum = "5 N*m", angle = "53 deg", shape = 1.0}
+        # or: file = "curve.csv"
+        # or: TaskTarget = {joint = "ankle", body_mass = "75 kg", scale = 0.05, gear_ratio = 80.0}
+
+        [limits]
+        MaximumCamRadius = {radius = "20 mm"}
+
+        [stock]
+        "spring.rubber.thickness" = ["2 mm", "3 mm"]
+        rubber = ["PMC-770"]
+
+        [search]
+        starts = 20
+        largest_error = "1 %"
+    """
+    deck = read_deck(text, file)
+    for key in deck.tables:
+        if key not in _TABLES:
+            raise unknown_name(deck.place(key), key, _TABLES)
+    if "target" not in deck.tables:
+        raise DeckError(
+            file.name, "has no target",
+            next_step='write [target] and below it PowerTorque = {coefficient = ..., ...} or file = "..."',
+        )  # fmt: skip
+    free = _names(deck, "free")
+    stock = tuple(_stock(deck))
+    return DesignJob(
+        path=file,
+        target=_target(deck),
+        free=None if free is None and not stock else (*(free or ()), *stock),
+        keep=tuple(_objects(deck, "limits", Limit)),  # type: ignore[type-abstract]
+        goals=tuple(_objects(deck, "goals", Goal)) or GOALS,  # type: ignore[type-abstract]
+        spring=None if "spring" not in deck.tables else str(deck.tables["spring"]),
+        settings=_settings(deck),
+        tolerance=_table(deck, "tolerance"),
+        drawing=_table(deck, "drawing"),
+        deck=deck,
+    )
+
+
+def kinds(base: type) -> dict[str, type]:
+    """Return the classes that can be named in a design file, by name.
+
+    Parameters
+    ----------
+    base
+        Of targets, limits or goals.
+    """
+    result: dict[str, type] = {}
+    kind: type
+    for kind in base.__subclasses__():
+        if not getattr(kind, "__abstractmethods__", None):
+            result[kind.__name__] = kind
+        result |= kinds(kind)
+    return dict(sorted(result.items()))
+
+
+def _target(deck: Deck) -> Target | TaskTarget:
+    table = _table(deck, "target")
+    if len(table) != 1:
+        raise DeckError(
+            deck.place("target"), f"has {len(table)} entries, a design has one target",
+            next_step=f'keep one of: file = "...", TaskTarget, {", ".join(kinds(Target))}',
+        )  # fmt: skip
+    ((name, given),) = table.items()
+    if name == "file":
+        return read_target(deck.path.parent / str(given))
+    if name == "TaskTarget":
+        task: TaskTarget = built(deck, TaskTarget, given, deck.place("target.TaskTarget"))
+        return task
+    (target,) = _objects(deck, "target", Target)  # type: ignore[type-abstract]
+    return target
+
+
+def _objects(deck: Deck, key: str, base: type[Asked]) -> Iterator[Asked]:
+    """Yield the objects of a table of limits, goals or targets."""
+    yield from _of_kinds(deck, key, base, _table(deck, key))
+
+
+def _of_kinds(deck: Deck, key: str, base: type[Asked], table: Mapping[str, Any]) -> Iterator[Asked]:
+    known = kinds(base)
+    for name, given in table.items():
+        place = deck.place(f"{key}.{name}")
+        if name not in known:
+            raise unknown_name(place, name, known)
+        for fields in given if isinstance(given, list) else [given]:
+            yield built(deck, known[name], fields, place)
+
+
+def built(deck: Deck, kind: type, given: object, place: str) -> Any:
+    """Return the object of a table.
+
+    Parameters
+    ----------
+    deck
+        The file.
+    kind
+        A dataclass.
+    given
+        Its fields by name.
+    place
+        For messages.
+
+    Raises
+    ------
+    DeckError
+        If it is no table, or a field is missing.
+    UnknownNameError
+        If there is no such field.
+    NlsError
+        If a field is refused.
+    """
+    if not isinstance(given, Mapping):
+        raise DeckError(
+            place, f"{given!r} is not a table", next_step='write it as {field = "number unit", ...}'
+        )
+    hints = typing.get_type_hints(kind)
+    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    for name in given:
+        if name not in fields:
+            raise unknown_name(f"{place}: field", name, fields)
+    missing = [
+        name
+        for name, field in fields.items()
+        if name not in given
+        and field.default is dataclasses.MISSING
+        and field.default_factory is dataclasses.MISSING
+    ]
+    if missing:
+        raise DeckError(place, f"lacks {', '.join(missing)}", next_step=f"fields are: {', '.join(fields)}")
+    values = {name: _value(deck, hints[name], raw, f"{place}: {name}") for name, raw in given.items()}
+    return _placed(lambda: kind(**values), place)
+
+
+def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
+    allowed = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    if isinstance(raw, Mapping):
+        kinds_of = [each for each in allowed if isinstance(each, type) and dataclasses.is_dataclass(each)]
+        named = [each for each in kinds_of if each.__name__ in raw]
+        if named:
+            return built(deck, named[0], raw[named[0].__name__], place)
+        records = [each for each in kinds_of if each is not Quantity]
+        if len(records) == 1:
+            return built(deck, records[0], raw, place)
+        if Limit in typing.get_args(hint):
+            return tuple(_of_kinds(deck, place, Limit, raw))
+        base = next(
+            (each for each in allowed if isinstance(each, type) and each in (TaskGoal, SpringSymmetry)), None
+        )
+        if base is not None:
+            return next(iter(_of_kinds(deck, place, base, raw)))
+        raise DeckError(place, "is a table where a number or text is wanted")
+    if isinstance(raw, list):
+        of_items = typing.get_args(hint)[0] if typing.get_args(hint) else Any
+        return tuple(_value(deck, of_items, item, place) for item in raw)
+    if isinstance(raw, str) and (Quantity in allowed or float in allowed):
+        return _number(raw, place)
+    return float(raw) if isinstance(raw, float) else raw
+
+
+def _number(text: str, place: str) -> Quantity:
+    head, _, tail = text.strip().partition(" ")
+    try:
+        number = float(head)
+    except ValueError:
+        raise UnitError(
+            f"{place} = '{text}'", "does not start with a number", next_step="write for instance '20 mm'"
+        ) from None
+    return _placed(
+        lambda: quantity(number, tail.strip() or "1", source="asked for in the design file"), place
+    )
+
+
+def _stock(deck: Deck) -> Iterator[StockChoice]:
+    for name, given in _table(deck, "stock").items():
+        place = deck.place(f"stock.{name}")
+        if not isinstance(given, list):
+            raise DeckError(place, "is not a list", next_step='write for instance ["2 mm", "3 mm"]')
+        if name == "rubber":
+            yield _placed(lambda given=given: RubberStock(tuple(str(each) for each in given)), place)  # type: ignore[misc]
+            continue
+        values = tuple(_number(v, place) if isinstance(v, str) else float(v) for v in given)
+        yield _placed(lambda name=name, values=values: Stock(name, values), place)  # type: ignore[misc]
+
+
+def _settings(deck: Deck) -> DesignSettings:
+    table = _table(deck, "search")
+    values: dict[str, Any] = {}
+    for name, raw in table.items():
+        place = deck.place(f"search.{name}")
+        if name not in _SEARCH:
+            raise unknown_name(place, name, _SEARCH)
+        given = _number(raw, place).number if isinstance(raw, str) else raw
+        values[name] = float(given) if name == "largest_error" else int(given)
+    return _placed(lambda: DesignSettings(**values), deck.place("search"))
+
+
+def _names(deck: Deck, key: str) -> tuple[str, ...] | None:
+    given = deck.tables.get(key)
+    if given is None:
+        return None
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise DeckError(deck.place(key), "is not a list of names", next_step=f'write {key} = ["...", "..."]')
+    return tuple(given)
+
+
+def _table(deck: Deck, key: str) -> Mapping[str, Any]:
+    given = deck.tables.get(key, {})
+    if not isinstance(given, Mapping):
+        raise DeckError(deck.place(key), "is not a table", next_step=f"write [{key}]")
+    return given
+
+
+Made = TypeVar("Made")
+
+
+def _placed(make: Callable[[], Made], place: str) -> Made:
+    """Return what is made, with its place in front of whatever is wrong with it."""
+    try:
+        return make()
+    except NlsError as error:
+        raise error.at(place) from None

@@ -1,0 +1,90 @@
+"""A target that follows from a task: read from a design file, made for the motor of the deck."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...errors import ValueRangeError
+from ...model import FlatModel
+from ...quantity import Quantity
+from ..curves.compliance import OddSpring, SpringSymmetry
+from ..curves.motor_and_gear import motor_and_gear
+from ..curves.numbers import in_si
+from ..curves.task import read_task, walking_task
+from ..curves.task_curve import LeastEnergy, TaskCurve, TaskGoal, TaskProblem, curve_for_task
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskTarget:
+    """The torque curve of least motor energy, or peak power, for a task.
+
+    Parameters
+    ----------
+    file
+        Record of one period, beside the design file; see :func:`~nlsdesign.design.read_task`.
+    joint
+        Instead of a file: ``"ankle"``, ``"knee"`` or ``"hip"`` in walking.
+    body_mass
+        In kg, where the torques are stated per body mass.
+    scale
+        Share of the torque that the actuator gives.
+    gear_ratio
+        Another than the declared one.
+    goal, symmetry
+        As for ``TaskProblem``.
+
+    Raises
+    ------
+    ValueRangeError
+        If neither a file nor a joint is given, or both are.
+    """
+
+    file: str = ""
+    joint: str = ""
+    body_mass: Quantity | float | None = None
+    scale: Quantity | float = 1.0
+    gear_ratio: Quantity | float | None = None
+    goal: TaskGoal = field(default_factory=LeastEnergy)
+    symmetry: SpringSymmetry = field(default_factory=OddSpring)
+
+    def __post_init__(self) -> None:
+        if bool(self.file) == bool(self.joint):
+            raise ValueRangeError(
+                "task", "needs a file or a joint, and not both",
+                next_step='write file = "task.csv", or joint = "ankle" with body_mass = "75 kg"',
+            )  # fmt: skip
+        in_si("scale", self.scale, "1", minimum=1e-6, maximum=1e3)
+
+    def curve(self, model: FlatModel, folder: Path) -> TaskCurve:
+        """Return the curve for the motor of a model.
+
+        Parameters
+        ----------
+        model
+            Flat model of the actuator.
+        folder
+            Of the design file.
+
+        Raises
+        ------
+        ValueRangeError
+            If the body mass is missing, or a number is out of range.
+        NlsError
+            If the task cannot be read, the motor declares too little, or no spring keeps its limits.
+        """
+        if self.file:
+            task = read_task(folder / self.file, body_mass=self.body_mass)
+        else:
+            mass = self.body_mass
+            if mass is None:
+                raise ValueRangeError(
+                    "task: body_mass", "is missing; the tables are per body mass",
+                    next_step='write body_mass = "75 kg"',
+                )  # fmt: skip
+            task = walking_task(self.joint, body_mass=mass)
+        drive = motor_and_gear(model)
+        if self.gear_ratio is not None:
+            drive = drive.geared(in_si("gear_ratio", self.gear_ratio, "1", minimum=1e-3, maximum=1e4))
+        problem = TaskProblem(goal=self.goal, symmetry=self.symmetry)
+        return curve_for_task(task.scaled(in_si("scale", self.scale, "1")), drive, problem)

@@ -1,0 +1,302 @@
+"""A goal over the spreads: the quantile of the torque error of made springs, trimmed or not, in symbols.
+
+To first order the error of a made spring over the angle is e + Σ sⱼ·xⱼ with independent xⱼ of variance 1, the
+error e of the design and the sensitivities sⱼ of :mod:`..tolerance.made_cam`. A trim takes the part along its
+tangent t off all sⱼ, but not off e: a design must not lean on it. The mean square of what is left is
+
+    Q = e·e + 2 bᵀx + xᵀGx,    bⱼ = e·sⱼ,    Gⱼₖ = sⱼ·sₖ,
+
+with the mean over the angle as product, so mean and variance of Q follow from b and G; the distribution in
+between is taken as that of a multiple of χ² with the same two, whose quantile has a closed form. All
+derivatives are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+import numpy as np
+from scipy.special import ndtri
+
+from ...errors import ArrangementError, ValueRangeError
+from ...quantity import Quantity
+from ...symbolic import Expression
+from ..curves.numbers import in_si, plain
+from ..tolerance.causes import AnchorCause, Cause, NumberCause, ProfileCause, WaveCause
+from ..tolerance.declared_spreads import SpreadRules, spring_causes
+from .design_point import DesignPoint
+from .goals import Goal
+from .limits import Bound, Limit
+
+_LEAST = 1e-12
+"""Addend of sizes that may vanish, relative to the square of the largest torque."""
+
+
+@dataclass(frozen=True)
+class ToleranceQuantile(Goal):
+    """Mean square torque error that a share of the made springs stays below, over the spreads of the numbers.
+
+    It holds the error of the design itself, so it stands in the place of :class:`TorqueError`. The friction
+    of guides is left out, and a trim counts as one of unlimited range; the design that comes out should be
+    looked at with :func:`~nlsdesign.design.tolerance_analysis`, which knows neither simplification.
+    Source: Satterthwaite 1946 (multiple of χ² with the same mean and variance); Wilson and Hilferty 1931
+    (its quantile).
+
+    Parameters
+    ----------
+    share
+        Of the made springs.
+    trims
+        Full names of what is set after assembly, together; ``None`` for the pretension, empty for nothing.
+    rules
+        How declared spreads are read.
+
+    Raises
+    ------
+    ValueRangeError
+        If the share is not between 0.5 and 1.
+    """
+
+    share: float = 0.95
+    trims: tuple[str, ...] | None = None
+    rules: SpreadRules = field(default_factory=SpreadRules)
+
+    def __post_init__(self) -> None:
+        if not 0.5 <= self.share < 1.0:
+            raise ValueRangeError(
+                f"share = {self.share:g}", "must be at least 0.5 and below 1",
+                next_step="take 0.95, the error that 95 % of the springs stay below",
+            )  # fmt: skip
+
+    def cost(self, design: DesignPoint) -> Expression:
+        """Return (quantile of the rms error / 0.1 % of the largest torque)²."""
+        scale = 1e-3 * design.target.largest
+        return self.mean_square(design) / scale**2
+
+    def mean_square(self, design: DesignPoint) -> Expression:
+        """Return the quantile of the mean square error in (N·m)².
+
+        Parameters
+        ----------
+        design
+            The design in symbols.
+
+        Raises
+        ------
+        ArrangementError
+            If a trim does not exist.
+        UnknownNameError
+            If a spread is given for a name that does not exist.
+        """
+        sensitivities = _Sensitivities(design)
+        rows = _rows(design, sensitivities, self.rules)
+        trims = (design.cam.pretension,) if self.trims is None else self.trims
+        tangents = [sensitivities.tangent(name) for name in trims]
+        least = _LEAST * design.target.largest**2
+        weights, errors = _weights(design), design.torque_errors
+        if not rows:
+            return ca.dot(weights, errors**2)
+        left = ca.horzcat(*rows)
+        for tangent in _orthogonal(tangents, weights):
+            along = (weights * tangent).T @ left / (ca.dot(weights, tangent**2) + least)
+            left = left - tangent @ along
+        weighed = ca.diag(weights) @ left
+        cross, gram = errors.T @ weighed, left.T @ weighed
+        mean = ca.dot(weights, errors**2) + ca.trace(gram)
+        peaked = self.rules.reading.fourth_moment - 3.0
+        variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + peaked * ca.sumsqr(ca.diag(gram))
+        return _quantile(mean, variance + least**2, float(ndtri(self.share)))
+
+
+@dataclass(frozen=True)
+class TrimRoom(Limit):
+    """Room for the trim: the number as set on most springs stays between two ends.
+
+    What is set after assembly differs from spring to spring with a standard deviation that follows to first
+    order from the spreads; ``deviations`` of them are kept free on both sides. Source: definition.
+
+    Parameters
+    ----------
+    name
+        Full name of the number that is trimmed.
+    lowest, highest
+        Ends in the unit of the number.
+    deviations
+        Standard deviations of the trim that are kept free. Soft springs need more than the first order says,
+        so that 2 leave room for about 93 % of them.
+    rules
+        How declared spreads are read.
+
+    Raises
+    ------
+    ValueRangeError
+        If the ends are in the wrong order, or the deviations are negative.
+    """
+
+    name: str
+    lowest: Quantity | float
+    highest: Quantity | float
+    deviations: float = 3.0
+    rules: SpreadRules = field(default_factory=SpreadRules)
+
+    def __post_init__(self) -> None:
+        in_si("deviations", self.deviations, "1", maximum=10.0)
+        if not plain(self.lowest) < plain(self.highest):
+            raise ValueRangeError(
+                f"TrimRoom for '{self.name}' from {self.lowest} to {self.highest}", "has no room",
+                next_step="give a lowest below the highest",
+            )  # fmt: skip
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield both sides.
+
+        Raises
+        ------
+        ArrangementError
+            If the number cannot be trimmed.
+        UnitError
+            If an end is given in a unit of something else.
+        """
+        sensitivities, weights = _Sensitivities(design), _weights(design)
+        tangent = sensitivities.tangent(self.name)
+        rows = _rows(design, sensitivities, self.rules)
+        along = ca.vertcat(ca.SX(0), *[ca.dot(weights, tangent * row) for row in rows])
+        least = _LEAST * design.target.largest**2
+        away = self.deviations * ca.sqrt(ca.sumsqr(along) + least**2) / (ca.dot(weights, tangent**2) + least)
+        number, unit = design.parameters[self.name], design.model.variable(self.name).unit
+        shown = design.shown_units[self.name]
+        for end, upper in ((self.lowest, False), (self.highest, True)):
+            value = in_si(f"TrimRoom of {self.name}", end, unit)
+            expression = number + away if upper else number - away
+            words = f"{self.name} as trimmed"
+            yield Bound("TrimRoom", words, expression, value, upper, shown, max(abs(value), 1e-3))
+
+
+def _rows(design: DesignPoint, sensitivities: _Sensitivities, rules: SpreadRules) -> list[Expression]:
+    causes = spring_causes(design.model, design.cam.drive, rules)
+    rows = [sensitivities.row(cause) for cause in causes]
+    return [row for row in rows if not row.is_zero()]
+
+
+def _weights(design: DesignPoint) -> Expression:
+    """Return the share of each node in the mean over the angle, by trapezoids, as the target weighs it."""
+    steps = design.angles[1:] - design.angles[:-1]
+    importance = [design.target.weight_law(design.angles[i]) for i in range(design.angles.shape[0])]
+    sizes = ca.vertcat(*importance) * (ca.vertcat(steps, 0.0) + ca.vertcat(0.0, steps))
+    return sizes / ca.sum1(sizes)
+
+
+def _quantile(mean: Expression, variance: Expression, normal: float) -> Expression:
+    """Return the quantile of a multiple of χ² of which mean and variance are known."""
+    ratio = variance / (9.0 * mean**2)
+    return mean * (1.0 - ratio + normal * ca.sqrt(ratio)) ** 3
+
+
+def _orthogonal(columns: Sequence[Expression], weights: Expression) -> list[Expression]:
+    """Return columns with the same span, at right angles to each other."""
+    result: list[Expression] = []
+    for column in columns:
+        for other in result:
+            column = column - other * ca.dot(weights, other * column) / ca.dot(weights, other**2)
+        result.append(column)
+    return result
+
+
+class _Sensitivities:
+    """Change of the torque at the nodes of a design per standard deviation, columns of shape (n,)."""
+
+    def __init__(self, design: DesignPoint) -> None:
+        self.design = design
+        anchor = design.cam.anchor_distance
+        self.anchor = ca.SX(np.inf) if anchor is None else design.parameters[anchor]
+        self.parallel = anchor is None
+        root = ca.sqrt(self.anchor**2 - design.lever_arms**2)
+        # dφ/dθ = 1 + h'/√(D² − p²) = √(D² − p²)/f, and p' = h'/(dφ/dθ).
+        self.root = root
+        self.turning = ca.SX(1.0) if self.parallel else 1.0 + design.lever_arm_slopes / root
+        self.slopes = design.lever_arm_slopes / self.turning
+        self.force_change = _ForceChange(design)
+
+    def row(self, cause: Cause) -> Expression:
+        """Return the change for a cause; zero for one that does not change the torque at rest."""
+        design = self.design
+        if isinstance(cause, NumberCause):
+            return self._by_numbers({n: self._amount(cause, n, size) for n, size in cause.numbers})
+        if isinstance(cause, AnchorCause):
+            return self._by_anchor(self._amount(cause, cause.name, cause.deviation))
+        if isinstance(cause, WaveCause):
+            turned, rate = design.directions, cause.order * np.pi / design.directions[-1]
+            if cause.order == 0:
+                return cause.deviation * self._by_contour(ca.SX.ones(turned.shape), turned)
+            return cause.deviation * self._by_contour(ca.cos(rate * turned), ca.sin(rate * turned) / rate)
+        if isinstance(cause, ProfileCause) and {n for n, _ in cause.numbers} & set(design.cam.control_values):
+            # A larger cam: Δ = a·p, whose integral is δ − √(D² − p²) + D.
+            arms = design.lever_arms
+            shortened = 0.0 if self.parallel else arms**2 / (self.anchor + self.root)
+            taken = design.extensions - design.parameters[design.cam.pretension] + shortened
+            return cause.deviation * self._by_contour(arms, taken)
+        return ca.SX.zeros(design.angles.shape)
+
+    def tangent(self, name: str) -> Expression:
+        """Return the change per metre (or unit) of a number that is set after assembly."""
+        cam = self.design.cam
+        if name == cam.anchor_distance:
+            return self._by_anchor(ca.SX(1.0))
+        if name not in cam.numbers:
+            raise ArrangementError(
+                f"trim '{name}'", "is not a single number behind the cam",
+                next_step=f"trim '{cam.pretension}'",
+            )  # fmt: skip
+        return self._by_numbers({name: ca.SX(1.0)})
+
+    def _amount(self, cause: Cause, name: str, size: float) -> Expression:
+        declared = self.design.model.values[name]
+        now = self.design.parameters[name]
+        return size * now / declared if cause.relative and declared != 0.0 else ca.SX(size)
+
+    def _by_numbers(self, amounts: dict[str, Expression]) -> Expression:
+        design = self.design
+        cam, elements = design.cam, design.elements
+        inside = {n: a for n, a in amounts.items() if n not in (cam.pretension, cam.elements)}
+        change = self.force_change(inside) + design.stiffnesses * amounts.get(cam.pretension, ca.SX(0))
+        more = design.forces * amounts.get(cam.elements, ca.SX(0))
+        return design.lever_arms * (elements * change + more)
+
+    def _by_contour(self, error: Expression, integral: Expression) -> Expression:
+        return self._by_geometry(error * self.turning, integral)
+
+    def _by_anchor(self, amount: Expression) -> Expression:
+        arms, away = self.design.lever_arms, self.anchor * self.root
+        change = -arms * self.slopes * self.turning / away
+        return amount * self._by_geometry(change, -(arms**2) / (self.anchor * (self.anchor + self.root)))
+
+    def _by_geometry(self, arms: Expression, longer: Expression) -> Expression:
+        design = self.design
+        return design.elements * (arms * design.forces + design.lever_arms * design.stiffnesses * longer)
+
+
+class _ForceChange:
+    """Change of the force of one element with its numbers, as a column over the nodes."""
+
+    def __init__(self, design: DesignPoint) -> None:
+        law = design.law
+        self.design, self.names = design, [v.name for v in law.parameters]
+        extension, numbers = ca.SX.sym("extension"), ca.SX.sym("numbers", len(self.names))
+        direction = ca.SX.sym("direction", len(self.names))
+        force = law.function.call([extension, numbers])[0]
+        change = ca.jtimes(force, numbers, direction)
+        self.function = ca.Function("change", [extension, numbers, direction], [change])
+        self.numbers = ca.vertcat(*[design.parameters[name] for name in self.names])
+
+    def __call__(self, amounts: dict[str, Expression]) -> Expression:
+        extensions = self.design.extensions
+        if not amounts:
+            return ca.SX.zeros(extensions.shape)
+        direction = ca.vertcat(*[amounts.get(name, ca.SX(0)) for name in self.names])
+        columns = [
+            self.function.call([extensions[i], self.numbers, direction])[0]
+            for i in range(extensions.shape[0])
+        ]
+        return ca.vertcat(*columns)

@@ -1,0 +1,175 @@
+"""What the studies of designed cams share: the part with its drawings, and the sections of a report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import nlsdesign as nls
+from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
+from nlsdesign.errors import ValueRangeError
+from nlsdesign.report import FigureSection, Section, TableSection
+
+INSPECTED = 8  # rows of the torque table on the drawing
+
+
+@dataclass(frozen=True, eq=False)
+class MadeCam:
+    """The designed cam as it is made.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    part
+        Edge, holes and base under the cable.
+    files
+        Drawings that were written.
+    """
+
+    design: CamDesign
+    part: CamPart
+    files: tuple[Path, ...]
+
+    @property
+    def tolerance(self) -> ToleranceResult:
+        """What the spreads do to it."""
+        return tolerance_of(self.design)
+
+
+def tolerance_of(design: CamDesign) -> ToleranceResult:
+    """Return the tolerance analysis of a design.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is none, with the reason that the design gives.
+    """
+    if design.tolerance is None:
+        raise ValueRangeError("design", "; ".join(design.remarks) or "has no tolerance analysis")
+    return design.tolerance
+
+
+def with_machined_contour(actuator: nls.Assembly, anchor: nls.Quantity | None = None) -> nls.Assembly:
+    """Return an actuator whose contour has no spread of its own, for one that is cut anew.
+
+    The spread of a deck's lever arm is that of the published figure that it was computed from; the errors of
+    a machined contour are counted by the tolerance analysis itself.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    anchor
+        Place of the cable's anchor in the new design; as declared if it is left out.
+    """
+    arm = actuator.quantities()["spring.cam.lever_arm"]
+    values = {"spring.cam.lever_arm": replace(arm, spread=0.0)}
+    if anchor is not None:
+        values["spring.cam.anchor_distance"] = anchor
+    return actuator.with_values(values)
+
+
+def make_cam(design: CamDesign, machined: MachinedCam, folder: Path, *, title: str) -> MadeCam:
+    """Write the edge for the machine and the page for the workshop, and return the part."""
+    part = machined.part(design.contour)
+    files = nls.write_drawings(folder, design.contour, machined=machined, note=f"design {design.fingerprint}")
+    block = nls.figures.TitleBlock(
+        title=title, deck=design.actuator.name, fingerprint=design.fingerprint, material="EN AW-7075"
+    )
+    page = nls.figures.workshop_drawing(part, title=block, rows=inspection_rows(design))
+    files += nls.figures.write_figures(folder, {"sheet": page})
+    files += nls.figures.write_figures(folder, {"sheet": page}, suffix=".pdf")
+    return MadeCam(design, part, tuple(files))
+
+
+def inspection_rows(design: CamDesign) -> list[nls.figures.InspectionRow]:
+    """Return torque, lever arm and cable tension at a few angles, to be measured on the finished spring."""
+    curves, check, contour = design.curves, design.check, design.contour
+    return [
+        nls.figures.InspectionRow(
+            angle=float(angle),
+            torque=float(np.interp(angle, check.angles, check.torques)),
+            lever_arm=float(np.interp(angle, contour.angles, contour.lever_arms)),
+            tension=float(np.interp(angle, curves.angles, curves.forces)),
+        )
+        for angle in np.linspace(0.0, design.target.last_angle, INSPECTED)
+    ]
+
+
+def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
+    """Show picture, torque, numbers and limits of a design.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    of
+        Which one, behind each heading, where a report shows several.
+    """
+    behind = f", {of}" if of else ""
+    curve = {"designed actuator": (design.check.angles, design.check.torques)}
+    return [
+        FigureSection(
+            f"The design to scale{behind}",
+            nls.figures.design_picture(design),
+            caption="Above at rest, below at the last angle; in mm. The rubber is drawn as if square.",
+            assumed="Rubber at rest, cable without thickness.",
+        ),
+        FigureSection(
+            f"Torque against the target{behind}",
+            nls.figures.torque_against_target(design.target, curve),
+            caption="Torque of the flattened, changed assembly; nominal numbers.",
+        ),
+        TableSection(f"Result of the design{behind}", ("quantity", "value"), tuple(design.rows())),
+        FigureSection(
+            f"Use of each limit{behind}",
+            nls.figures.limit_margins(design),
+            caption="Hatched: the design sits on the limit. Limits that nobody asked for follow from the "
+            "declared cable and rubber.",
+        ),
+    ]
+
+
+def tolerance_sections(result: ToleranceResult) -> list[Section]:
+    """Show what the spreads do, and what to trim, measure and tighten."""
+    head, *rows = result.table()
+    built, trim = result.quantiles[-1], result.trims[0] if result.trims else None
+    after = "" if trim is None else f"; {1e3 * trim.quantiles[-1].value:.0f} once {trim.name} is trimmed"
+    return [
+        FigureSection(
+            "Torque error of made springs",
+            nls.figures.tolerance_bars(result),
+            caption="95 % of the springs stay below.",
+            means=f"95 % of {len(result.errors)} made springs are within {1e3 * built.value:.0f} mN·m rms as "
+            f"built{after}. {advice(result)}",
+            assumed="; ".join(dict.fromkeys(c.cause.source for c in result.causes if c.cause.assumed)),
+        ),
+        FigureSection(
+            "Torque of made springs",
+            nls.figures.torque_band(result),
+            caption="Nine of ten springs lie within the band.",
+        ),
+        TableSection("Tolerance", ("what", "value"), tuple(result.rows())),
+        TableSection(
+            "Causes",
+            (*head[:6], "share, trimmed", "halved, trimmed", "known, trimmed"),
+            tuple(rows),
+            caption="Share of the variance in %, and the 95 % quantile in mN·m rms: of the cause alone, if "
+            "it were half as large, and if it were known before the cam is made; then after the trim.",
+            folded=True,
+        ),
+    ]
+
+
+def advice(result: ToleranceResult) -> str:
+    """Return what to do first, as a sentence."""
+    steps = (
+        ("trim", result.trim_first),
+        ("measure", result.measure_first),
+        ("tighten", result.tighten_first),
+    )
+    named = [f"{verb} {name}" for verb, name in steps if name]
+    return f"First: {'; '.join(named)}." if named else ""

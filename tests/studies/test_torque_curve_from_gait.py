@@ -1,0 +1,25 @@
+"""The study of torque curves from walking keeps its claims; a spring never makes it worse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nlsdesign.cli.studies import claims, load_study, not_as_claimed, run_study
+
+
+def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
+    results = run_study("torque_curve_from_gait", tmp_path)
+    expected = claims("torque_curve_from_gait")
+    assert set(results) == set(expected)
+    assert not_as_claimed(results, expected) == {}
+    assert results["ankle_heat_curve_J"] < results["ankle_heat_linear_J"] < results["ankle_heat_rigid_J"]
+    report = (tmp_path / "report.html").read_text(encoding="utf8")
+    assert report.count("<svg") == 6
+    assert "no bound is proved" in report
+
+
+def test_the_fast_way_looks_at_some_of_the_ratios(tmp_path: Path) -> None:
+    study = load_study("torque_curve_from_gait")
+    assert set(study.COARSE) < set(study.RATIOS)
+    results = study.main(tmp_path, fast=True)
+    assert results.ankle_gear_ratio in study.COARSE
