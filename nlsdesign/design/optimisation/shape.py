@@ -180,7 +180,8 @@ def _support(variables: ContourVariables, first: Expression, last: Expression, s
     step = last / INTERVALS
     begin = (first, variables.first_slope.value, ca.SX(0))
     symbols = ca.SX.sym("support", 3, INTERVALS)
-    states = [begin, *(tuple(size * symbols[k, i] for k in range(3)) for i in range(INTERVALS))]
+    columns = [[size * symbols[k, i] for i in range(INTERVALS)] for k in range(3)]
+    states = [begin, *zip(*columns, strict=True)]
     explicit, rows = [begin], []
     for i, (left, right) in enumerate(itertools.pairwise(rho)):
         explicit.append(_next(explicit[-1], left, right, step))
@@ -198,8 +199,8 @@ def _support(variables: ContourVariables, first: Expression, last: Expression, s
 
 
 def _next(
-    state: tuple[Expression, ...], left: Expression, right: Expression, step: Expression
-) -> tuple[Expression, ...]:
+    state: tuple[Expression, Expression, Expression], left: Expression, right: Expression, step: Expression
+) -> tuple[Expression, Expression, Expression]:
     """Return p, p' and ∫ρ one interval further."""
     cosine, sine = ca.cos(step), ca.sin(step)
     growth = (right - left) / step
