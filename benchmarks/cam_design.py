@@ -35,14 +35,12 @@ from nlsdesign import components as parts
 from nlsdesign import design as design_room
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.design.optimisation.defaults import safe_limits, with_defaults
-from nlsdesign.design.optimisation.design_search import Question, Search
+from nlsdesign.design import DesignSettings
+from nlsdesign.design.optimisation.design_search import Search
 from nlsdesign.design.optimisation.limits import Limit
 from nlsdesign.design.optimisation.program import Rows
-from nlsdesign.design.optimisation.solve import GOALS, USUAL
+from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
 from nlsdesign.design.optimisation.starts import starts
-from nlsdesign.design.statics.smooth_cables import with_smooth_cables
-from nlsdesign.model.roles import series_cam
 
 Floats = NDArray[np.float64]
 
@@ -80,12 +78,11 @@ class Problem:
 
     def search(self) -> Search:
         """Return the search that ``design_cam`` begins with."""
-        model = nls.flatten(with_smooth_cables(self.actuator))
-        names = series_cam(model, None)
-        defaults = safe_limits(model, names.drive) if self.defaults is None else self.defaults
-        keep = with_defaults(self.keep, defaults)
-        question = Question(model, self.actuator[names.name], names.drive, self.target, keep, GOALS, USUAL)
-        return question.search(self.free)
+        settings = DesignSettings(defaults=self.defaults)
+        question, free = Wanted(self.target, self.free, self.keep, None, GOALS).question(
+            self.actuator, settings
+        )
+        return question.search(free)
 
 
 def problems() -> list[Problem]:
@@ -211,14 +208,22 @@ class PeerProblem:
     def __init__(self, search: Search) -> None:
         problem, program = search.problem, search.program
         self.count = len(problem.chosen(np.zeros(len(problem.variables))))
-        errors = program.unknowns[self.count :]
+        states, errors = ca.vertsplit(
+            program.unknowns, [0, self.count, self.count + problem.states.shape[0], len(problem.variables)]
+        )[1:]
         # The last rows of the structure are share·(error − symbol) = 0, so the symbol follows from the rest.
         lifted = problem.structure[-1].expression
         share = -float(ca.evalf(ca.jacobian(lifted[0], errors[0])))
         follows = ca.substitute(lifted, errors, ca.SX.zeros(errors.shape)) / share
-        kept = [row for row in program.rows if row is not problem.structure[-1]]
+        follows = ca.substitute(follows, states, problem.states)
+        # So do the states of the contour, whose equations stand first.
+        kept = [row for row in program.rows if row not in (problem.structure[0], problem.structure[-1])]
         unknowns = program.unknowns[: self.count]
-        cost, above, equal = ca.substitute([program.cost, _above(kept), _equal(kept)], [errors], [follows])
+        cost, above, equal = ca.substitute(
+            [program.cost, _above(kept), _equal(kept)],
+            [ca.vertcat(states, errors)],
+            [ca.vertcat(problem.states, follows)],
+        )
         self.lower, self.upper = program.lower[: self.count], program.upper[: self.count]
         self.above, self.equal = above.shape[0], equal.shape[0]
         self.values = _compiled(ca.Function("values", [unknowns], [ca.vertcat(cost, above, equal)]))

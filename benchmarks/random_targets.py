@@ -27,8 +27,8 @@ Floats = NDArray[np.float64]
 DECKS = ("austin2015_figure_consistent", "austin2015_as_printed")
 FREE = ("spring.cam.contour", "spring.pretension", "spring.rubber.area")
 KEEP: tuple[Limit, ...] = (nls.MaximumCamRadius(20e-3),)
-SETTINGS = DesignSettings(look_for_size_ranges=False)
-"""The ranges of sizes that cost nothing do not change the design."""
+SETTINGS = DesignSettings(look_for_size_ranges=False, draws=0)
+"""Neither tolerances nor ranges of sizes that cost nothing change the design."""
 _POINTS = 41
 _LIMITS: dict[str, type] = {
     each.__name__: each

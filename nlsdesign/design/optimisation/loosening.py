@@ -152,13 +152,13 @@ class Loosened:
         slacks
             Indices of the limits that may give.
         start
-            Where to begin; the starts of the whole if it is left out.
+            Where to begin, before the starts of the whole.
         """
         lower, upper = self._box(names)
         allowed = np.isin(np.arange(len(self.bounds)), slacks)
         upper[self.count :] = np.where(allowed, _MOST, 0.0)
         outcomes: list[Solution] = []
-        for point in self.starts if start is None else [start]:
+        for point in self.starts if start is None else [start, *self.starts]:
             begin = np.append(np.clip(point, lower[: self.count], upper[: self.count]), allowed.astype(float))
             outcomes.append(self.program.solve(begin, lower=lower, upper=upper))
             if outcomes[-1].solved and outcomes[-1].cost <= FEASIBLE:

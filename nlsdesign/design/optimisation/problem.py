@@ -42,7 +42,7 @@ class DesignProblem:
     law
         Equilibrium law of the element behind the cam.
     variables
-        All, in the order of the vector: single numbers, contour, torque errors.
+        All, in the order of the vector: single numbers, contour, states, torque errors.
     design
         The design in symbols.
     structure
@@ -53,6 +53,8 @@ class DesignProblem:
         The variables of the contour; ``None`` where it is given.
     sizes
         What starts are relative to.
+    states
+        Scaled values of the unknowns that the structure ties to the contour; they follow its variables.
     """
 
     law: ElasticLaw
@@ -62,6 +64,7 @@ class DesignProblem:
     scalars: tuple[DesignVariable, ...]
     contour: ContourVariables | None
     sizes: StartSizes
+    states: Expression
 
     @property
     def vector(self) -> Expression:
@@ -80,15 +83,20 @@ class DesignProblem:
         return {v.name: float(value) for v, value in zip(self.variables, values, strict=True)}
 
     def chosen(self, point: Floats) -> dict[str, float]:
-        """Return the scaled values by name, without the torque errors, which follow from them.
+        """Return the scaled values by name, without states and torque errors, which follow from them.
 
         Parameters
         ----------
         point
             Shape (variables,) or longer, scaled.
         """
-        kept = len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
+        kept = self._chosen
         return {v.name: float(value) for v, value in zip(self.variables[:kept], point[:kept], strict=True)}
+
+    @property
+    def _chosen(self) -> int:
+        """Number of variables from which the others follow."""
+        return len(self.scalars) + (len(self.contour.all()) if self.contour else 0)
 
     def evaluate(self, expression: Expression, point: Floats) -> Floats:
         """Return the value of an expression of the variables.
@@ -117,7 +125,7 @@ class DesignProblem:
         return self.completed(values)
 
     def completed(self, values: dict[str, float]) -> Floats:
-        """Return a point at which the equations of the torque errors hold.
+        """Return a point at which the equations of states and torque errors hold.
 
         Parameters
         ----------
@@ -125,6 +133,8 @@ class DesignProblem:
             Scaled values by name; what is missing starts as it does by itself.
         """
         point = np.array([values.get(v.name, v.start) for v in self.variables])
+        if self.states.shape[0]:
+            point[self._chosen : self._chosen + self.states.shape[0]] = self.evaluate(self.states, point)
         errors = self.structure[-1].expression / _ERROR_SCALE
         point[len(point) - errors.shape[0] :] += self.evaluate(errors, point)
         return point
@@ -185,12 +195,13 @@ def design_problem(
     return _lifted(
         DesignProblem(
             law=law,
-            variables=(*scalars.values(), *(contour.all() if contour else ())),
+            variables=(*scalars.values(), *(contour.all() if contour else ()), *shape.states),
             design=_design(model, law, target, shape, parameters),
             structure=shape.rows,
             scalars=tuple(scalars.values()),
             contour=contour,
             sizes=sizes,
+            states=shape.state_values,
         )
     )
 

@@ -25,8 +25,8 @@ _OPTIONS: dict[str, Any] = {
     "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.tol": 1e-9,
-    "ipopt.acceptable_tol": 1e-7,
+    "ipopt.tol": 1e-11,
+    "ipopt.acceptable_tol": 1e-9,
     # Otherwise a bound may be missed by 1e-8, which a pretension of zero would notice.
     "ipopt.honor_original_bounds": "yes",
     # Unknowns and rows are scaled to about 1 already; MUMPS' own scaling takes half of the time of a step.

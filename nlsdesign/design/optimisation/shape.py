@@ -33,7 +33,12 @@ _LEAST_CLEARANCE = 0.02
 
 
 class Shape(NamedTuple):
-    """Columns over the nodes of a contour, what must hold for it to be one, and where its cable passes."""
+    """Columns over the nodes of a contour, what must hold for it to be one, and where its cable passes.
+
+    ``states`` are unknowns that the rows tie to the contour: p, p' and ∫ρ at each node, so that what is asked
+    of a node depends on a few unknowns only, and the derivatives are sparse; ``state_values`` are their
+    scaled values as they follow from the contour.
+    """
 
     directions: Expression
     angles: Expression
@@ -44,6 +49,8 @@ class Shape(NamedTuple):
     lever_arm_slopes: Expression
     rows: tuple[Rows, ...]
     through_centre: bool
+    states: tuple[DesignVariable, ...]
+    state_values: Expression
 
 
 class ContourVariables(NamedTuple):
@@ -63,12 +70,15 @@ class ContourVariables(NamedTuple):
 
 
 class _Support(NamedTuple):
-    """Columns of p, p' and ∫ρ over the nodes."""
+    """Columns of p, p' and ∫ρ over the nodes; the unknowns that they are, with what ties these down."""
 
     values: Expression
     slopes: Expression
     arcs: Expression
     directions: Expression
+    rows: Rows
+    states: tuple[DesignVariable, ...]
+    state_values: Expression
 
 
 def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
@@ -88,20 +98,23 @@ def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[
         "last_direction", turned, turned, last_angle, last_angle + np.pi / 2, last_angle + 0.6
     )
     variables = ContourVariables(_radii(size), _length("first_slope", size, start=0.5), last)
-    p, slope, arcs, directions = _support(variables, ca.SX(0), last.value)
+    support = _support(variables, ca.SX(0), last.value, size)
+    p, slope, arcs, directions = support[:4]
     root = ca.sqrt(anchor**2 - p**2)
     angles = directions - ca.asin(p / anchor)
     # √(D² − p²) − D without cancellation
     extensions = arcs - (slope - slope[0]) - p**2 / (anchor + root)
     rows = (
+        support.rows,
         Rows(angles[-1] - last_angle, 0.0, 0.0),
         Rows((root - slope) / anchor, _LEAST_CLEARANCE, ca.inf),
         Rows((p**2 + slope**2) / anchor**2, -ca.inf, (1.0 - _LEAST_CLEARANCE) ** 2),
     )
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     return variables, Shape(
-        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows, True
-    )
+        directions, angles, p, slope, rho, extensions, slope * root / (root - slope), rows, True,
+        support.states, support.state_values,
+    )  # fmt: skip
 
 
 def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
@@ -117,12 +130,14 @@ def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
     slope = _length("first_slope", size, start=0.3)._replace(lower=-_LARGEST_RADIUS / size)
     arm = _length("first_lever_arm", size, start=0.5)
     variables = ContourVariables(_radii(size), slope, arm)
-    p, slopes, arcs, directions = _support(variables, arm.value, ca.SX(last_angle))
+    support = _support(variables, arm.value, ca.SX(last_angle), size)
+    p, slopes, arcs, directions = support[:4]
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
-    rows = (Rows(p / size, 0.0, ca.inf),)
+    rows = (support.rows, Rows(p / size, 0.0, ca.inf))
     return variables, Shape(
-        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False
-    )
+        directions, directions, p, slopes, rho, arcs - (slopes - slopes[0]), slopes, rows, False,
+        support.states, support.state_values,
+    )  # fmt: skip
 
 
 def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shape:
@@ -147,6 +162,7 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
         ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
         ca.SX(contour.radii_of_curvature), ca.SX(extensions).T,
         ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), declared_cam(cam).through_centre,
+        (), ca.SX(0, 1),
     )  # fmt: skip
 
 
@@ -159,16 +175,38 @@ def _length(name: str, size: float, *, start: float) -> DesignVariable:
     return DesignVariable(name, symbol, size * symbol, 0.0, _LARGEST_RADIUS / size, start)
 
 
-def _support(variables: ContourVariables, first: Expression, last: Expression) -> _Support:
+def _support(variables: ContourVariables, first: Expression, last: Expression, size: float) -> _Support:
     rho = [u.value for u in variables.radii_of_curvature]
     step = last / INTERVALS
-    cosine, sine = ca.cos(step), ca.sin(step)
-    values, slopes, arcs = [first], [variables.first_slope.value], [ca.SX(0)]
-    for left, right in itertools.pairwise(rho):
-        growth = (right - left) / step
-        off, tilt = values[-1] - left, slopes[-1] - growth
-        values.append(right + off * cosine + tilt * sine)
-        slopes.append(growth - off * sine + tilt * cosine)
-        arcs.append(arcs[-1] + step * (left + right) / 2)
+    begin = (first, variables.first_slope.value, ca.SX(0))
+    symbols = ca.SX.sym("support", 3, INTERVALS)
+    columns = [[size * symbols[k, i] for i in range(INTERVALS)] for k in range(3)]
+    states = [begin, *zip(*columns, strict=True)]
+    explicit, rows = [begin], []
+    for i, (left, right) in enumerate(itertools.pairwise(rho)):
+        explicit.append(_next(explicit[-1], left, right, step))
+        there = _next(states[i], left, right, step)
+        rows += [(a - b) / size for a, b in zip(there, states[i + 1], strict=True)]
     directions = step * ca.SX(np.arange(INTERVALS + 1))
-    return _Support(ca.vertcat(*values), ca.vertcat(*slopes), ca.vertcat(*arcs), directions)
+    p, slopes, arcs = (ca.vertcat(*column) for column in zip(*states, strict=True))
+    lifted = tuple(
+        DesignVariable(f"{name}[{i + 1}]", symbols[k, i], size * symbols[k, i], -np.inf, np.inf, 0.0)
+        for i in range(INTERVALS)
+        for k, name in enumerate(("support", "support_slope", "arc"))
+    )
+    values = ca.vertcat(*[each for state in explicit[1:] for each in state]) / size
+    return _Support(p, slopes, arcs, directions, Rows(ca.vertcat(*rows), 0.0, 0.0), lifted, values)
+
+
+def _next(
+    state: tuple[Expression, Expression, Expression], left: Expression, right: Expression, step: Expression
+) -> tuple[Expression, Expression, Expression]:
+    """Return p, p' and ∫ρ one interval further."""
+    cosine, sine = ca.cos(step), ca.sin(step)
+    growth = (right - left) / step
+    off, tilt = state[0] - left, state[1] - growth
+    return (
+        right + off * cosine + tilt * sine,
+        growth - off * sine + tilt * cosine,
+        state[2] + step * (left + right) / 2,
+    )
