@@ -107,7 +107,7 @@ def designs_of(front: ParetoFront) -> list[Design]:
 
 FRONTS = [
     pytest.param(TorqueError, LeastSize, (0, 1), id="error and size"),
-    pytest.param(LeastRubber, LeastSize, (2, 1), id="rubber and size"),
+    pytest.param(LeastRubber, LeastSize, (2, 1), id="rubber and size", marks=pytest.mark.slow),
 ]
 
 

@@ -9,7 +9,9 @@ import nlsdesign as nls
 from benchmarks.random_targets import DECKS, FREE, KEEP, Line, lines, random_target
 from nlsdesign.design.optimisation.loosening import Freed
 
-CASES = [(DECKS[0], 3), (DECKS[0], 5), (DECKS[0], 6), (DECKS[1], 2), (DECKS[1], 4), (DECKS[1], 5)]
+QUICK = [(DECKS[0], 4), (DECKS[1], 2)]
+SLOW = [(DECKS[0], 3), (DECKS[0], 5), (DECKS[1], 4), (DECKS[1], 5)]
+CASES = [*QUICK, *(pytest.param(case, marks=pytest.mark.slow) for case in SLOW)]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{case[0]}-{case[1]}")
@@ -49,8 +51,10 @@ def test_the_error_is_that_of_the_machine_as_declared() -> None:
     knots = np.array(rubber["spring.rubber.stiff.knots"].values)
     stress = np.maximum(strain[:, None] - knots, 0.0) @ moduli
     torque = 2.0 * contour.lever_arms * rubber["spring.rubber.area"].number * stress
-    off = torque - target.torque(contour.angles)
-    assert np.sqrt(np.mean(off**2)) < 0.01 * target.largest
+    reported = np.interp(contour.angles, design.check.angles, design.check.torques)
+    assert torque == pytest.approx(reported, abs=1e-3 * target.largest)
+    off = reported - target.torque(contour.angles)
+    assert (np.sqrt(np.mean(off**2)) < 0.01 * target.largest) == design.met
 
 
 @pytest.mark.parametrize("seed", range(1, 51))
