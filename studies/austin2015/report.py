@@ -49,8 +49,8 @@ def write_page(results: Results, out: Path) -> None:
         out / "report.html",
         key_numbers(results),
         *actuator_sections(results),
-        *chapter_of_design(results),
         *figure_sections(results),
+        *chapter_of_design(results),
         *observer_sections(results),
         *loop_sections(results),
         *verdict_sections(results.verdict),
@@ -119,7 +119,7 @@ def chapter_of_design(results: Results) -> list[Section]:
         "Design",
         "Contour, pretension, section and rest length of the rubber designed together for 5 N·m at 53°, the "
         "curve of 2014. Curvature, cable tension, stress and strain are held by limits that follow from the "
-        "declared cable and rubber. From here on everything is shown for both actuators: the `published` "
+        "declared cable and rubber. Observer and torque loop are shown for both actuators: the `published` "
         "one, and the `designed` one, which has this spring in the place of the published.",
     )
     moved = CamSection(

@@ -437,6 +437,15 @@ def test_a_long_sum_wraps_and_an_unknown_function_names_a_row_once() -> None:
     assert plain[1] == ["h=", "f(motor.angle,", "lever_arm,", "…)"]
 
 
+def test_long_equations_can_be_folded(tmp_path: Path) -> None:
+    given = report.mathml.Equations({"x": A + B}, {}, False)
+    for folded in (False, True):
+        section = report.EquationsSection("E", given, "Of the model.", folded=folded)
+        page = report.report_text(tmp_path, [section], title="T")
+        assert ("<summary>Of the model.</summary>" in page) == folded
+        assert page.count("<details") == page.count("</details>") == int(folded)
+
+
 def test_the_equations_of_a_model_stand_in_the_page(text: str) -> None:
     rows = re.findall(r'<p class="equation">(.*?)</p>', text, re.DOTALL)
     plain = [re.sub(r"\s+", "", re.sub(r"<[^>]*>", "", row)) for row in rows]
