@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nlsdesign.components import OneSidedCam, through, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.design import (
@@ -212,3 +213,16 @@ def test_a_target_that_no_contour_can_give_says_so() -> None:
     missed = design_cam(actuator(CONCAVE), target=corner, free=RUBBER, keep=keep, settings=QUICK)
     assert missed.miss is not None
     assert missed.miss.advice
+
+
+def test_a_cam_that_sets_in_too_slowly_is_the_one_to_blame() -> None:
+    """The contour does; with a wide onset the made cam does not, and no size helps that."""
+    cam = OneSidedCam(lever_arm=(0.01,) * 12, last_angle=degrees(90.0), onset=degrees(15.0))
+    machine = actuator(CONCAVE)
+    spring = tie(through(cam, rubber=machine["spring.rubber"]), "motor", "load")
+    target = PowerTorque(coefficient=0.7, exponent=1.0, angle=degrees(60.0))
+    free = ["spring.cam.contour"]
+    missed = design_cam(machine.with_part("spring", spring), target=target, free=free, settings=QUICK)
+    assert missed.miss is not None
+    assert missed.predicted_rms < 1e-3 * target.largest
+    assert "make spring.cam.onset smaller" in missed.miss.advice[0]

@@ -23,7 +23,7 @@ from .design_search import Search, carried_over
 from .limits import Bound
 from .problem import DesignProblem
 from .program import Solution
-from .remedies import find_remedies
+from .remedies import Remedies, find_remedies
 from .result import CamDesign, DesignCurves, LimitState, Miss, StartOutcome, TorqueCheck
 from .size_ranges import size_ranges
 
@@ -208,13 +208,15 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
     if check.rms <= allowed:
         return None
     binding = [i for i, state in enumerate(limits) if state.active]
-    remedies = (
-        find_remedies(
+    remedies: Remedies | None = None
+    advice: tuple[str, ...] = ()
+    if solved.predicted_rms <= allowed:
+        advice = (_made_otherwise(solved),)
+    elif settings.look_for_remedies:
+        remedies = find_remedies(
             solved.search, solved.free, solved.best.point, allowed=allowed, error=check.rms, binding=binding
         )
-        if settings.look_for_remedies
-        else None
-    )
+        advice = tuple(remedies.sentences(target.largest))
     worst = int(np.argmax(np.abs(check.errors)))
     return Miss(
         error=check.rms / target.largest,
@@ -223,7 +225,18 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
         worst_error=float(check.errors[worst]),
         binding=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
         remedies=remedies,
-        advice=() if remedies is None else tuple(remedies.sentences(target.largest)),
+        advice=advice,
+    )
+
+
+def _made_otherwise(solved: SolvedSearch) -> str:
+    """Say that the contour would do and the declared cam does not hold it: over its onset, or its knots."""
+    cam, largest = solved.search.problem.law.cam.name, solved.search.problem.design.target.largest
+    widths = [name for name in (f"{cam}.onset", f"{cam}.changeover") if name in solved.actuator.quantities()]
+    share = 100.0 * solved.predicted_rms / largest
+    return (
+        f"the contour itself leaves {share:.2g} %; the rest is the cam, which sets in over an angle: "
+        f"make {' or '.join(widths)} smaller, or round the knots of the rubber's law"
     )
 
 
