@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _DRAWS = 1000
+_FILES = (
+    *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
+    *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
+)
 
 
 @click.command()
@@ -177,6 +181,9 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     from ..writing import make_folder, write_text
 
     make_folder(out)
+    for name in _FILES:
+        # What an earlier run has left here belongs to another design.
+        (out / name).unlink(missing_ok=True)
     model, numbers = out / "model.toml", out / "design.json"
     write_deck(designed.actuator, model)
     content = {**_numbers(designed), "rows": designed.rows()}
@@ -208,6 +215,13 @@ def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remar
         # The contour is worth having even where hub, channel and cable do not fit it yet.
         remarks.append(f"no machined part, only the line of the cable's centre: {error}")
         return write_drawings(out, designed.contour, note=note)
+    reach = max(float(np.hypot(*outline.polygon().T).max()) for outline in part.outlines)
+    remarks.append(
+        f"the made part reaches {1e3 * reach:.4g} mm from its axis, the contour "
+        f"{1e3 * float(designed.contour.radii.max()):.4g} mm: run-out and corners come on top"
+    )
+    if machined.hub_bore is None and machined.bolts is None:
+        remarks.append("nothing holds the part yet: name hub_bore, bolts or cable_end under [drawing]")
     check, curves = designed.check, designed.curves
     angles = np.linspace(0.0, designed.target.last_angle, 11)
     rows = [

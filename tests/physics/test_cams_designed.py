@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 from nlsdesign.components import AnchoredCam, Assembly, OneSidedCam, through, tie
 from nlsdesign.design import (
+    AnchorDistance,
     CamDesign,
     MaximumCamRadius,
     MaximumStrain,
@@ -122,3 +123,17 @@ def test_contour_of_a_declared_cam_is_that_of_the_design(kind: str) -> None:
     steepest = float(np.gradient(arms, again.angles[inside]).max())
     assert again.lever_arms[inside] == pytest.approx(arms, abs=2e-6 + 1e-3 * steepest)
     assert isinstance(found, CamDesign)
+
+
+def test_the_anchor_of_an_anchored_cam_may_be_free() -> None:
+    start = AnchoredCam(
+        support=(-0.002, 0.0, 0.002, 0.004, 0.006, 0.008, 0.01), last_direction=1.4, anchor_distance=60e-3,
+        elements=2.0,
+    )  # fmt: skip
+    free = [*PRETENSION, "spring.cam.anchor_distance"]
+    found = design_cam(with_cam(start), target=TARGET, free=free, keep=[*KEEP, AnchorDistance(22e-3, 60e-3)])
+    made = found.actuator["spring.cam"]
+    assert isinstance(made, AnchoredCam)
+    assert made.anchor_distance.number == pytest.approx(found.contour.anchor_distance, rel=1e-6)
+    assert made.anchor_distance.number < 59e-3
+    assert found.rms == pytest.approx(found.predicted_rms, rel=0.02, abs=1e-4)

@@ -133,6 +133,11 @@ def test_a_design_file_is_followed_and_a_part_drawn(run: Run, tmp_path: Path) ->
     assert "meets its target" in out
     names = {path.name for path in (tmp_path / "o").iterdir()}
     assert {"model.toml", "cam.dxf", "drawing.pdf", "picture.svg", "margins.svg", "design.json"} <= names
+    # Another design into the same folder: nothing of the first one stays beside it.
+    words = ["--target", 'PowerTorque = {coefficient = 3.4, exponent = 1.0, angle = "50 deg"}']
+    status, _, _ = run("design", "--deck", "austin2015_as_printed", *words, "--draws", "0", "--out", "o")
+    assert status == 1
+    assert not {"cam.dxf", "cam.csv", "drawing.pdf"} & {path.name for path in (tmp_path / "o").iterdir()}
     status, _, err = run(*call, "--maximum", "5 N*m")
     assert status == 2
     assert "--maximum: stand beside --task" in err

@@ -93,6 +93,15 @@ def test_a_target_may_be_a_table_beside_the_file(tmp_path: Path) -> None:
     assert job.free is None
 
 
+def test_a_band_beside_the_target_is_kept_as_a_limit(tmp_path: Path) -> None:
+    rows = "angle [deg],torque [N*m],lower [N*m],upper [N*m]\n0,0,0,0\n20,1,0.9,1.1\n50,4,3.5,4.5\n"
+    (tmp_path / "curve.csv").write_text(rows, encoding="utf-8")
+    (tmp_path / "job.toml").write_text('[target]\nfile = "curve.csv"\n', encoding="utf-8")
+    (limit,) = read_job(tmp_path / "job.toml").keep
+    assert isinstance(limit, TorqueWithin)
+    assert limit.band.upper == (0.0, 1.1, 4.5)
+
+
 def test_a_target_may_follow_from_a_task() -> None:
     fields = 'joint = "ankle", body_mass = "75 kg", scale = 0.05, symmetry = {OneSidedSpring = {}}'
     text = f"[target]\nTaskTarget = {{{fields}}}\n"
@@ -107,7 +116,8 @@ def test_a_target_may_follow_from_a_task() -> None:
         ("MaximumCamRadius", "MaximumCamRadus", UnknownNameError, r"job\.toml:9:1.*mean 'MaximumCamRadius'"),
         ("radius =", "radios =", UnknownNameError, r"job\.toml:9:1.*field.*did you mean 'radius'"),
         ('"20 mm"', '"20 N"', UnitError, r"job\.toml:9:1"),
-        ('"20 mm"', '"20"', UnitError, r"job\.toml:9:1.*give it in a unit like 'm'"),
+        ('"20 mm"', '"20"', UnitError, r"job\.toml:9:1.*has no unit -> give it in a unit like 'm'"),
+        ('"20 mm"', "0.5", UnitError, r"job\.toml:9:1.*has no unit"),
         ('"20 mm"', '"twenty mm"', UnitError, r"radius = 'twenty mm'.*does not start with a number"),
         ("[goals]", "[gaols]", UnknownNameError, r"did you mean 'goals'"),
         ("seed = 3", "sede = 3", UnknownNameError, r"job\.toml:\d+:1.*did you mean 'seed'"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -26,6 +27,8 @@ from nlsdesign.design import (
     design_cam,
     safe_limits,
 )
+from nlsdesign.design.optimisation.limits import Bound
+from nlsdesign.design.optimisation.loosening import Give
 from nlsdesign.errors import InfeasibleError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.quantity import degrees, quantity
@@ -151,6 +154,7 @@ def test_a_stock_is_gone_through_and_listed() -> None:
     [
         (lambda: Stock("spring.rubber.area", ()), ValueRangeError, "empty list"),
         (lambda: Stock("spring.rubber.area", (1e-4, 1e-4)), ValueRangeError, "twice"),
+        (lambda: Stock("spring.cam.elements", (2, 2.5)), ValueRangeError, "elements are counted"),
         (
             lambda: OverTravel(0.1, limits=(MaximumCamRadius(0.02),)),
             ValueRangeError,
@@ -213,6 +217,24 @@ def test_a_target_that_no_contour_can_give_says_so() -> None:
     missed = design_cam(actuator(CONCAVE), target=corner, free=RUBBER, keep=keep, settings=QUICK)
     assert missed.miss is not None
     assert missed.miss.advice
+
+
+@pytest.mark.parametrize(("value", "upper", "end"), [(4.88412, True, "4.885"), (2.16199, False, "2.161")])
+def test_a_give_is_rounded_to_the_side_that_is_enough(value: float, upper: bool, end: str) -> None:
+    bound = Bound("Limit", "size", ca.SX(0), 1e-3 if upper else 5e-3, upper, "mm", 1e-3)
+    give = Give(bound, abs(1e-3 * value - bound.value))
+    assert f"(to {end} mm)" in str(give)
+
+
+def test_a_broken_default_and_the_end_of_a_range_are_said() -> None:
+    """Limits that the designer has replaced by wider ones are not forgotten."""
+    published = declare(load_deck("austin2015_as_printed"))
+    keep = [MaximumCableTension(5000.0), MaximumStress(quantity(50.0, "MPa"))]
+    design = design_cam(published, target=TARGET, free=PRETENSION, keep=keep, settings=QUICK)
+    assert any("MaximumStress" in remark and "allow" in remark for remark in design.remarks)
+    heavy = PowerTorque(coefficient=500.0, exponent=1.5, angle=degrees(53.0))
+    huge = design_cam(published, target=heavy, free=RUBBER, keep=[MaximumCamRadius(20e-3)], settings=QUICK)
+    assert any("end of its range" in remark for remark in huge.remarks)
 
 
 def test_a_cam_that_sets_in_too_slowly_is_the_one_to_blame() -> None:

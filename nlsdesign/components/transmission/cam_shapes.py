@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import BSpline
 
 from ...errors import ArrangementError, ValueRangeError
 from ...quantity import Quantity
@@ -15,6 +15,9 @@ from ..core.element import Scope
 from ..core.part import parameter
 from .cam import Cam, side_of
 from .stretchy_cable import newton_root
+
+_CHECKED = 1001
+"""Directions at which a contour is checked against its anchor."""
 
 
 def _check_row(name: str, values: Quantity) -> None:
@@ -112,10 +115,12 @@ class AnchoredCam(Cam):
         super().__post_init__()
         _check_row("support", self.support)
         anchor, values = self.anchor_distance.number, np.array(self.support.values)
-        outermost = float(np.max(np.abs(values)))
-        steepest = float(np.max(np.diff(values))) * (len(values) - 3) / self.last_direction.number
-        # A spline and its slope stay within the hull of their control values.
-        if outermost >= anchor or math.sqrt(anchor**2 - outermost**2) <= steepest:
+        last = self.last_direction.number
+        step, at = last / (len(values) - 3), np.linspace(0.0, last, _CHECKED)
+        spline = BSpline(step * np.arange(-3, len(values) + 1), values, 3)
+        support, contact = spline(at), spline.derivative()(at)
+        outermost, steepest = float(np.max(np.abs(support))), float(np.max(contact))
+        if outermost >= anchor or np.any(np.sqrt(anchor**2 - support**2) <= contact):
             raise ArrangementError(
                 f"AnchoredCam with anchor_distance = {self.anchor_distance}",
                 f"reaches its anchor: support up to {1e3 * outermost:.4g} mm, "

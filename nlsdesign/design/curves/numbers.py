@@ -46,7 +46,7 @@ def in_si(
         if not same_dimension(given.unit, unit):
             raise UnitError(
                 f"{name} = {given}",
-                f"'{given.unit}' is no unit of it",
+                "has no unit" if given.unit == "1" else f"'{given.unit}' is no unit of it",
                 next_step=f"give it in a unit like '{unit}'",
             )
         value = given.number

@@ -15,10 +15,11 @@ from ...errors import DeckError, NlsError, UnitError, unknown_name
 from ...quantity import Quantity, quantity
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
-from ..curves.target_files import read_target
+from ..curves.target_files import read_band, read_target
 from ..curves.task_curve import TaskGoal
 from ..optimisation.goals import Goal
 from ..optimisation.limits import Limit
+from ..optimisation.limits_of_use import TorqueWithin
 from ..optimisation.settings import DesignSettings
 from ..optimisation.solve import GOALS
 from ..optimisation.stock import RubberStock, Stock, StockChoice
@@ -98,7 +99,8 @@ def job_of(text: str, file: Path) -> DesignJob:
 
     Each limit and goal is a line ``Name = {field = "number unit"}`` under ``[limits]`` or ``[goals]``, with
     the names and fields of the Python objects; the target is one such line under ``[target]``, or
-    ``file = "curve.csv"`` (beside the design file). Bare numbers are in SI.
+    ``file = "curve.csv"`` (beside the design file), which may hold a band too. Numbers carry their
+    unit; bare ones are pure numbers, or rows in SI.
 
     Parameters
     ----------
@@ -153,7 +155,7 @@ def job_of(text: str, file: Path) -> DesignJob:
         path=file,
         target=_target(deck),
         free=None if free is None and not stock else (*(free or ()), *stock),
-        keep=tuple(_objects(deck, "limits", Limit)),  # type: ignore[type-abstract]
+        keep=(*_objects(deck, "limits", Limit), *_band(deck)),  # type: ignore[type-abstract]
         goals=tuple(_objects(deck, "goals", Goal)) or GOALS,  # type: ignore[type-abstract]
         spring=None if "spring" not in deck.tables else str(deck.tables["spring"]),
         settings=_settings(deck),
@@ -189,12 +191,26 @@ def _target(deck: Deck) -> Target | TaskTarget:
         )  # fmt: skip
     ((name, given),) = table.items()
     if name == "file":
-        return read_target(deck.path.parent / str(given))
+        return read_target(_target_file(deck))
     if name == "TaskTarget":
         task: TaskTarget = built(deck, TaskTarget, given, deck.place("target.TaskTarget"))
         return task
     (target,) = _objects(deck, "target", Target)  # type: ignore[type-abstract]
     return target
+
+
+def _target_file(deck: Deck) -> Path:
+    return deck.path.parent / str(_table(deck, "target")["file"])
+
+
+def _band(deck: Deck) -> Iterator[Limit]:
+    """Yield the band that stands beside the torque in the file of the target."""
+    if "file" not in _table(deck, "target"):
+        return
+    with _target_file(deck).open(encoding="utf-8-sig") as lines:
+        head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    if "lower" in head and "upper" in head:
+        yield TorqueWithin(read_band(_target_file(deck)))
 
 
 def _objects(deck: Deck, key: str, base: type[Asked]) -> Iterator[Asked]:
@@ -280,6 +296,9 @@ def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
         return tuple(_value(deck, of_items, item, place) for item in raw)
     if isinstance(raw, str) and (Quantity in allowed or float in allowed):
         return _number(raw, place)
+    if isinstance(raw, int | float) and not isinstance(raw, bool) and Quantity in allowed:
+        # A bare number is a pure one: a length without a unit is refused by what it is for.
+        return Quantity(float(raw), "1", "asked for in the design file")
     return float(raw) if isinstance(raw, float) else raw
 
 

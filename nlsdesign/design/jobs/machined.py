@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ...errors import DeckError
 from ...model import flatten
 from ...model.roles import series_cam
-from ...quantity import Quantity
 from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
 from ..optimisation.result import CamDesign
 from ..statics.declared_cam import declared_cam
@@ -38,7 +35,7 @@ def machined_cam(design: CamDesign, job: DesignJob) -> MachinedCam:
         if declared_cam(design.actuator[names.name]).through_centre
         else MachinedOneSidedCam
     )
-    sizes = dict(job.drawing)
+    sizes: dict[str, object] = dict(job.drawing)
     if "cable_radius" not in sizes:
         if names.cable is None:
             raise DeckError(
@@ -47,15 +44,8 @@ def machined_cam(design: CamDesign, job: DesignJob) -> MachinedCam:
             )  # fmt: skip
         diameter = design.actuator.quantities()[names.cable.diameter]
         half = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
-        return _with_cable(job, kind, sizes, half)
+        sizes["cable_radius"] = half
     return _made(job, kind, sizes)
-
-
-def _with_cable(
-    job: DesignJob, kind: type[MachinedCam], sizes: dict[str, object], radius: Quantity
-) -> MachinedCam:
-    stand_in = _made(job, kind, {**sizes, "cable_radius": radius.number})
-    return replace(stand_in, cable_radius=radius)
 
 
 def _made(job: DesignJob, kind: type[MachinedCam], sizes: dict[str, object]) -> MachinedCam:

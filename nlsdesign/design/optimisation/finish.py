@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,6 +19,7 @@ from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
 from .checks import torque_check
+from .defaults import safe_limits
 from .design_search import Search, carried_over
 from .limits import Bound
 from .problem import DesignProblem
@@ -30,9 +31,12 @@ from .size_ranges import size_ranges
 Floats = NDArray[np.float64]
 
 _ACTIVE = 1e-3
+_AT_END = 1e-6
 _CONTROL_VALUES = 64
 _NARROWED = 2
 """How often the rounding of knots is narrowed at most."""
+_SHARE_OF_CAM = 0.25
+"""Part of what is allowed that the declared cam may add to the error of its contour without a word."""
 _PROMISED = 2e-4
 """Difference between the error that the optimiser saw and that of the finished assembly, relative to the
 largest torque, from which the rounding of knots is narrowed."""
@@ -174,7 +178,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         if settings.look_for_size_ranges
         else (),
         miss=_miss(solved, limits),
-        remarks=(*_remarks(search), *remarks),
+        remarks=(*_remarks(search), *_ends(solved), *_beyond_defaults(solved), *remarks),
         drive=problem.law.cam.drive,
     )
 
@@ -217,6 +221,8 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
             solved.search, solved.free, solved.best.point, allowed=allowed, error=check.rms, binding=binding
         )
         advice = tuple(remedies.sentences(target.largest))
+        if check.rms - solved.predicted_rms > _SHARE_OF_CAM * allowed:
+            advice += (_made_otherwise(solved),)
     worst = int(np.argmax(np.abs(check.errors)))
     return Miss(
         error=check.rms / target.largest,
@@ -238,6 +244,29 @@ def _made_otherwise(solved: SolvedSearch) -> str:
         f"the contour itself leaves {share:.2g} %; the rest is the cam, which sets in over an angle: "
         f"make {' or '.join(widths)} smaller, or round the knots of the rubber's law"
     )
+
+
+def _ends(solved: SolvedSearch) -> Iterator[str]:
+    """Yield the numbers that sit at the end of the range of their part, which no limit names."""
+    problem, point = solved.search.problem, solved.best.point
+    for i, variable in enumerate(problem.scalars):
+        if variable.name in solved.search.question.model.values and (
+            point[i] - variable.lower < _AT_END or variable.upper - point[i] < _AT_END
+        ):
+            value = solved.changes[variable.name]
+            if value.number > 0.0:
+                yield f"{variable.name} = {value} is the end of its range, no limit of yours: bound it"
+
+
+def _beyond_defaults(solved: SolvedSearch) -> Iterator[str]:
+    """Yield the limits of the declared cable and rubber that were replaced and that the design breaks."""
+    problem, question = solved.search.problem, solved.search.question
+    for limit in safe_limits(question.model, question.drive):
+        for bound in limit.bounds(problem.design):
+            state = limit_state(problem, bound, solved.best.point)
+            excess = (state.value - state.bound) * (1.0 if state.upper else -1.0)
+            if excess > _ACTIVE * bound.scale:
+                yield f"beyond what the declared cable and rubber allow: {state}"
 
 
 def _remarks(search: Search) -> tuple[str, ...]:
@@ -302,7 +331,11 @@ def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tupl
             np.inf if anchor is None else float(problem.evaluate(design.parameters[anchor], best.point)[0])
         ),
     )
-    return contour, cam_from_profile(contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES)
+    given = None if anchor is None else contour.anchor_distance
+    fit = cam_from_profile(
+        contour.angles, contour.lever_arms, like=cam, count=_CONTROL_VALUES, anchor_distance=given
+    )
+    return contour, fit
 
 
 def limit_state(problem: DesignProblem, bound: Bound, point: Floats) -> LimitState:

@@ -8,6 +8,7 @@ sum of the slacks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,6 +37,15 @@ _MOST_STRAIN = 5.0
 """Nominal strain at which soft rubbers break: the tensile curve of PMC-770 ends there (Schepelmann 2014)."""
 _RANGE = 4.0
 """By what factor a size that is freed may leave its present value, either way."""
+
+
+def _outwards(value: float, upper: bool) -> float:
+    """Return a number rounded to four digits on the side where the limit is wider."""
+    if value == 0.0:
+        return 0.0
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - 3)
+    # The margin covers what the solver leaves open.
+    return step * (math.ceil(value / step * (1 + 1e-5)) if upper else math.floor(value / step * (1 - 1e-5)))
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,7 @@ class Give:
         return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED
 
     def __str__(self) -> str:
-        amount, end = self.bound.shown(self.amount), self.bound.shown(self.moved)
+        amount, end = self.bound.shown(self.amount), self.bound.shown(_outwards(self.moved, self.bound.upper))
         return f"{self.bound} would have to give by {amount} (to {end})"
 
 

@@ -107,7 +107,14 @@ def find_remedies(
         if everything is not None and _error(everything) <= _ENOUGH * allowed:
             enough = [_smallest(loose, [one.names[0] for one in better], allowed) or everything]
     gives = () if enough else _gives(loose, binding)
+    # A limit that need not give shows that freeing all sizes is enough after all.
+    enough += [also for give, also in gives if also is not None and _nothing(give)][:1]
+    gives = tuple((give, also) for give, also in gives if not _nothing(give))
     return Remedies(tuple(enough), tuple(better), gives, everything)
+
+
+def _nothing(give: Give) -> bool:
+    return give.amount <= 1e-4 * give.bound.scale
 
 
 def _error(freed: Freed) -> float:

@@ -337,7 +337,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
         ("cable force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each cable"),
         *((f"strain of {path}", f"up to {100 * row.max():.4g} %") for path, row in curves.strains.items()),
         *((f"stress of {path}", f"up to {row.max() / 1e6:.4g} MPa") for path, row in curves.stresses.items()),
-        ("energy stored", f"{curves.energy:.4g} J"),
+        ("energy from angle zero", f"{curves.energy:.4g} J, without that of the pretension"),
         *([("rubber", f"{1e6 * design.rubber_volume:.4g} cm³")] if design.rubber_volume > 0.0 else []),
         ("radius of curvature", f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"),
         ("cam radius", f"{1e3 * design.contour.radii.max():.4g} mm"),
@@ -364,6 +364,8 @@ def _starts(design: CamDesign) -> str:
     if not others:
         return text + "; no second one to compare with"
     ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
+    if ratio < 1.001:
+        return text + "; the next best is as good, within 0.1 % of the cost"
     return text + f"; the next best has {ratio:.4g} times the cost, {1e3 * others[0].rms:.3g} mN·m rms"
 
 

@@ -12,6 +12,7 @@ from ...components.assembly.other_rubber import with_rubber
 from ...components.materials.library import material
 from ...errors import ValueRangeError, unknown_name
 from ...quantity import Quantity
+from ..curves.numbers import plain
 
 _MOST = 1000
 
@@ -69,6 +70,13 @@ class Stock(StockChoice):
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", tuple(self.values))
         _require_list(f"Stock('{self.name}')", self.values)
+        if self.name.endswith(".elements"):
+            for value in self.values:
+                if plain(value) % 1.0:
+                    raise ValueRangeError(
+                        f"Stock('{self.name}') with {value}", "elements are counted",
+                        next_step="offer whole numbers",
+                    )  # fmt: skip
 
     @property
     def chosen(self) -> str:

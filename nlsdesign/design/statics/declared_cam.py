@@ -84,7 +84,7 @@ class DeclaredCam(ABC, Generic[Made]):
         """
 
     @abstractmethod
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
         """Return a cam like this one with a given lever arm.
 
         Parameters
@@ -93,6 +93,8 @@ class DeclaredCam(ABC, Generic[Made]):
             Shape (n,); angles ascend from zero.
         count
             Number of control values.
+        anchor
+            Another distance of the anchor in m; its own for ``None``.
         """
 
 
@@ -112,7 +114,7 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.changeover.number)
         return contour_from_lever_arm(angles, arms, anchor_distance=self.part.anchor_distance.number)
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
         # The control values are fitted to h(θ) through the law of the cam, which changes sides over the
         # angle w, so that the change costs nothing where h starts at zero. A jump is rounded over w.
         width = self.part.changeover.number
@@ -148,7 +150,7 @@ class _OneSided(DeclaredCam[OneSidedCam]):
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.onset.number / 2)
         return contour_from_lever_arm(angles, arms, anchor_distance=np.inf)
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
         width = self.part.onset.number
         dense, wanted = _dense(angles, lever_arms, count)
         r = np.clip(dense / width, 0.0, 1.0)
@@ -193,8 +195,9 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         p = support(directions)
         return Contour(directions, p, support(directions, 1), p + support(directions, 2), anchor)
 
-    def fitted(self, angles: Floats, lever_arms: Floats, count: int) -> CamFit:
-        width, anchor = self.part.changeover.number, self.part.anchor_distance.number
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+        width, old = self.part.changeover.number, self.part.anchor_distance
+        anchor = old.number if anchor is None else anchor
         dense, wanted = _dense(angles, lever_arms, count)
         root = np.hypot(dense, width)
         # The law is h = p(φ)·θ/√(θ² + w²) at φ − asin(p(φ)/D) = √(θ² + w²) − w.
@@ -208,6 +211,7 @@ class _Anchored(DeclaredCam[AnchoredCam]):
             self.part,
             support=_row(self.part.support, values),
             last_direction=self.part.last_direction.with_value(end, _SOURCE),
+            anchor_distance=old if anchor == old.number else old.with_value(anchor, _SOURCE),
         )
         return CamFit(cam, error, ("support", "last_direction"))
 
@@ -262,7 +266,14 @@ def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int 
     return declared_cam(cam).contour(last_angle, points)
 
 
-def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, count: int = 48) -> CamFit:
+def cam_from_profile(
+    angles: ArrayLike,
+    lever_arms: ArrayLike,
+    *,
+    like: object,
+    count: int = 48,
+    anchor_distance: float | None = None,
+) -> CamFit:
     """Return a cam with a given lever arm.
 
     The control values are fitted to h(θ) through the law of the cam, with its change of sides or onset. A
@@ -278,6 +289,8 @@ def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, 
         A cam as for :func:`contour_of_cam`; all but its contour is kept.
     count
         Number of control values.
+    anchor_distance
+        Of the new cam in m; that of ``like`` if it is left out.
 
     Raises
     ------
@@ -290,7 +303,7 @@ def cam_from_profile(angles: ArrayLike, lever_arms: ArrayLike, *, like: object, 
     theta, arm = np.asarray(angles, dtype=float), np.asarray(lever_arms, dtype=float)
     if theta[0] != 0.0 or np.any(np.diff(theta) <= 0.0) or theta.shape != arm.shape:
         raise ValueRangeError("cam table", "angles must ascend from zero, one lever arm for each")
-    return made.fitted(theta, arm, count)
+    return made.fitted(theta, arm, count, anchor_distance)
 
 
 def spline_basis(at: Floats, last: float, count: int) -> Floats:
