@@ -186,7 +186,9 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
         (out / name).unlink(missing_ok=True)
     model, numbers = out / "model.toml", out / "design.json"
     write_deck(designed.actuator, model)
-    content = {**_numbers(designed), "rows": designed.rows()}
+    # How many iterations it took depends on the processor, the design does not.
+    rows = [row for row in designed.rows() if row[0] not in ("solver", "starts")]
+    content = {**_numbers(designed), "rows": rows}
     write_text(numbers, json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n")
     curve = {"design": (designed.check.angles, designed.check.torques)}
     pictures: dict[str, Any] = {
@@ -246,18 +248,23 @@ def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remar
 def _numbers(designed: CamDesign) -> dict[str, Any]:
     spread = {}
     if designed.tolerance is not None:
-        spread = {f"{100 * q.share:g} %": q.value for q in designed.tolerance.quantiles}
+        spread = {f"{100 * q.share:g} %": _rounded(q.value) for q in designed.tolerance.quantiles}
     return {
         "met": designed.met,
-        "torque_error_rms": designed.rms,
+        "torque_error_rms": _rounded(designed.rms),
         "miss": None if designed.miss is None else str(designed.miss),
         "advice": [] if designed.miss is None else list(designed.miss.advice),
         "values": {name: quantity.value for name, quantity in designed.values.items()},
         "active_limits": list(designed.active_limits),
-        "largest_cable_force": float(designed.curves.forces.max()),
-        "energy": designed.curves.energy,
+        "largest_cable_force": _rounded(float(designed.curves.forces.max())),
+        "energy": _rounded(designed.curves.energy),
         "rms_error_over_spreads": spread,
     }
+
+
+def _rounded(value: float) -> float:
+    """Return what a result is good for: six digits, the same on every processor."""
+    return float(f"{value:.6g}")
 
 
 def _show(designed: CamDesign, files: Iterable[Path]) -> None:

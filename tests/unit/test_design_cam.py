@@ -113,7 +113,7 @@ def test_progress_is_told_after_each_start() -> None:
         keep=KEEP,
         settings=DesignSettings(progress=lambda: steps.append(1)),
     )
-    assert len(steps) == 4
+    assert len(steps) == 8
 
 
 def test_a_given_cam_leaves_pretension_and_rubber_to_find() -> None:

@@ -213,8 +213,10 @@ COMMANDS = {
 }
 WORKS = {
     ("analyse", "one_sided_cable_drive"), ("analyse", "austin2015_soft_spring"),
-    ("observer", "austin2015_soft_spring"), ("design", "two_motors"), ("export c", "austin2015_soft_spring"),
+    ("observer", "austin2015_soft_spring"), ("export c", "austin2015_soft_spring"),
 }  # fmt: skip
+MISSES = {("design", "two_motors"), ("design", "one_sided_cable_drive")}
+"""Designed, but the contour alone cannot give that torque; that is exit status 1."""
 
 
 @pytest.mark.parametrize("deck", MACHINES)
@@ -225,8 +227,8 @@ def test_a_machine_passes_or_one_sentence_says_why(
     before = sorted(tmp_path.rglob("*"))
     words = COMMANDS[command]
     status, _, err = run(*words, "--deck", decks[deck])
-    assert status == (0 if (command, deck) in WORKS else 2), err
-    if status:
+    assert status == (0 if (command, deck) in WORKS else 1 if (command, deck) in MISSES else 2), err
+    if status == 2:
         (line,) = err.strip().splitlines()
         assert re.match(r"error: .+: .+ -> .+", line), line
         assert sorted(tmp_path.rglob("*")) == before, "nothing half-written"

@@ -37,7 +37,9 @@ def test_the_deck_of_a_rig_is_the_same_to_the_byte(tmp_path: Path) -> None:
 
 def test_a_designed_deck_and_its_drawings_are_the_same_to_the_byte(tmp_path: Path) -> None:
     target = ("--maximum", "5 N*m", "--angle", "53 deg")
-    free = ("--free", "spring.cam.contour", "--free", "spring.pretension", "--free", "spring.rubber.area")
+    names = ("cam.contour", "pretension", "rubber.area", "rubber.rest_length")
+    free = [word for name in names for word in ("--free", f"spring.{name}")]
+    free += ["--limit", 'RestLengthRange = {minimum = "10 mm", maximum = "50 mm"}', "--draws", "50"]
     words = ("design", "--deck", "austin2015_figure_consistent", *target, *free, "--out", "o")
     files = [written(kernel, tmp_path / kernel, *words) for kernel in KERNELS]
     assert {"model.toml", "cam.csv"} <= set(files[0])

@@ -33,6 +33,8 @@ Floats = NDArray[np.float64]
 _ACTIVE = 1e-3
 _AT_END = 1e-6
 _CONTROL_VALUES = 64
+_DEARER = 1.2
+"""Factor on the cost up to which a narrower rounding counts as the same design."""
 _NARROWED = 2
 """How often the rounding of knots is narrowed at most."""
 _SHARE_OF_CAM = 0.25
@@ -136,7 +138,8 @@ def narrowed(solved: SolvedSearch) -> SolvedSearch:
             break
         search = solved.search.question.search(solved.free, finer)
         outcome = search.program.solve(carried_over(solved.search, solved.best.point, search))
-        if not outcome.solved:
+        # A sharper law is no reason to end in another, dearer place.
+        if not outcome.solved or outcome.cost > _DEARER * solved.best.cost:
             break
         better = replace(solved, search=search, best=outcome)
         if better.check.rms >= solved.check.rms:

@@ -49,7 +49,7 @@ class DesignSettings:
     0.01
     """
 
-    starts: int = 4
+    starts: int = 8
     seed: int = 1
     largest_error: float = 0.01
     defaults: Sequence[Limit] | None = None

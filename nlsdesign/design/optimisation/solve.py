@@ -27,7 +27,7 @@ from .stock import StockChoice, combinations, require_once
 GOALS: tuple[Goal, ...] = (TorqueError(), SmoothContour(), LeastRubber())
 """Torque error; the other two only choose between designs of equal torque."""
 USUAL = DesignSettings()
-"""Four starts, 1 % of the largest torque as the largest error, limits of the declared cable and rubber."""
+"""Eight starts, 1 % of the largest torque as the largest error, limits of the declared cable and rubber."""
 
 
 def design_cam(
