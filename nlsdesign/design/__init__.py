@@ -49,7 +49,7 @@ from .optimisation.limits import (
     PretensionRange,
     RestLengthRange,
 )
-from .optimisation.limits_of_use import OverTravel, TorqueWithin
+from .optimisation.limits_of_use import AtMost, OverTravel, TorqueWithin
 from .optimisation.pareto import pareto
 from .optimisation.result import CamDesign, LimitState, TorqueCheck
 from .optimisation.settings import DesignSettings
@@ -71,6 +71,7 @@ from .tolerance.trimming import Trim
 __all__ = [
     "AnchorDistance",
     "AreaRange",
+    "AtMost",
     "BoltCircle",
     "BothStrokes",
     "CamDesign",

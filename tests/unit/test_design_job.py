@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.design import (
+    AtMost,
     ExponentialTorque,
     LeastRubber,
+    LeastSize,
     MaximumCamRadius,
     MaximumStrain,
     MaximumStress,
@@ -91,6 +93,13 @@ def test_a_target_may_be_a_table_beside_the_file(tmp_path: Path) -> None:
     assert isinstance(job.target, TabulatedTorque)
     assert job.target.last_angle == pytest.approx(degrees(50.0))
     assert job.free is None
+
+
+def test_a_goal_may_stand_in_a_limit() -> None:
+    text = WHOLE.replace("[goals]", 'AtMost = {of = {LeastSize = {}}, value = "19 mm"}\n\n[goals]')
+    assert job_of(text, Path("job.toml")).keep[-1] == AtMost(
+        LeastSize(), quantity(19.0, "mm", source="asked for in the design file")
+    )
 
 
 def test_a_band_beside_the_target_is_kept_as_a_limit(tmp_path: Path) -> None:

@@ -10,7 +10,10 @@ from nlsdesign.components import OneSidedCam, through, tie
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.design import (
+    AtMost,
+    CamDesign,
     DesignSettings,
+    LeastMass,
     MaximumCableTension,
     MaximumCamRadius,
     MaximumStrain,
@@ -29,7 +32,7 @@ from nlsdesign.design import (
 )
 from nlsdesign.design.optimisation.limits import Bound
 from nlsdesign.design.optimisation.loosening import Give
-from nlsdesign.errors import InfeasibleError, UnknownNameError, ValueRangeError
+from nlsdesign.errors import InfeasibleError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.quantity import degrees, quantity
 from tests.cam_cases import CONCAVE, CONTOUR, KEEP, PRETENSION, RUBBER, TARGET, actuator
@@ -190,6 +193,26 @@ def test_over_travel_keeps_the_strain_beyond_the_last_angle() -> None:
     assert model.evaluate(state)["spring.rubber.strain"] <= 1.0 + 2e-3
     (kept,) = (each for each in design.limits if each.limit == "OverTravel")
     assert model.evaluate(state)["spring.rubber.strain"] == pytest.approx(kept.value, rel=2e-3)
+
+
+def test_what_a_goal_measures_may_be_a_limit() -> None:
+    """Mass of rubber by hand: density · N · A · L; the plates weigh next to nothing."""
+    mass = LeastMass(rubber_density=1100.0, plate_thickness=1e-5, plate_density=100.0)
+
+    def rubber(design: CamDesign) -> float:
+        numbers = design.actuator.quantities()
+        return (
+            1100.0 * 2.0 * numbers["spring.rubber.area"].number * numbers["spring.rubber.rest_length"].number
+        )
+
+    free = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=KEEP, settings=QUICK)
+    assert rubber(free) > 2.85e-3
+    keep = [*KEEP, AtMost(mass, quantity(2.8, "g"))]
+    light = design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=keep, settings=QUICK)
+    assert rubber(light) <= 2.8e-3
+    assert "AtMost" in light.active_limits
+    with pytest.raises(UnitError, match="unit like 'g'"):
+        design_cam(actuator(CONCAVE), target=TARGET, free=RUBBER, keep=[AtMost(mass, quantity(3.0, "mm"))])
 
 
 def test_a_torque_band_is_a_limit() -> None:

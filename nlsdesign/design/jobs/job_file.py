@@ -276,21 +276,7 @@ def built(deck: Deck, kind: type, given: object, place: str) -> Any:
 def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
     allowed = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
     if isinstance(raw, Mapping):
-        kinds_of = [each for each in allowed if isinstance(each, type) and dataclasses.is_dataclass(each)]
-        named = [each for each in kinds_of if each.__name__ in raw]
-        if named:
-            return built(deck, named[0], raw[named[0].__name__], place)
-        records = [each for each in kinds_of if each is not Quantity]
-        if len(records) == 1:
-            return built(deck, records[0], raw, place)
-        if Limit in typing.get_args(hint):
-            return tuple(_of_kinds(deck, place, Limit, raw))
-        base = next(
-            (each for each in allowed if isinstance(each, type) and each in (TaskGoal, SpringSymmetry)), None
-        )
-        if base is not None:
-            return next(iter(_of_kinds(deck, place, base, raw)))
-        raise DeckError(place, "is a table where a number or text is wanted")
+        return _of_table(deck, hint, allowed, raw, place)
     if isinstance(raw, list):
         of_items = typing.get_args(hint)[0] if typing.get_args(hint) else Any
         return tuple(_value(deck, of_items, item, place) for item in raw)
@@ -300,6 +286,23 @@ def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
         # A bare number is a pure one: a length without a unit is refused by what it is for.
         return Quantity(float(raw), "1", "asked for in the design file")
     return float(raw) if isinstance(raw, float) else raw
+
+
+def _of_table(deck: Deck, hint: Any, allowed: tuple[Any, ...], raw: Mapping[str, Any], place: str) -> Any:
+    """Return what a table stands for: an object named in it, or the fields of the one kind allowed."""
+    for base in (Goal, TaskGoal, SpringSymmetry):
+        if base in allowed:
+            return next(iter(_of_kinds(deck, place, base, raw)))
+    if Limit in typing.get_args(hint):
+        return tuple(_of_kinds(deck, place, Limit, raw))
+    records = [each for each in allowed if isinstance(each, type) and dataclasses.is_dataclass(each)]
+    named = [each for each in records if each.__name__ in raw]
+    if named:
+        return built(deck, named[0], raw[named[0].__name__], place)
+    others = [each for each in records if each is not Quantity]
+    if len(others) == 1:
+        return built(deck, others[0], raw, place)
+    raise DeckError(place, "is a table where a number or text is wanted")
 
 
 def _number(text: str, place: str) -> Quantity:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ...errors import ValueRangeError
-from ...quantity import Quantity
+from ...errors import UnitError, ValueRangeError
+from ...quantity import Quantity, same_dimension
 from ..curves.numbers import in_si, plain
 from ..curves.shapes import TorqueBand
 from .design_point import DesignPoint
+from .goals import Goal
 from .limits import Bound, Limit, MaximumCableTension, MaximumStrain, MaximumStress
 
 
@@ -99,3 +100,41 @@ class TorqueWithin(Limit):
         torques, scale = design.torques[1:], design.target.largest
         yield self._bound("torque above band", torques - low, 0.0, upper=False, unit="mN*m", scale=scale)
         yield self._bound("torque below band", torques - high, 0.0, upper=True, unit="mN*m", scale=scale)
+
+
+@dataclass(frozen=True)
+class AtMost(Limit):
+    """What a goal measures, as a limit: mass, size, energy lost, error on both strokes.
+
+    Parameters
+    ----------
+    of
+        The goal that measures it, for instance :class:`LeastMass`.
+    value
+        Quantity, or a bare number in SI.
+
+    Examples
+    --------
+    >>> from nlsdesign.design import LeastSize
+    >>> AtMost(LeastSize(), 0.02).value
+    0.02
+    """
+
+    of: Goal
+    value: Quantity | float
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield one bound.
+
+        Raises
+        ------
+        UnitError
+            If the value is in a unit of something else.
+        """
+        measure = self.of.measured(design)
+        if isinstance(self.value, Quantity) and not same_dimension(self.value.unit, measure.unit):
+            raise UnitError(
+                f"AtMost: {measure.what} = {self.value}", f"'{self.value.unit}' is no unit of it",
+                next_step=f"give it in a unit like '{measure.unit}'",
+            )  # fmt: skip
+        yield self._bound(measure.what, measure.expression, plain(self.value), upper=True, unit=measure.unit)
