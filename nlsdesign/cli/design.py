@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..design import CamDesign, DesignJob, Target
 
 _LINE = "repeatable; a line as in a design file, for instance"
-_DRAWS = 1000
 _FILES = (
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
@@ -48,7 +47,7 @@ _FILES = (
 @click.option("--starts", type=int, default=None, help="Number of starting points.")
 @click.option("--seed", type=int, default=None, help="Seed of the starts after the fourth, and of the draws.")
 @click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
-@click.option("--draws", type=int, default=_DRAWS, show_default=True, help="Draws of the tolerance; 0: none.")
+@click.option("--draws", type=int, default=None, help="Draws of the tolerance, else 1000; 0: none.")
 @spring_option
 @out_option("out/design")
 @json_option

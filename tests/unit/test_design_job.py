@@ -54,6 +54,9 @@ LeastRubber = {weight = 0.01}
 "spring.rubber.rest_length" = ["10 mm", "12.5 mm"]
 rubber = ["PMC-770", "Dragon_Skin_30"]
 
+[tolerance]
+draws = 60
+
 [search]
 starts = 12
 seed = 3
@@ -82,6 +85,7 @@ def test_a_file_says_what_the_objects_say() -> None:
     assert [float(getattr(value, "number", value)) for value in stock.values] == [0.01, 0.0125]
     assert rubber == RubberStock(("PMC-770", "Dragon_Skin_30"))
     assert (job.settings.starts, job.settings.seed, job.settings.largest_error) == (12, 3, 0.005)
+    assert job.settings.draws == 60
     assert job.spring == "spring"
 
 
@@ -128,6 +132,8 @@ def test_a_target_may_follow_from_a_task() -> None:
         ('"20 mm"', '"20"', UnitError, r"job\.toml:9:1.*has no unit -> give it in a unit like 'm'"),
         ('"20 mm"', "0.5", UnitError, r"job\.toml:9:1.*has no unit"),
         ('"20 mm"', '"twenty mm"', UnitError, r"radius = 'twenty mm'.*does not start with a number"),
+        ("draws = 60", "drawz = 60", UnknownNameError, r"did you mean 'draws'"),
+        ("draws = 60", 'draws = "many"', DeckError, r"is not a whole number"),
         ("[goals]", "[gaols]", UnknownNameError, r"did you mean 'goals'"),
         ("seed = 3", "sede = 3", UnknownNameError, r"job\.toml:\d+:1.*did you mean 'seed'"),
         ("starts = 12", "starts = 0", ValueRangeError, r"starts = 0"),

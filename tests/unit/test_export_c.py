@@ -120,6 +120,7 @@ def test_the_self_test_passes_and_can_fail(name, real, tmp_path):
 @pytest.mark.parametrize("real", REALS)
 def test_gcc_finds_nothing_to_complain_about(real, optimised, tmp_path):
     if shutil.which("gcc") is None:
+        # The code is C99 for any compiler; these are the warnings of one that need not be on every machine.
         pytest.skip("gcc is not installed")
     for model in MODELS.values():
         source = export_c(model, tmp_path, real=real)

@@ -186,6 +186,7 @@ def test_the_edges_have_no_corner_but_at_the_ferrule(tmp_path: Path, contour: Co
 
 
 def test_step_holds_the_solids_in_millimetres(tmp_path: Path, contour: Contour) -> None:
+    # Open CASCADE is 380 MB on disk, so it is neither a dependency nor locked; the package works without.
     pytest.importorskip("OCP", reason="STEP is an extra")
     machined = MachinedTwoSidedCam(cable_radius=CABLE, bolts=BOLTS)
     dxf, step = write_drawings(tmp_path, contour, machined=machined, formats=["dxf", "step"])

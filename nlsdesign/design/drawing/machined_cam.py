@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -148,7 +149,7 @@ class ClampScrew:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MachinedCam:
+class MachinedCam(ABC):
     """Sizes common to all cams; take :class:`MachinedTwoSidedCam` or :class:`MachinedOneSidedCam`.
 
     Each number is a quantity, or bare in SI. What is left out is derived from the contour and the cable; the
@@ -277,11 +278,11 @@ class MachinedCam:
         check_machinable(made)
         return made
 
+    @abstractmethod
     def _drawn(
         self, contour: Contour, lip: LipEdge, numbers: dict[str, Quantity]
     ) -> tuple[list[ArcPath], list[Hole], list[ArcPath]]:
         """Return outlines, holes but those of the bolts, and cables; adds the numbers that it derives."""
-        raise NotImplementedError
 
     def _body_radius(self, limit: float, numbers: dict[str, Quantity]) -> None:
         """Add the body radius where it is not given: what holes need, else half of what fits."""

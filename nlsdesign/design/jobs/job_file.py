@@ -28,6 +28,7 @@ from .task_target import TaskTarget
 Asked = TypeVar("Asked")
 
 _TABLES = ("spring", "free", "target", "limits", "goals", "stock", "search", "tolerance", "drawing")
+_DRAWS = 1000
 _SEARCH = ("starts", "seed", "largest_error")
 
 
@@ -51,8 +52,8 @@ class DesignJob:
         Path of the cam spring, where it was named.
     settings
         Of the search.
-    tolerance, drawing
-        The tables of those names, as read.
+    drawing
+        The table of that name, as read.
     deck
         The whole file with the places of its names.
     """
@@ -64,7 +65,6 @@ class DesignJob:
     goals: tuple[Goal, ...]
     spring: str | None
     settings: DesignSettings
-    tolerance: Mapping[str, Any]
     drawing: Mapping[str, Any]
     deck: Deck
 
@@ -135,10 +135,11 @@ def job_of(text: str, file: Path) -> DesignJob:
         [stock]
         "spring.rubber.thickness" = ["2 mm", "3 mm"]
         rubber = ["PMC-770"]
-
         [search]
         starts = 20
         largest_error = "1 %"
+        [tolerance]
+        draws = 2000
     """
     deck = read_deck(text, file)
     for key in deck.tables:
@@ -159,7 +160,6 @@ def job_of(text: str, file: Path) -> DesignJob:
         goals=tuple(_objects(deck, "goals", Goal)) or GOALS,  # type: ignore[type-abstract]
         spring=None if "spring" not in deck.tables else str(deck.tables["spring"]),
         settings=_settings(deck),
-        tolerance=_table(deck, "tolerance"),
         drawing=_table(deck, "drawing"),
         deck=deck,
     )
@@ -339,7 +339,20 @@ def _settings(deck: Deck) -> DesignSettings:
             raise unknown_name(place, name, _SEARCH)
         given = _number(raw, place).number if isinstance(raw, str) else raw
         values[name] = float(given) if name == "largest_error" else int(given)
+    values["draws"] = _draws(deck)
     return _placed(lambda: DesignSettings(**values), deck.place("search"))
+
+
+def _draws(deck: Deck) -> int:
+    """Return the number of made springs that the table ``[tolerance]`` asks for."""
+    table = _table(deck, "tolerance")
+    for name in table:
+        if name != "draws":
+            raise unknown_name(deck.place(f"tolerance.{name}"), name, ["draws"])
+    given = table.get("draws", _DRAWS)
+    if not isinstance(given, int) or isinstance(given, bool):
+        raise DeckError(deck.place("tolerance.draws"), f"{given!r} is not a whole number")
+    return given
 
 
 def _names(deck: Deck, key: str) -> tuple[str, ...] | None:

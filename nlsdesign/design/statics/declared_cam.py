@@ -102,19 +102,23 @@ class DeclaredCam(ABC, Generic[Made]):
 class _TwoSided(DeclaredCam[TwoSidedCam]):
     @property
     def through_centre(self) -> bool:
+        """True."""
         return True
 
     @property
     def anchor_distance(self) -> float:
+        """Distance of the anchor in m."""
         return self.part.anchor_distance.number
 
     def contour(self, last_angle: float | None, points: int) -> Contour:
+        """Return the contour behind the change of sides or the onset."""
         angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
         # Beyond the change of sides the cable lies on the contour with the lever arm H(θ − w).
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.changeover.number)
         return contour_from_lever_arm(angles, arms, anchor_distance=self.part.anchor_distance.number)
 
     def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+        """Return a cam with that lever arm, fitted through the law of this kind."""
         # The control values are fitted to h(θ) through the law of the cam, which changes sides over the
         # angle w, so that the change costs nothing where h starts at zero. A jump is rounded over w.
         width = self.part.changeover.number
@@ -138,19 +142,23 @@ class _TwoSided(DeclaredCam[TwoSidedCam]):
 class _OneSided(DeclaredCam[OneSidedCam]):
     @property
     def through_centre(self) -> bool:
+        """False: the cable stays parallel."""
         return False
 
     @property
     def anchor_distance(self) -> float:
+        """Distance of the anchor in m."""
         return math.inf
 
     def contour(self, last_angle: float | None, points: int) -> Contour:
+        """Return the contour behind the change of sides or the onset."""
         angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
         # Beyond the onset the cable lies on the contour with the lever arm H(θ − w/2).
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.onset.number / 2)
         return contour_from_lever_arm(angles, arms, anchor_distance=np.inf)
 
     def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+        """Return a cam with that lever arm, fitted through the law of this kind."""
         width = self.part.onset.number
         dense, wanted = _dense(angles, lever_arms, count)
         r = np.clip(dense / width, 0.0, 1.0)
@@ -170,13 +178,16 @@ class _OneSided(DeclaredCam[OneSidedCam]):
 class _Anchored(DeclaredCam[AnchoredCam]):
     @property
     def through_centre(self) -> bool:
+        """True."""
         return True
 
     @property
     def anchor_distance(self) -> float:
+        """Distance of the anchor in m."""
         return self.part.anchor_distance.number
 
     def contour(self, last_angle: float | None, points: int) -> Contour:
+        """Return the contour behind the change of sides or the onset."""
         end, anchor = self.part.last_direction.number, self.part.anchor_distance.number
         values = np.array(self.part.support.values)
         step = end / (len(values) - 3)
@@ -196,6 +207,7 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         return Contour(directions, p, support(directions, 1), p + support(directions, 2), anchor)
 
     def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+        """Return a cam with that lever arm, fitted through the law of this kind."""
         width, old = self.part.changeover.number, self.part.anchor_distance
         anchor = old.number if anchor is None else anchor
         dense, wanted = _dense(angles, lever_arms, count)
