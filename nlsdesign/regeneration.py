@@ -29,7 +29,7 @@ from .model.readings import reading_of
 from .model.roles import measured_motion, series_spring
 from .model.structure import SpringNames
 from .observer import FixedGrid, Grid, ObserverDesign, design_observer_with_details, observe
-from .observer.scheduled import whole_contour
+from .observer.scheduling.scheduled import whole_contour
 from .processes import parallel_map
 from .quantity import three_digits, with_unit
 from .simulation import Trace

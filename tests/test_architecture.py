@@ -71,6 +71,8 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
+    "observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),
+    "control": ({"laws"}, {"loop"}, {"evaluation"}, {"tuning"}),
     "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation"}),
 }  # fmt: skip
 
@@ -248,8 +250,8 @@ ALLOWED = {
     "components/core/spring": "import casadi",
     "model/linear": "import control\nfrom ..components.transmission.cam import Cam",
     "analysis/sweep": "from control import StateSpace\nfrom ..model import linear",
-    "observer/gains": "from ..analysis.sweep import over",
-    "control/torque_loop": "import control.matlab\nfrom ..observer import gains",
+    "observer/scheduling/gains": "from ...analysis.sweep import over",
+    "control/laws/torque_loop": "import control.matlab\nfrom ...observer import gains",
     "design/statics/contour": "from ...components.transmission.cam import Cam",
     "design/optimisation/solve": "from ...components.assembly.named_parts import Assembly",
     "components/assembly/named_parts": "",
@@ -344,7 +346,7 @@ def test_a_forbidden_import_is_caught(tmp_path: Path, module: str, text: str, co
         "components/transmission/cam",
         "components/assembly/named_parts",
         "analysis/sweep",
-        "observer/gains",
+        "observer/scheduling/gains",
         "discrepancy/effects",
     ]
     empty = dict.fromkeys([*rooms, "cli", "report/html"], "")

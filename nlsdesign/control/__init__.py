@@ -1,8 +1,8 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
-from .evaluation import SineResponse, Tracking, sine_response, tracking, zero_torque
-from .loop import ClosedLoop
-from .torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
+from .evaluation.responses import SineResponse, Tracking, sine_response, tracking, zero_torque
+from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
+from .loop.closed_loop import ClosedLoop
 
 __all__ = [
     "ClosedLoop",

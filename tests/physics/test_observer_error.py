@@ -27,7 +27,7 @@ from nlsdesign.observer import (
     design_observer_with_details,
     observe,
 )
-from nlsdesign.observer.check import error_matrices
+from nlsdesign.observer.scheduling.check import error_matrices
 from nlsdesign.simulation import Trace, simulate
 from tests import observed as ob
 

@@ -44,7 +44,7 @@ from nlsdesign.observer import (
     design_observer_with_details,
     observe,
 )
-from nlsdesign.observer.scheduled import whole_contour
+from nlsdesign.observer.scheduling.scheduled import whole_contour
 from nlsdesign.quantity import parse_unit
 from nlsdesign.simulation import Trace, simulate
 from tests import observed as ob

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from nlsdesign.errors import UnknownNameError, ValueRangeError
 from nlsdesign.observer import CascadeGain, PolePlacement, SteadyStateKalman
-from nlsdesign.observer.gains import GainRule, SampledPlant
+from nlsdesign.observer.scheduling.gains import GainRule, SampledPlant
 from tests import observed as ob
 
 TIME = 1e-3

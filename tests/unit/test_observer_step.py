@@ -10,9 +10,9 @@ from nlsdesign.errors import ValueRangeError
 from nlsdesign.model import FlatModel, Variable
 from nlsdesign.model.transform import with_outputs, with_signal
 from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
-from nlsdesign.observer.angle_form import AngleForm, ScheduledNames
-from nlsdesign.observer.plant import AngleScheduledPlant, Coefficients
-from nlsdesign.observer.step import ObserverStep
+from nlsdesign.observer.scheduling.angle_form import AngleForm, ScheduledNames
+from nlsdesign.observer.scheduling.plant import AngleScheduledPlant, Coefficients
+from nlsdesign.observer.scheduling.step import ObserverStep
 from tests import observed as ob
 
 TIME, DECAY = 1e-3, 100.0

@@ -7,7 +7,7 @@ import pytest
 
 from nlsdesign.errors import ConvergenceError, ValueRangeError
 from nlsdesign.observer import FixedGrid, GridByTolerance
-from nlsdesign.observer.table import ColumnPlace, Compact, Entry, Grid, compacted
+from nlsdesign.observer.scheduling.table import ColumnPlace, Compact, Entry, Grid, compacted
 
 
 def entry(key: str, values: np.ndarray, *, row: str = "sum", weight: float = 1.0) -> Entry:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 
 import casadi as ca
 
-from ..errors import ArrangementError, ValueRangeError
-from ..model import FlatModel, Variable
-from ..model.roles import motor_of, series_spring
-from ..symbolic import Expression
+from ...errors import ArrangementError, ValueRangeError
+from ...model import FlatModel, Variable
+from ...model.roles import motor_of, series_spring
+from ...symbolic import Expression
 
 DESIRED = "desired"
 """What is added to the name of the torque for the torque that the spring should have."""

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from ..analysis.rest import evaluate_rows, rest_states
-from ..errors import ArrangementError
-from ..model import FlatModel
+from ...analysis.rest import evaluate_rows, rest_states
+from ...errors import ArrangementError
+from ...model import FlatModel
 from .plant import Coefficients
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import place_poles
 
-from ..analysis.kalman import discrete_noise, steady_state_kalman
-from ..errors import ConvergenceError, ValueRangeError, unknown_name
+from ...analysis.kalman import discrete_noise, steady_state_kalman
+from ...errors import ConvergenceError, ValueRangeError, unknown_name
 
 Array = NDArray[np.float64]
 Spectrum: TypeAlias = NDArray[np.complex128]
@@ -98,7 +98,8 @@ class CascadeGain:
     number at all of them. What does not vanish is what the model has wrong.
 
     It needs that Φ_ζ and F do not depend on the angle. Φ_ζ does for rubber behind a soft cable, F for a drive
-    with dry friction; :func:`~nlsdesign.observer.check.check_stability` looks, and says what is left.
+    with dry friction; :func:`~nlsdesign.observer.scheduling.check.check_stability` looks, and says what is
+    left.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Variable
+from ...model import Variable
 
 Array = NDArray[np.float64]
 

@@ -16,11 +16,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArrangementError, ValueRangeError, unknown_name
-from ..model import FlatModel
-from ..simulation import Trace, range_warnings
-from .sampled import DiscreteStepper, PlantStepper
-from .torque_loop import LoopNames, loop_names
+from ...errors import ArrangementError, ValueRangeError, unknown_name
+from ...model import FlatModel
+from ...simulation import Trace, range_warnings
+from ...simulation.sampled import DiscreteStepper, PlantStepper
+from ..laws.torque_loop import LoopNames, loop_names
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], float] | float

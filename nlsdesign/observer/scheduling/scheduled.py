@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArrangementError, ValueRangeError
-from ..model import FlatModel, Table, Variable
-from ..model.roles import measured_motion, spring_torque
-from ..quantity import typeset_unit
-from ..symbolic import Expression
+from ...errors import ArrangementError, ValueRangeError
+from ...model import FlatModel, Table, Variable
+from ...model.roles import measured_motion, spring_torque
+from ...quantity import typeset_unit
+from ...symbolic import Expression
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, GainRule
 from .step import ObserverStep
@@ -169,9 +169,9 @@ def design_observer(
     sample_time
         In s.
     gain
-        Rule for the correction; :class:`~nlsdesign.observer.gains.CascadeGain` by default.
+        Rule for the correction; :class:`~nlsdesign.observer.scheduling.gains.CascadeGain` by default.
     form
-        Which states are carried; :class:`~nlsdesign.observer.forms.Minimal` by default.
+        Which states are carried; :class:`~nlsdesign.observer.scheduling.forms.Minimal` by default.
     grid
         Range and number of grid points; :func:`whole_contour` by default.
 

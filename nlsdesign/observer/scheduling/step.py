@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Variable
+from ...model import Variable
 from .discretise import held, linear
 from .gains import GainRule, SampledPlant
 from .plant import AngleScheduledPlant

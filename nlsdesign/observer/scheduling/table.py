@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, ValueRangeError
+from ...errors import ConvergenceError, ValueRangeError
 
 Array = NDArray[np.float64]
 

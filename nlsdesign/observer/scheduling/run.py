@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import MeasurementError, ValueRangeError
-from ..model import FlatModel
-from ..simulation import Trace, simulate
+from ...errors import MeasurementError, ValueRangeError
+from ...model import FlatModel
+from ...simulation import Trace, simulate
 
 
 def observe(

@@ -6,8 +6,8 @@ its step, with its entries as the table gives them, so it knows nothing of the d
 - Check: the spectral radius of E at angles ten times finer than the grid. It says that the observer is stable
   at every checked angle that stands still. For a moving angle it says nothing.
 - Proof: where E is block triangular with constant stable blocks, see
-  :class:`~nlsdesign.observer.gains.CascadeGain`. The table interpolates linearly between equal numbers, so
-  the blocks are constant for all angles, not only the checked ones.
+  :class:`~nlsdesign.observer.scheduling.gains.CascadeGain`. The table interpolates linearly between equal
+  numbers, so the blocks are constant for all angles, not only the checked ones.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError
-from ..model import FlatModel
+from ...errors import ValueRangeError
+from ...model import FlatModel
 from .scheduled import INNOVATION, MEMORY
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def error_matrices(observer: FlatModel, angles: Array, speed: float = 0.0) -> Ar
     Parameters
     ----------
     observer
-        As :func:`~nlsdesign.observer.scheduled.design_observer` gave it.
+        As :func:`~nlsdesign.observer.scheduling.scheduled.design_observer` gave it.
     angles
         Measured angles in rad, shape (N,).
     speed
@@ -117,7 +117,7 @@ def check_stability(
     Parameters
     ----------
     observer
-        As :func:`~nlsdesign.observer.scheduled.design_observer` gave it.
+        As :func:`~nlsdesign.observer.scheduling.scheduled.design_observer` gave it.
     finer
         How many times finer than its table the angles are.
     speeds

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError
-from ..model.roles import moved_load
-from ..simulation import Trace
-from .loop import PLANT, ClosedLoop
+from ...errors import ValueRangeError
+from ...model.roles import moved_load
+from ...simulation import Trace
+from ..loop.closed_loop import PLANT, ClosedLoop
 
 Array = NDArray[np.float64]
 

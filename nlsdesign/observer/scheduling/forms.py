@@ -9,11 +9,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.rest import evaluate_rows, rate_state, rest_states, typical_sizes
-from ..errors import ValueRangeError, unknown_name
-from ..model import FlatModel
-from ..model.paper_form import GEOMETRIC, PaperFormNames, paper_form
-from ..model.transform import with_outputs, without_idle_states
+from ...analysis.rest import evaluate_rows, rate_state, rest_states, typical_sizes
+from ...errors import ValueRangeError, unknown_name
+from ...model import FlatModel
+from ...model.paper_form import GEOMETRIC, PaperFormNames, paper_form
+from ...model.transform import with_outputs, without_idle_states
 from .angle_form import AngleForm, ScheduledNames
 from .plant import AngleScheduledPlant
 
