@@ -75,7 +75,7 @@ class Trust:
         If a number is not positive.
     """
 
-    unmodelled: float = 0.002
+    unmodelled: float = 0.005
     correlation_time: float = 0.02
     drift_time: float = 600.0
     counts: float = 1.0
@@ -205,9 +205,10 @@ def design_adaptive_observer(
     plant = finished(form, sizes, ())
     points = operating_points(form, settings.duty)
     resolution = trust.unmodelled * points.torque
+    prior = settings.prior or declared_prior(model)
     directions = uncertain_directions(
         form,
-        settings.prior or declared_prior(model),
+        prior,
         settings.duty,
         resolution=trust.smallest * points.torque,
         most=trust.most,
@@ -217,7 +218,14 @@ def design_adaptive_observer(
     )
     compact = over.compact(step.entries)
     missed = math.hypot(resolution, directions.left_out)
-    filter_ = _Filter(step, compact, directions, trust, _Noise(noise, missed / points.inertia, missed))
+    filter_ = _Filter(
+        step,
+        compact,
+        directions,
+        trust,
+        _Noise(noise, missed / points.inertia, missed),
+        safe_inputs(model, prior),
+    )
     observed = tuple(body for body in model.bodies if body.motion == measured)
     design = AdaptiveDesign(
         replace(filter_.model(), bodies=observed), step, compact, directions, settings.duty, trust
@@ -270,6 +278,26 @@ def encoder_quantum(model: FlatModel, measured: str) -> float:
     )  # fmt: skip
 
 
+def safe_inputs(model: FlatModel, prior: Prior) -> dict[str, float]:
+    """Return the size of each limited input up to which the drive surely gives it: two deviations inside.
+
+    Parameters
+    ----------
+    model
+        Flat model with its motors.
+    prior
+        What is known of the limits.
+    """
+    safe = {}
+    for body in model.bodies:
+        motor = body.motor
+        if motor is not None and motor.command is not None and motor.current_limit is not None:
+            name = motor.current_limit
+            spread = float(prior.deviations[prior.place(name)]) if name in prior.names else 0.0
+            safe[motor.command] = model.values[name] * math.exp(-2.0 * spread)
+    return safe
+
+
 @dataclass(frozen=True)
 class _Noise:
     """Deviations: of the measured angle in rad, of the acceleration in rad/s², of the estimate."""
@@ -289,8 +317,10 @@ class _Filter:
         directions: UncertainDirections,
         trust: Trust,
         noise: _Noise,
+        safe_inputs: Mapping[str, float],
     ) -> None:
         self.step, self.compact, self.trust, self.noise = step, compact, trust, noise
+        self.safe_inputs = safe_inputs
         self.plant = step.nominal.plant
         self.directions = directions
         self.n, self.slow = len(self.plant.states), len(directions.effect)
@@ -399,6 +429,14 @@ class _Filter:
         column[self.n :] *= moving * ca.fmin(1.0, self.trust.surprise / ca.sqrt(surprise + 1e-12))
         return column, moving
 
+    def _within_limit(self, u: Expression) -> Expression:
+        """Return 1 while no input is near a limit of the drive that is not known exactly, else 0."""
+        inside = ca.SX(1)
+        for i, v in enumerate(self.plant.inputs):
+            if v.name in self.safe_inputs:
+                inside *= ca.fabs(u[i]) < self.safe_inputs[v.name]
+        return inside
+
     def model(self) -> FlatModel:
         """Return the observer."""
         n, slow_count, plant = self.n, self.slow, self.plant
@@ -412,6 +450,7 @@ class _Filter:
         innovation = angle - expected[self.angle]
         surprise = (innovation / self.noise.angle) ** 2 / (before[self.angle, self.angle] + 1.0)
         gain, moving = self._gain(before, expected[self.speed], surprise)
+        gain[n:] *= self._within_limit(u)
         step = gain * (innovation / self.noise.angle)
         state = expected + step[:n] * self.units
         slow_after = ca.fmin(ca.fmax(slow + step[n:], -self.trust.limit), self.trust.limit)
