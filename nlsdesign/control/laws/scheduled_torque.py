@@ -137,7 +137,7 @@ class ScheduledTorque(TorqueLaw):
     stiffness_floor: float | None = None
     feedforward: float = 1.0
     acceleration_share: float = 1.0
-    acceleration_bandwidth: float = 60.0
+    acceleration_bandwidth: float = 100.0
     speed_limit: float = 60.0
     acceleration_limit: float | None = None
     rate: DesiredRate = field(default_factory=FilteredDifference)
@@ -182,11 +182,11 @@ class ScheduledTorque(TorqueLaw):
         return writer.signal(name, "N*m/rad", "stiffness that the law divides by", stiffness)
 
     def _acceleration(self, writer: LawWriter, ahead: Expression) -> Expression:
-        """Return the filtered rate of the feedforward part of the speed, which is kept within its limit."""
-        most = writer.setting(
-            "speed_limit", "rad/s", "torque loop: largest speed command", self.speed_limit
-        )
-        held = ca.fmin(ca.fmax(ahead, -most), most)
+        """Return the filtered rate of the feedforward part of the speed.
+
+        The speed is not limited before: where the spring has no stiffness the command jumps, and the current
+        limit then holds acceleration and braking alike.
+        """
         share = writer.setting(
             "acceleration_share", "1", "torque loop: share of the acceleration known beforehand",
             self.acceleration_share,
@@ -197,8 +197,8 @@ class ScheduledTorque(TorqueLaw):
         )  # fmt: skip
         before = writer.state("torque_loop.feedforward.previous", "rad/s", "feedforward one sample ago")
         old = writer.state("torque_loop.feedforward.rate", "rad/s^2", "filtered rate of the feedforward")
-        rate = writer.low_pass(old, (held - before) / writer.sample_time, corner)
-        writer.follow("torque_loop.feedforward.previous", held)
+        rate = writer.low_pass(old, (ahead - before) / writer.sample_time, corner)
+        writer.follow("torque_loop.feedforward.previous", ahead)
         writer.follow("torque_loop.feedforward.rate", rate)
         return share * rate
 
