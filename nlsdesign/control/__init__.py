@@ -2,6 +2,7 @@
 
 from .evaluation.responses import SineResponse, Tracking, sine_response, tracking, zero_torque
 from .laws.disturbance import DisturbanceObserver
+from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, torque_limit
 from .laws.outer_laws import PidTorque, TorqueLaw
 from .laws.scheduled_torque import DesiredRate, FilteredDifference, GivenRate, ScheduledTorque
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
@@ -25,11 +26,15 @@ __all__ = [
     "SineResponse",
     "TorqueGains",
     "TorqueLaw",
+    "TorqueLimit",
     "Tracking",
     "VelocityLoop",
+    "check_torque",
+    "largest_torque",
     "loop_names",
     "sine_response",
     "torque_controller",
+    "torque_limit",
     "tracking",
     "zero_torque",
 ]

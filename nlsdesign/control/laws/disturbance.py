@@ -36,7 +36,7 @@ class MotorBalance(NamedTuple):
 
 @dataclass(frozen=True)
 class DisturbanceObserver:
-    """Disturbance torque d̂ = Q(s)·(J·s·ω − k·I + r·T̂ + friction), whose opposite is added to the motor torque.
+    """Disturbance torque d̂ = Q(s)·(J·s·ω − k·I + r·T̂ + friction); the motor is given its opposite.
 
     Q is a low-pass of first order. The current in the balance is the one that acted: the commands of earlier
     samples, as late as they act. With it the drive answers as its nominal inertia up to the bandwidth of Q;

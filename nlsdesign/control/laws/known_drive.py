@@ -80,7 +80,7 @@ class KnownDrive:
 
     @property
     def spring_turns_value(self) -> float:
-        """r at the declared numbers, 1."""
+        """Turns of the spring per turn of the motor at the declared numbers, 1."""
         known, s = self._named
         slope = ca.jacobian(known[self.spring_motion], known[self.body.motion])
         point = ca.Function("turns", [s.time, s.state, s.input, s.parameter], [slope])

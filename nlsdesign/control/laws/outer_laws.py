@@ -183,9 +183,7 @@ class PidTorque(TorqueLaw):
         return SpeedCommand(speed, asked - speed, ca.SX(0), finish)
 
 
-def held_speed(
-    writer: LawWriter, asked: Expression, limit: float, acceleration: float | None
-) -> Expression:
+def held_speed(writer: LawWriter, asked: Expression, limit: float, acceleration: float | None) -> Expression:
     """Return a speed command within its limit, and within that of its change where there is one.
 
     Parameters

@@ -18,7 +18,7 @@ from ...model.transform import with_outputs
 from ...symbolic import Expression
 from .known_drive import KnownDrive
 from .law_writer import LawWriter
-from .outer_laws import HeldBack, Heard, SpeedCommand, TorqueLaw, check_settings, held_speed
+from .outer_laws import Heard, HeldBack, SpeedCommand, TorqueLaw, check_settings, held_speed
 
 POINTS = 257
 """Grid points of the table of the stiffness; odd, so that zero is one of them."""
@@ -29,8 +29,8 @@ BANDWIDTH = 12.0
 SHARE_OF_RATE = 0.012
 """Share of the sampling rate that the bandwidth has at most by default."""
 
-FLOOR_SHARE = 0.1
-"""Floor of the stiffness over its largest value, by default."""
+FLOOR_SHARE = 0.2
+"""Floor of the stiffness over the secant stiffness at the end of the contour, by default."""
 
 
 class DesiredRate(ABC):
@@ -87,7 +87,7 @@ class FilteredDifference(DesiredRate):
 
 @dataclass(frozen=True)
 class GivenRate(DesiredRate):
-    """The rate is an input of the controller, ``spring.torque.desired.rate``: whoever plans a torque knows it."""
+    """The rate is an input, ``spring.torque.desired.rate``, given by whoever plans the torque."""
 
     def rate(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> Expression:
         """Return the input; see :class:`DesiredRate`."""
@@ -111,7 +111,8 @@ class ScheduledTorque(TorqueLaw):
     bandwidth
         f_c in Hz; by default 12 Hz, or 0.012 of the sampling rate where that is less.
     stiffness_floor
-        k_0 in N·m/rad; by default a tenth of the largest stiffness in the table.
+        k_0 in N·m/rad; by default a fifth of the secant stiffness at the end of the table, torque
+        over angle.
     feedforward
         Share c of the rate of the desired torque, 1.
     acceleration_share
@@ -152,8 +153,10 @@ class ScheduledTorque(TorqueLaw):
     def command(self, writer: LawWriter, drive: KnownDrive, heard: Heard) -> SpeedCommand:
         """Return v within its limits; see :class:`TorqueLaw`."""
         stiffness = self._stiffness(writer, drive, heard)
-        gain = 2.0 * math.pi * writer.setting(
-            "bandwidth", "Hz", "torque loop: bandwidth", self.closes_at(writer.sample_time)
+        gain = (
+            2.0
+            * math.pi
+            * writer.setting("bandwidth", "Hz", "torque loop: bandwidth", self.closes_at(writer.sample_time))
         )
         share = writer.setting(
             "feedforward", "1", "torque loop: share of the rate of the desired torque", self.feedforward
@@ -172,10 +175,9 @@ class ScheduledTorque(TorqueLaw):
         if table.argument != drive.names.angle:
             writer.input(table.argument, "rad", "measured angle of the spring")
         (slope,) = writer.look_up(table)
-        largest = float(np.max(np.abs(table.values)))
         floor = writer.setting(
             "stiffness_floor", "N*m/rad", "torque loop: stiffness that the law takes at least",
-            FLOOR_SHARE * largest if self.stiffness_floor is None else self.stiffness_floor,
+            FLOOR_SHARE * _secant(table) if self.stiffness_floor is None else self.stiffness_floor,
         )  # fmt: skip
         stiffness = ca.sqrt(slope * slope + floor * floor)
         name = f"{series_spring(drive.plant).name}.stiffness.scheduled"
@@ -204,7 +206,7 @@ class ScheduledTorque(TorqueLaw):
 
 
 def stiffness_table(drive: KnownDrive) -> Table:
-    """Return the slope of the spring's torque at rest over its measured angle.
+    """Return the slope of the spring's torque at rest over its measured angle, zero where the torque falls.
 
     Over the contour of the cam, or ±90° where there is none; held at the ends, as the lever arm is. All inner
     states of the spring are relaxed. The argument is the angle of the motor where that alone tells the angle
@@ -228,18 +230,29 @@ def stiffness_table(drive: KnownDrive) -> Table:
     ends = [plant.values[cam.last_angle] for cam in spring.cams if cam.last_angle]
     end = min(ends, default=math.pi / 2.0)
     angles = np.linspace(-end, end, POINTS)
-    offset = plant.evaluate(plant.start(plant.states))[spring.motion]
+    offset = plant.evaluate(list(plant.start(plant.states)))[spring.motion]
     offset -= turns * float(plant.variable(body.motion).start)
     swept = over_angle(
         with_outputs(plant, [spring.effort]), [Stability()], angles=np.sort((angles - offset) / turns)
     )
-    slopes = swept["stiffness.slow"][:: 1 if turns > 0.0 else -1] / turns
+    slopes = np.maximum(swept["stiffness.slow"][:: 1 if turns > 0.0 else -1] / turns, 0.0)
     column = Variable(f"{spring.name}.stiffness", "N*m/rad", f"slope of {spring.effort} at rest")
     if not drive.spring_seen_at_the_motor:
         return Table(spring.motion, -end, float(angles[1] - angles[0]), (column,), slopes[:, None])
     at = swept.at
     ordered = slopes if turns > 0.0 else slopes[::-1]
     return Table(body.motion, float(at[0]), float(at[1] - at[0]), (column,), ordered[:, None])
+
+
+def _secant(table: Table) -> float:
+    """Return the torque at the stiffer end of the table over the angle there, in N·m/rad.
+
+    A mean of the slopes, so that a corner of the law at one angle does not decide.
+    """
+    grid = table.lower + table.step * np.arange(len(table.values))
+    slope = table.values[:, 0]
+    sides = [(grid >= 0.0), (grid <= 0.0)]
+    return max(float(np.mean(slope[side])) for side in sides if np.any(side))
 
 
 def _check_held(plant: FlatModel, motor: str) -> None:

@@ -1,4 +1,4 @@
-"""Torque controller of a series elastic drive: an outer law on the estimated torque, a velocity loop inside."""
+"""Torque controller of a series elastic drive: an outer law on the torque around a velocity loop."""
 
 from __future__ import annotations
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from ...symbolic import Expression
 from .disturbance import DisturbanceObserver, MotorBalance
 from .known_drive import KnownDrive
 from .law_writer import LawWriter, limited
-from .outer_laws import HeldBack, Heard, SpeedCommand, check_settings
+from .outer_laws import Heard, HeldBack, SpeedCommand, check_settings
 from .windup import AntiWindup, ConditionalIntegration, Integration
 
 BANDWIDTH = 45.0
@@ -159,9 +158,18 @@ class VelocityLoop:
         """
         raw, speed = self.measured_speed(writer, drive, heard)
         slow = writer.state("velocity_loop.integral", "N*m", "integral part of the motor torque")
-        turns, inertia, constant = drive.spring_turns(writer), drive.inertia(writer), drive.torque_per_current(writer)
-        stiffness = inertia * 2.0 * math.pi * writer.setting(
-            "velocity_bandwidth", "Hz", "velocity loop: bandwidth", self.closes_at(writer.sample_time)
+        turns, inertia, constant = (
+            drive.spring_turns(writer),
+            drive.inertia(writer),
+            drive.torque_per_current(writer),
+        )
+        stiffness = (
+            inertia
+            * 2.0
+            * math.pi
+            * writer.setting(
+                "velocity_bandwidth", "Hz", "velocity loop: bandwidth", self.closes_at(writer.sample_time)
+            )
         )
         share = writer.setting(
             "compensation", "1", "velocity loop: share of the estimated spring torque added to the current",
@@ -181,15 +189,19 @@ class VelocityLoop:
         if self.disturbance is not None:
             self.disturbance.remember(writer, current)
         beyond = wanted - current
-        rate = 2.0 * math.pi * writer.setting(
-            "velocity_integral", "Hz", "velocity loop: corner below which it integrates", self.integral
+        rate = (
+            2.0
+            * math.pi
+            * writer.setting(
+                "velocity_integral", "Hz", "velocity loop: corner below which it integrates", self.integral
+            )
         )
-        one = Integration(
-            "velocity", slow, lacking, rate * stiffness * lacking, (beyond,), beyond * constant
-        )
+        one = Integration("velocity", slow, lacking, rate * stiffness * lacking, (beyond,), beyond * constant)
         writer.follow("velocity_loop.integral", self.windup.following(writer, one))
         return MotorCurrent(
-            current, HeldBack(command.beyond, beyond * ca.sign(turns), ca.fabs(turns) * constant / stiffness), speed
+            current,
+            HeldBack(command.beyond, beyond * ca.sign(turns), ca.fabs(turns) * constant / stiffness),
+            speed,
         )
 
     def measured_speed(
