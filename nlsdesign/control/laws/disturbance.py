@@ -86,12 +86,12 @@ class DisturbanceObserver:
         ]
         # The difference of two mean speeds is the mean acceleration of both samples, each counted half.
         acting = (currents[self.delay] + currents[self.delay + 1]) / 2
-        found = (
+        apart = (
             balance.inertia * (balance.raw_speed - speed) / writer.sample_time
             - balance.torque_per_current * acting
             + load
         )
-        disturbance = writer.low_pass(estimate, found, corner)
+        disturbance = writer.low_pass(estimate, apart, corner)
         writer.follow("disturbance_observer.speed.previous", balance.raw_speed)
         writer.follow("disturbance_observer.load.previous", balance.load)
         writer.follow("disturbance_observer.torque", disturbance)

@@ -199,20 +199,20 @@ class KnownDrive:
         known, s = self._named
         rate = known[self.body.rate]
         others = ca.vertcat(s.time, _without(s.state, rate), s.input)
-        found = [
+        by_speed = [
             v.name
             for v in self.plant.signals
             if v.unit == "N*m" and depends(known[v.name], rate) and not depends(known[v.name], others)
         ]
-        if not found:
+        if not by_speed:
             return lambda speed: ca.SX(0)
         # Cut at all of them at once, a torque inside another one of them has no effect of its own.
-        opened = cut(self.plant, found)
+        opened = cut(self.plant, by_speed)
         after = opened.symbols()
         within = named(opened, after)
         acceleration = after.derivative[[v.name for v in opened.states].index(self.body.rate)]
         total = ca.SX(0)
-        for name in found:
+        for name in by_speed:
             share = -within[self.body.inertia or ""] * ca.jacobian(acceleration, within[name])
             if not depends(share, ca.vertcat(after.state, after.input)):
                 total += ca.substitute(share, after.parameter, s.parameter) * known[name]

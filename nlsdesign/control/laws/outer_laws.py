@@ -109,7 +109,7 @@ class PidTorque(TorqueLaw):
 
     v is the speed of the spring. Below crossover a load that is moved with the speed ω feels the torque ω/Kp,
     whatever the spring. The loop gain is Kp·k_t(θ): a stiffening spring loses margin.
-    Sources: Pratt and Williamson 1995; Vallery et al. 2008 (around a velocity loop).
+    Sources: Pratt and Williamson 1995; Robinson 2000; Vallery et al. 2008 (around a velocity loop).
 
     Parameters
     ----------

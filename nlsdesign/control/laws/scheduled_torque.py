@@ -9,16 +9,19 @@ from typing import ClassVar
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
-from ...analysis import Stability, over_angle
-from ...errors import ArrangementError
+from ...analysis.rest import evaluate_rows, rest_states
+from ...errors import ArrangementError, ValueRangeError
 from ...model import FlatModel, Table, Variable
 from ...model.roles import series_spring
-from ...model.transform import with_outputs
+from ...model.transform import named
 from ...symbolic import Expression
 from .known_drive import KnownDrive
-from .law_writer import LawWriter
+from .law_writer import GAIN, LawWriter
 from .outer_laws import Heard, HeldBack, SpeedCommand, TorqueLaw, check_settings, held_speed
+
+Array = NDArray[np.float64]
 
 POINTS = 257
 """Grid points of the table of the stiffness; odd, so that zero is one of them."""
@@ -31,6 +34,10 @@ SHARE_OF_RATE = 0.012
 
 FLOOR_SHARE = 0.2
 """Floor of the stiffness over the secant stiffness at the end of the contour, by default."""
+
+
+LEAST_FLOOR = 1e-3
+"""Least floor over the secant stiffness where the spring has no stiffness somewhere."""
 
 
 class DesiredRate(ABC):
@@ -104,7 +111,7 @@ class ScheduledTorque(TorqueLaw):
     the floor k_0 holds the command finite where the spring has no stiffness, as at the centre of a two-sided
     cam. The loop gain is 2π·f_c whatever the angle, so a stiffening spring keeps its margins. The rate of
     the feedforward part is known beforehand and goes to the velocity loop as an acceleration.
-    Source: Pratt and Williamson 1995 (the speed of the motor makes the rate of the torque), virtual work.
+    Sources: definition (dT/dt = k_t·dφ/dt); Vallery et al. 2008 (around a velocity loop).
 
     Parameters
     ----------
@@ -129,7 +136,8 @@ class ScheduledTorque(TorqueLaw):
     Raises
     ------
     ValueRangeError
-        If a setting is negative or not finite.
+        If a setting is negative or not finite; when it is written also if the floor is zero and the spring
+        has no stiffness somewhere.
     """
 
     title: ClassVar[str] = "speed by tangent stiffness on the estimated torque"
@@ -175,13 +183,28 @@ class ScheduledTorque(TorqueLaw):
         if table.argument != drive.names.angle:
             writer.input(table.argument, "rad", "measured angle of the spring")
         (slope,) = writer.look_up(table)
-        floor = writer.setting(
-            "stiffness_floor", "N*m/rad", "torque loop: stiffness that the law takes at least",
-            FLOOR_SHARE * _secant(table) if self.stiffness_floor is None else self.stiffness_floor,
-        )  # fmt: skip
+        floor = writer.number(self._floor(table))
         stiffness = ca.sqrt(slope * slope + floor * floor)
         name = f"{series_spring(drive.plant).name}.stiffness.scheduled"
         return writer.signal(name, "N*m/rad", "stiffness that the law divides by", stiffness)
+
+    def _floor(self, table: Table) -> Variable:
+        """Return the floor of the stiffness as a parameter; it is positive where the table has a zero."""
+        secant, smallest = _secant(table), int(np.argmin(table.values[:, 0]))
+        value = FLOOR_SHARE * secant if self.stiffness_floor is None else self.stiffness_floor
+        least = LEAST_FLOOR * secant if table.values[smallest, 0] <= LEAST_FLOOR * secant else 0.0
+        angle = round(table.lower + smallest * table.step, 9) + 0.0
+        if value < least or secant <= 0.0:
+            raise ValueRangeError(
+                f"stiffness_floor {value:g} N·m/rad",
+                f"the spring has no stiffness at {angle:.4g} rad, so the law would divide by zero there",
+                next_step=f"give at least {least:.2g} N·m/rad; a fifth of the secant stiffness, "
+                f"{FLOOR_SHARE * secant:.3g} N·m/rad, is the default",
+            )
+        return Variable(
+            f"{GAIN}.stiffness_floor", "N*m/rad", "torque loop: stiffness that the law takes at least",
+            value, value or 1.0, least,
+        )  # fmt: skip
 
     def _acceleration(self, writer: LawWriter, ahead: Expression) -> Expression:
         """Return the filtered rate of the feedforward part of the speed.
@@ -232,16 +255,25 @@ def stiffness_table(drive: KnownDrive) -> Table:
     angles = np.linspace(-end, end, POINTS)
     offset = plant.evaluate(list(plant.start(plant.states)))[spring.motion]
     offset -= turns * float(plant.variable(body.motion).start)
-    swept = over_angle(
-        with_outputs(plant, [spring.effort]), [Stability()], angles=np.sort((angles - offset) / turns)
-    )
-    slopes = np.maximum(swept["stiffness.slow"][:: 1 if turns > 0.0 else -1] / turns, 0.0)
+    # The mean slope of each cell around a grid point, so that the sum over the table is the torque.
+    edges = np.concatenate([angles[:1], (angles[1:] + angles[:-1]) / 2.0, angles[-1:]])
+    torques = _rest_torques(plant, spring.effort, (edges - offset) / turns)
+    slopes = np.maximum(np.diff(torques) / np.diff(edges), 0.0)
     column = Variable(f"{spring.name}.stiffness", "N*m/rad", f"slope of {spring.effort} at rest")
     if not drive.spring_seen_at_the_motor:
         return Table(spring.motion, -end, float(angles[1] - angles[0]), (column,), slopes[:, None])
-    at = swept.at
-    ordered = slopes if turns > 0.0 else slopes[::-1]
-    return Table(body.motion, float(at[0]), float(at[1] - at[0]), (column,), ordered[:, None])
+    seen = (angles - offset) / turns
+    order = np.argsort(seen)
+    step = float(abs(seen[1] - seen[0]))
+    return Table(body.motion, float(np.min(seen)), step, (column,), slopes[order][:, None])
+
+
+def _rest_torques(plant: FlatModel, torque: str, angles: Array) -> Array:
+    """Return a torque at rest at many angles of the motor."""
+    s = plant.symbols()
+    function = ca.Function("torque", [s.time, s.state, s.input, s.parameter], [named(plant, s)[torque]])
+    states = rest_states(plant, angles)
+    return evaluate_rows(function, states, plant.start(plant.inputs), plant.start(plant.parameters))[0][:, 0]
 
 
 def _secant(table: Table) -> float:

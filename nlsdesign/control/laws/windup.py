@@ -56,7 +56,10 @@ class AntiWindup(ABC):
 
 @dataclass(frozen=True)
 class ConditionalIntegration(AntiWindup):
-    """The integrator stands still while it pushes further into a limit, and only then."""
+    """The integrator stands still while it pushes further into a limit, and only then.
+
+    Source: Åström and Hägglund 2006 (conditional integration).
+    """
 
     def following(self, writer: LawWriter, one: Integration) -> Expression:
         """Return x + T·ẋ, or x while error and excess have the same sign."""
@@ -69,6 +72,8 @@ class ConditionalIntegration(AntiWindup):
 @dataclass(frozen=True)
 class BackCalculation(AntiWindup):
     """The integrator is led back by the excess over the limit: ẋ = K·e − excess/T_t.
+
+    Source: Åström and Hägglund 2006.
 
     Parameters
     ----------
