@@ -32,8 +32,8 @@ def test_co_simulated_loops_are_those_of_one_piece(tmp_path: Path) -> None:
     scheduled = nls.torque_controller(
         plant, law=ScheduledTorque(), velocity=VelocityLoop(disturbance=DisturbanceObserver())
     )
-    # The scheduled law divides by the small stiffness around zero, which enlarges what Runge-Kutta errs at the
-    # corner of the friction, until a count of the encoder falls one sample later: shorter steps in one piece.
+    # The scheduled law divides by the small stiffness around zero, which enlarges the integration error at
+    # the corner of the friction until a count of the encoder falls one sample later: shorter steps there.
     controllers = ((nls.torque_controller(plant), 10), (scheduled, 80))
     for number, (controller, substeps) in enumerate(controllers):
         file = nls.export_fmu(controller, tmp_path / f"controller{number}.fmu")
