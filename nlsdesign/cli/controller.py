@@ -35,12 +35,11 @@ from .units import Number
 def export_controller(
     deck_name: str,
     law: str,
-    bandwidth: float | None,
-    velocity_bandwidth: float | None,
     sample_time: float,
     out: Path,
     real: str,
     fmu: bool,
+    **bandwidths: float | None,
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
@@ -49,11 +48,12 @@ def export_controller(
     from ..export import export_c, export_fmu
     from ..model import flatten
 
+    bandwidth = bandwidths["bandwidth"]
     if law == "pid" and bandwidth is not None:
         raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
     plant = flatten(declare(load_deck(deck_name)))
     outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
-    inner = VelocityLoop(bandwidth=velocity_bandwidth)
+    inner = VelocityLoop(bandwidth=bandwidths["velocity_bandwidth"])
     model = torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")

@@ -22,7 +22,7 @@ WIRES = {
 }
 
 
-def test_co_simulated_loops_are_those_of_one_piece(tmp_path: Path) -> None:
+def test_co_simulated_loop_is_that_of_one_piece(tmp_path: Path) -> None:
     actuator = nls.declare(nls.load_deck("austin2015_figure_consistent"))
     plant = nls.flatten(actuator, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
     parts = {"plant": plant, "observer": nls.design_observer(plant)}

@@ -416,6 +416,7 @@ def test_what_the_sample_time_does_not_carry_is_refused(
         lambda: VelocityLoop(bandwidth=-1.0),
         lambda: FilteredDifference(-1.0),
         lambda: FrictionCompensation(width=math.nan),
+        lambda: FrictionCompensation(width=0.0),
         lambda: DisturbanceObserver(bandwidth=-1.0),
         lambda: DisturbanceObserver(delay=-1),
         lambda: BackCalculation(0.0),

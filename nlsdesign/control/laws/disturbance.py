@@ -40,7 +40,9 @@ class DisturbanceObserver:
 
     Q is a low-pass of first order. The current in the balance is the one that acted: the commands of earlier
     samples, as late as they act. With it the drive answers as its nominal inertia up to the bandwidth of Q;
-    in place of the integral of the velocity loop. Source: Paine et al. 2014.
+    in place of the integral of the velocity loop.
+    Sources: Ohnishi et al. 1996; Kong et al. 2009 (on the motor of a series elastic drive); Paine et al. 2014
+    (in a force loop).
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from ...model import FlatModel, Variable
 from .known_drive import KnownDrive
 from .law_writer import LawWriter
 from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
+from .supply import voltage_is_limited
 from .velocity_loop import VelocityLoop
 from .wired_names import DESIRED
 from .wired_names import LoopNames as LoopNames
@@ -154,7 +155,7 @@ def torque_controller(
         current or names.current, "A", "current for the coming sample",
         nominal=limit, minimum=-limit, maximum=limit,
     )  # fmt: skip
-    supply = "" if drive.voltage_is_limited else "; no voltage is limited, for the motor declares no winding"
+    supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
     return writer.model("torque_controller", description, (output, motor.current))
 

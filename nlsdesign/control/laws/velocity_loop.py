@@ -8,11 +8,15 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from ...errors import ValueRangeError
+from ...model import Variable
 from ...symbolic import Expression
+from .declared_friction import declared_friction
 from .disturbance import DisturbanceObserver, MotorBalance
 from .known_drive import KnownDrive
-from .law_writer import LawWriter, limited
+from .law_writer import GAIN, LawWriter, limited
 from .outer_laws import Heard, HeldBack, SpeedCommand, check_settings
+from .supply import currents_of_supply
 from .windup import AntiWindup, ConditionalIntegration, Integration
 
 BANDWIDTH = 45.0
@@ -20,6 +24,9 @@ BANDWIDTH = 45.0
 
 SHARE_OF_RATE = 0.045
 """Share of the sampling rate that the bandwidth has at most by default: 33° of phase for two samples."""
+
+LEAST_WIDTH = 1e-6
+"""Least speed in rad/s over which the compensated friction changes sign."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +46,7 @@ class FrictionCompensation:
     Raises
     ------
     ValueRangeError
-        If a setting is negative or not finite.
+        If a setting is negative or not finite, or the width is zero.
     """
 
     share: float = 1.0
@@ -47,6 +54,11 @@ class FrictionCompensation:
 
     def __post_init__(self) -> None:
         check_settings(self)
+        if self.width < LEAST_WIDTH:
+            raise ValueRangeError(
+                f"width {self.width:g} rad/s", f"must be at least {LEAST_WIDTH:g} rad/s",
+                next_step="take about the speed that one count of the encoder per sample is",
+            )  # fmt: skip
 
     def torque(self, writer: LawWriter, drive: KnownDrive, speed: Expression) -> Expression:
         """Return the torque in N·m that the declared friction takes at a speed.
@@ -63,10 +75,13 @@ class FrictionCompensation:
         share = writer.setting(
             "friction_share", "1", "velocity loop: share of the declared friction added", self.share
         )
-        width = writer.setting(
-            "friction_width", "rad/s", "velocity loop: speed over which that changes sign", self.width
-        )
-        return share * drive.friction(writer, width)(speed)
+        width = writer.number(
+            Variable(
+                f"{GAIN}.friction_width", "rad/s", "velocity loop: speed over which that changes sign",
+                self.width, self.width, LEAST_WIDTH,
+            )
+        )  # fmt: skip
+        return share * declared_friction(drive, writer, width)(speed)
 
 
 class MotorCurrent(NamedTuple):
@@ -225,7 +240,7 @@ class VelocityLoop:
         self, writer: LawWriter, drive: KnownDrive, wanted: Expression, speed: Expression
     ) -> Expression:
         current = limited(wanted, drive.current_limit(writer))
-        supply = drive.currents_of_supply(writer, speed)
+        supply = currents_of_supply(drive, writer, speed)
         if supply is None:
             return current
         return ca.fmin(ca.fmax(current, supply[0]), supply[1])

@@ -93,7 +93,13 @@ class BackCalculation(AntiWindup):
             raise ValueRangeError(f"tracking_time {self.tracking_time:g} s", "must be positive and finite")
 
     def following(self, writer: LawWriter, one: Integration) -> Expression:
-        """Return x + T·(ẋ − excess/T_t)."""
+        """Return x + T·(ẋ − excess/T_t).
+
+        Raises
+        ------
+        ValueRangeError
+            If the tracking time is below the sample time.
+        """
         if self.tracking_time < writer.sample_time:
             raise ValueRangeError(
                 f"tracking_time {self.tracking_time:g} s",
