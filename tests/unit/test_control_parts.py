@@ -397,6 +397,7 @@ def test_the_end_of_the_contour_limits_too() -> None:
         (ScheduledTorque(bandwidth=120.0), VelocityLoop(), 1e-3, "torque loop 120 Hz.*100 Hz"),
         (PidTorque(), VelocityLoop(bandwidth=60.0), 2e-3, "velocity loop 60 Hz.*50 Hz.*72° of phase"),
         (ScheduledTorque(bandwidth=50.0), VelocityLoop(), 1e-3, "above that of the velocity loop inside, 45"),
+        (PidTorque(), VelocityLoop(disturbance=DisturbanceObserver(150.0)), 1e-3, "observer 150 Hz.*100 Hz"),
         (PidTorque(windup=BackCalculation(1e-4)), VelocityLoop(), 1e-3, "below the sample time"),
         (PidTorque(), VelocityLoop(), math.nan, "sample_time"),
     ],
@@ -406,6 +407,29 @@ def test_what_the_sample_time_does_not_carry_is_refused(
 ) -> None:
     with pytest.raises(ValueRangeError, match=said):
         torque_controller(ob.bench(), law=law, velocity=velocity, sample_time=sample_time)
+
+
+def test_defaults_are_what_the_sample_time_carries() -> None:
+    slow = torque_controller(ob.bench(), law=ScheduledTorque(), sample_time=4e-3).values
+    assert (slow["controller.bandwidth"], slow["controller.velocity_bandwidth"]) == (3.0, 11.25)
+    assert torque_controller(ob.bench(), sample_time=2e-3).values["controller.velocity_bandwidth"] == 30.0
+    fast = torque_controller(ob.bench(), law=ScheduledTorque(), sample_time=1e-4).values
+    assert (fast["controller.bandwidth"], fast["controller.velocity_bandwidth"]) == (12.0, 45.0)
+
+
+def test_a_part_called_controller_is_not_mixed_up_with_the_settings() -> None:
+    named = tie(Dashpot(damping=1e-4, domain=ROTATION), "controller")
+    parts = dict(ob.actuator().parts)
+    motor = parts.pop("motor")
+    machine = {
+        "controller": motor,
+        "spring": tie(parts["spring"].element, "controller", "load"),
+        "oil": named,
+    }
+    plant = flatten(assembly("odd", load=Fixed(), **machine))
+    controller = torque_controller(plant, law=ScheduledTorque())
+    assert controller.values["controller.inertia"] == ob.INERTIA
+    assert controller.values["controller.bandwidth"] == 12.0
 
 
 @pytest.mark.parametrize(

@@ -64,8 +64,19 @@ class LawWriter:
         ----------
         variable
             With its value as start.
+
+        Raises
+        ------
+        ArrangementError
+            If another parameter has that name, as where a part of the plant is called ``controller``.
         """
-        return self._parameters.setdefault(variable.name, (variable, ca.SX.sym(variable.name)))[1]
+        known, symbol = self._parameters.setdefault(variable.name, (variable, ca.SX.sym(variable.name)))
+        if known != variable:
+            raise ArrangementError(
+                f"parameter '{variable.name}' of a controller", "is declared twice, with other numbers",
+                next_step=f"give the part of the plant another name than '{GAIN}'",
+            )  # fmt: skip
+        return symbol
 
     def state(self, name: str, unit: str, description: str) -> Expression:
         """Return a state that starts at zero.

@@ -259,7 +259,7 @@ def stiffness_table(drive: KnownDrive) -> Table:
     edges = np.concatenate([angles[:1], (angles[1:] + angles[:-1]) / 2.0, angles[-1:]])
     torques = _rest_torques(plant, spring.effort, (edges - offset) / turns)
     slopes = np.maximum(np.diff(torques) / np.diff(edges), 0.0)
-    column = Variable(f"{spring.name}.stiffness", "N*m/rad", f"slope of {spring.effort} at rest")
+    column = Variable(f"{spring.name}.tangent_stiffness", "N*m/rad", f"slope of {spring.effort} at rest")
     if not drive.spring_seen_at_the_motor:
         return Table(spring.motion, -end, float(angles[1] - angles[0]), (column,), slopes[:, None])
     seen = (angles - offset) / turns

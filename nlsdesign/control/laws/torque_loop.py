@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...errors import ArrangementError, ValueRangeError
 from ...model import FlatModel, Variable
@@ -15,6 +15,9 @@ from .velocity_loop import VelocityLoop
 from .wired_names import DESIRED
 from .wired_names import LoopNames as LoopNames
 from .wired_names import loop_names as loop_names
+
+SHARE_OF_RATE = 0.06
+"""Share of the sampling rate that the velocity loop of the default gains has at most: 60 Hz at 1 kHz."""
 
 CARRIED = 0.1
 """Share of the sampling rate above which no loop is closed.
@@ -114,7 +117,8 @@ def torque_controller(
         Continuous, on the bench: load fixed or prescribed.
     law
         Outer law, such as :class:`~nlsdesign.control.laws.scheduled_torque.ScheduledTorque`; a PID with the
-        defaults of :class:`TorqueGains` if neither a law nor gains are given.
+        defaults of :class:`TorqueGains` if neither a law nor gains are given, its velocity loop at most at
+        0.06 of the sampling rate.
     velocity
         Velocity loop inside; with its defaults if only a law is given.
     gains
@@ -135,7 +139,7 @@ def torque_controller(
     """
     if not (math.isfinite(sample_time) and sample_time > 0.0):
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
-    outer, inner = _parts(law, velocity, gains)
+    outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
     _check_bandwidths(outer, inner, sample_time)
     drive, writer = KnownDrive(plant), LawWriter(sample_time)
     names = drive.names
@@ -168,18 +172,30 @@ def _parts(
             "gains", "are those of a PID law and its velocity loop, and law or velocity is given as well",
             next_step="give law=PidTorque(...) and velocity=VelocityLoop(...) alone",
         )  # fmt: skip
-    if law is None and velocity is None:
-        settings = gains or TorqueGains()
-        return settings.law, settings.velocity
+    if gains is not None:
+        return gains.law, gains.velocity
     return law or PidTorque(), velocity or VelocityLoop()
+
+
+def _gains_by_default(
+    law: TorqueLaw | None, velocity: VelocityLoop | None, sample_time: float
+) -> TorqueGains | None:
+    """Return the default gains where nothing is given, with a velocity loop that the sample time carries."""
+    if law is not None or velocity is not None:
+        return None
+    usual = TorqueGains()
+    return replace(usual, velocity_bandwidth=min(usual.velocity_bandwidth, SHARE_OF_RATE / sample_time))
 
 
 def _check_bandwidths(law: TorqueLaw, velocity: VelocityLoop, sample_time: float) -> None:
     outer, inner = law.closes_at(sample_time), velocity.closes_at(sample_time)
-    for name, value in (("bandwidth of the torque loop", outer), ("bandwidth of the velocity loop", inner)):
+    loops = {"torque loop": outer, "velocity loop": inner}
+    if velocity.disturbance is not None:
+        loops["disturbance observer"] = velocity.disturbance.bandwidth
+    for name, value in loops.items():
         if value > CARRIED / sample_time * (1.0 + 1e-9):
             raise ValueRangeError(
-                f"{name} {value:g} Hz",
+                f"bandwidth of the {name} {value:g} Hz",
                 f"is more than a sample time of {1e3 * sample_time:g} ms carries: a tenth of the sampling "
                 f"rate, {CARRIED / sample_time:g} Hz, where the two samples between angle and current take "
                 "72° of phase",
