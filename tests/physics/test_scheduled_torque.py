@@ -26,7 +26,7 @@ from nlsdesign.export import CompiledStep, export_c, natively
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Sine, simulate
 from nlsdesign.simulation.prior import declared_prior
-from nlsdesign.simulation.sampled_batch import BatchTrace, run_batch
+from nlsdesign.simulation.sampled_batch import BatchTrace, SampledSystem, run_batch
 from tests import observed as ob
 from tests.renamed import SCHEMES, Scheme, renamed
 
@@ -213,6 +213,27 @@ def test_it_is_stable_over_draws_of_the_deck(loop: ClosedLoop) -> None:
 @pytest.mark.slow
 def test_it_is_stable_over_a_thousand_draws_of_the_deck(loop: ClosedLoop) -> None:
     assert np.all(stable_draws(loop, 1000))
+
+
+def test_friction_between_motor_and_torque_wants_less_bandwidth() -> None:
+    """The capstan of this deck makes the torque jump with the sign of the speed; the defaults limit-cycle."""
+    plant = machine("one_sided_cable_drive")
+    rough = []
+    for law, velocity in (
+        (ScheduledTorque(bandwidth=4.0), VelocityLoop(bandwidth=20.0)),
+        (ScheduledTorque(), VelocityLoop()),
+    ):
+        desired, torque = "controller.spring.torque.desired", "plant.spring.torque"
+        system = SampledSystem(
+            plant=plant, blocks={"controller": torque_controller(plant, law=law, velocity=velocity)},
+            sources={desired: desired, "controller.spring.torque": torque, "controller.motor.angle": READING},
+            driven="motor.current", substeps=40,
+        )  # fmt: skip
+        course = {desired: lambda t: 2.0 * min(1.0, t / 0.3)}
+        run = run_batch(system, 1.2, inputs=course, keep=[torque])[torque][0, -400:]
+        rough.append(float(np.max(np.abs(run - 2.0))))
+    assert rough[0] < 0.02
+    assert rough[1] > 0.2
 
 
 # --- other names, other languages ------------------------------------------------------------------------
