@@ -169,9 +169,14 @@ def _matrices(side: _Side, time: float, angles: Array, inner: int) -> dict[str, 
     within, begin_inner, end_inner = linear(c.a[:, :inner, :inner], time)
     moving, begin, end = linear(c.a[:, inner:, inner:], time)
     count = len(angles)
-    pushed = np.zeros((count, n, len(plant.rows)))
-    pushed[:, list(plant.rows), range(len(plant.rows))] = 1.0
-    _, push = held(c.a, pushed, time)
+    push = np.zeros((count, n, len(plant.rows)))
+    for part, block in (
+        (slice(None, inner), c.a[:, :inner, :inner]),
+        (slice(inner, None), c.a[:, inner:, inner:]),
+    ):
+        pushed = np.zeros((count, n, len(plant.rows)))
+        pushed[:, list(plant.rows), range(len(plant.rows))] = 1.0
+        push[:, part] = held(block, pushed[:, part], time)[1]
     following, prior, coupling = (
         np.zeros((count, n, n + 1)),
         np.zeros((count, n, 1)),
