@@ -1,4 +1,4 @@
-"""``nlsdesign analyse``: what can be said of a machine; each kind of analysis is a command in its own module."""
+"""``nlsdesign analyse``: what can be said of a machine; each analysis is a command in its own module."""
 
 from __future__ import annotations
 
