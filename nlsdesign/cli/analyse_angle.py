@@ -145,12 +145,6 @@ def _as_json(chart: Chart, drops: RankDrops, ranking: SensorRanking | None) -> d
 
 
 def _show(chart: Chart, drops: RankDrops, name: str) -> None:
-    modes = [
-        v for v in chart.columns if v.name.partition(".")[0] not in ("observability", "gramian", "deviation")
-    ]
-    still = {
-        v.name.partition(".")[0] for v in modes if v.name.endswith(".frequency") and not chart[v.name].any()
-    }
     others = ("observability", "gramian", "deviation")
     modes = [v for v in chart.columns if _group(v) not in others]
     swings = {_group(v) for v in modes if v.name.endswith(".frequency") and chart[v.name].any()}
