@@ -67,7 +67,7 @@ def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
     charts
         By label, each with the columns of ``Stability``.
     """
-    figure, (decay, frequency, damping, stiffness) = panels(2, 2, height=5.4, sharex=True)
+    figure, (decay, frequency, damping, stiffness) = panels(4, height=7.6, sharex=True)
     summaries = []
     for number, (label, chart) in enumerate(charts.items()):
         degrees, tone = np.degrees(chart.at), look(number).color
@@ -89,16 +89,16 @@ def stability_over_angle(charts: Mapping[str, Chart]) -> Figure:
     decay.set_yscale("symlog", linthresh=10.0)
     for panel, title, unit in (
         (decay, "Slowest real part (stable below zero)", "real part in 1/s"),
-        (frequency, "Frequency of the least damped", "frequency in Hz"),
-        (damping, "Its damping ratio", "damping ratio"),
+        (frequency, "Frequency of the least damped oscillation", "frequency in Hz"),
+        (damping, "Its damping ratio (1: nothing oscillates)", "damping ratio"),
         (stiffness, "Stiffness at rest", "stiffness in N·m/rad"),
     ):
-        panel.set_title(title, fontsize=8.5)
+        panel.set_title(title)
         panel.set_ylabel(unit)
-    for panel in (frequency, damping):
-        panel.set_ylim(bottom=0.0)
-    for panel in (damping, stiffness):
-        panel.set_xlabel("angle in degrees")
+    frequency.set_ylim(bottom=0.0)
+    if all(np.min(np.asarray(line.get_ydata(), dtype=float)) > 0.0 for line in damping.lines):
+        log_axis(damping)
+    stiffness.set_xlabel("angle in degrees")
     for panel in (decay, stiffness):
         legend(panel, columns=2)
     return described(figure, f"Stability and stiffness over the angle. {' '.join(summaries)}")
