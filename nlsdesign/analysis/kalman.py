@@ -136,7 +136,10 @@ class EstimateDeviation(View):
         )
         alone = self._model_alone(points, density, measurement)
         values = np.column_stack([deviation_of(wanted, each) for each in (alone, best)])
-        unit, stated = points.model.variable(estimate).unit, "given" if self.process else str(assumed)
+        unit, stated = (
+            points.model.variable(estimate).unit,
+            "as given" if self.process is not None else str(assumed),
+        )
         columns = (
             Variable("deviation.model", unit, f"standard deviation of {estimate} from the model alone"),
             Variable(

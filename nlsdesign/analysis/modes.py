@@ -51,8 +51,11 @@ class PlantMode:
         ``"sliding_backward"`` where these differ, and ``"stuck"``.
     words
         What is linearised, in words.
-    a
-        Slopes of the rates of the states, shape (N, n, n).
+    a, b
+        Slopes of the rates of the states in states and inputs, shapes (N, n, n) and (N, n, m).
+    rates
+        What the states would do if the angle were let go, in the mean of both directions, so without dry
+        friction; shape (N, n).
     held
         Number of rates that are held: as many motions stand still.
     allowed
@@ -63,6 +66,8 @@ class PlantMode:
     name: str
     words: str
     a: Array
+    b: Array
+    rates: Array
     held: int = 0
     allowed: Array | None = None
 
@@ -82,11 +87,12 @@ class _Side(NamedTuple):
     rates: Array
     slopes: Array
     moving: Array
+    inputs: Array
     modes: Array
 
 
 def plant_modes(
-    model: FlatModel, states: Array, at_rest: Array, *, rate: str, speed: float
+    model: FlatModel, states: Array, at_rest: tuple[Array, Array, Array], *, rate: str, speed: float
 ) -> tuple[PlantMode, ...]:
     """Return the modes of a plant; those in which it moves come first.
 
@@ -97,7 +103,7 @@ def plant_modes(
     states
         Rest states, shape (N, n).
     at_rest
-        Slopes there, shape (N, n, n).
+        Slopes there in states and inputs, and the rates, shapes (N, n, n), (N, n, m) and (N, n).
     rate
         Name of the rate of the angle that is swept.
     speed
@@ -120,7 +126,7 @@ def plant_modes(
         jump = (ahead.rates - back.rates)[:, rates]
         size = float(np.max(np.abs([ahead.at_speed[:, rates], back.at_speed[:, rates]])))
         if not np.any(np.abs(jump) > JUMP * size):
-            return (PlantMode("free", "no dry friction; at rest", at_rest),)
+            return (PlantMode("free", "no dry friction; at rest", *at_rest),)
         twice = [equations.side(states[:1], sign * 2.0 * speed).rates[:, rates] for sign in (1.0, -1.0)]
         if np.all(np.abs(twice[0] - twice[1] - jump[:1]) <= JUMP * size):
             break
@@ -140,19 +146,26 @@ def _moving(sides: tuple[_Side, _Side], rates: list[int], speed: float) -> list[
         a[:, :, rates] = side.moving[:, :, rates]
         matrices.append(a)
     words = f"dry friction at its sliding level, slopes in the speed at {{}}{speed:.3g} rad/s"
+    mean = (sides[0].rates + sides[1].rates) / 2.0
     if np.max(np.abs(matrices[0] - matrices[1])) <= DIFFERENT * np.max(np.abs(matrices[0])):
-        return [PlantMode("sliding", words.format("±"), matrices[0])]
+        return [PlantMode("sliding", words.format("±"), matrices[0], sides[0].inputs, mean)]
     return [
-        PlantMode("sliding_forward", words.format("+"), matrices[0]),
-        PlantMode("sliding_backward", words.format("−"), matrices[1]),
+        PlantMode(f"sliding_{name}", words.format(sign), a, side.inputs, mean)
+        for name, sign, a, side in zip(("forward", "backward"), "+−", matrices, sides, strict=True)
     ]
 
 
-def _stuck(a: Array, allowed: Array, held: int) -> list[PlantMode]:
-    if a.shape[-1] <= 2 * held:
+def _stuck(side: _Side, allowed: Array, held: int) -> list[PlantMode]:
+    """Return the mode of the equations of one side, projected onto what may move."""
+    if allowed.shape[-1] <= 2 * held:
         return []
     words = "dry friction holds the speed at zero, the inner states move"
-    return [PlantMode("stuck", words, allowed @ a @ allowed, held, allowed)]
+    rates = np.einsum("Nij,Nj->Ni", allowed, side.rates)
+    return [
+        PlantMode(
+            "stuck", words, allowed @ side.slopes @ allowed, allowed @ side.inputs, rates, held, allowed
+        )
+    ]
 
 
 class _Branches:
@@ -171,10 +184,12 @@ class _Branches:
         if self.sharp:
             f, _, held = self.sharp.branch(*given, modes)
             self._natural = self.sharp.natural
-        slopes = [ca.densify(ca.jacobian(each, s.state)) for each in (f, held)]
+        slopes = [ca.jacobian(f, s.state), ca.jacobian(held, s.state), ca.jacobian(f, s.input)]
         # The modes follow the inputs, so that all rows can be evaluated in one call.
         self._function = ca.Function(
-            "branch", [s.time, s.state, ca.vertcat(s.input, modes), s.parameter], [f, *slopes]
+            "branch",
+            [s.time, s.state, ca.vertcat(s.input, modes), s.parameter],
+            [f, *(ca.densify(each) for each in slopes)],
         )
         self._name = model.name
 
@@ -182,25 +197,26 @@ class _Branches:
         """Return what the equations are at a speed of all bodies, and their limit at zero."""
         modes = self._modes(states, speed)
         found = [self._at(self._moved(states, share * speed), modes) for share in _SHARES]
-        rates, slopes = (_extrapolated([each[i] for each in found]) for i in (0, 1))
-        return _Side(found[-1][0], rates, slopes, found[-1][1], modes)
+        rates, slopes, _, inputs = (_extrapolated([each[i] for each in found]) for i in range(4))
+        return _Side(found[-1][0], rates, slopes, found[-1][1], inputs, modes)
 
-    def stuck(self, states: Array, at_rest: Array, ahead: _Side) -> list[PlantMode]:
+    def stuck(self, states: Array, at_rest: tuple[Array, Array, Array], ahead: _Side) -> list[PlantMode]:
         """Return the mode in which dry friction holds; none where nothing else moves."""
         if self.sharp:
             other = self._modes(states, -1.0)
             rubs = np.array(self.sharp.holds) & np.any(ahead.modes != other, axis=0)
             modes = np.where(rubs, 0.0, ahead.modes)
-            _, a, rows = self._at(states, modes)
+            rates, a, rows, b = self._at(states, modes)
             onto = np.eye(states.shape[1]) - np.linalg.pinv(rows[:, rubs]) @ rows[:, rubs]
-            return _stuck(a, onto, int(np.max(np.linalg.matrix_rank(rows[:, rubs]))))
-        corner = np.zeros_like(at_rest)
-        corner[:, :, self.rates] = (at_rest - ahead.slopes)[:, :, self.rates]
+            held = int(np.max(np.linalg.matrix_rank(rows[:, rubs])))
+            return _stuck(_Side(rates, rates, a, a, b, modes), onto, held)
+        corner = np.zeros_like(at_rest[0])
+        corner[:, :, self.rates] = (at_rest[0] - ahead.slopes)[:, :, self.rates]
         left, size, right = np.linalg.svd(corner)
         held = int(np.max(np.sum(size > JUMP * size[:, :1], axis=-1)))
         g, h = left[:, :, :held], right[:, :held]
         across = np.eye(states.shape[1]) - g @ np.linalg.pinv(h @ g) @ h
-        return _stuck(ahead.slopes, across, held)
+        return _stuck(ahead, across, held)
 
     def _modes(self, states: Array, speed: float) -> Array:
         if not self.sharp:
@@ -213,16 +229,21 @@ class _Branches:
         moved[:, self.rates] = speed / (1.0 + 0.5 * np.arange(len(self.rates)))
         return moved
 
-    def _at(self, states: Array, modes: Array) -> tuple[Array, Array, Array]:
+    def _at(self, states: Array, modes: Array) -> tuple[Array, Array, Array, Array]:
         given = np.column_stack([np.tile(self.u, (len(states), 1)), modes])
-        rates, slopes, rows = evaluate_rows(self._function, states, given, self.p)
-        if not np.all(np.isfinite(slopes)):
+        rates, slopes, rows, inputs = evaluate_rows(self._function, states, given, self.p)
+        if not all(np.all(np.isfinite(each)) for each in (slopes, inputs)):
             raise ValueRangeError(
                 f"slopes of {self._name}", "are not finite in motion",
                 next_step="move away from the corner or use the smooth form of the law",
             )  # fmt: skip
-        count = states.shape[1]
-        return rates, slopes.reshape(-1, count, count), rows.reshape(len(states), -1, count)
+        many, n = states.shape
+        return (
+            rates,
+            slopes.reshape(many, n, n),
+            rows.reshape(many, -1, n),
+            inputs.reshape(many, n, len(self.u)),
+        )
 
 
 def limit_at_zero_speed(at_speed: Callable[[float], Array], speed: float) -> Array:

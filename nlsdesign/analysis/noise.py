@@ -42,7 +42,7 @@ class NoiseAssumptions:
         points
             The model at rest at each angle.
         """
-        names, largest = points.state_names, np.max(np.abs(points.rates), axis=0)
+        names, largest = points.state_names, np.max(np.abs(points.moving.rates), axis=0)
         decay = np.median(np.abs(np.einsum("Nii->Ni", points.moving.a)), axis=0)
         found = {}
         for i, name in enumerate(names):

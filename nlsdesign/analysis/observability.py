@@ -92,7 +92,7 @@ class Observability(View):
         Raises
         ------
         UnknownNameError
-            If something measured is neither a state nor an output of the model.
+            If something measured is no output of the model, or a size is of something that is not in it.
         """
         self._check(points.model)
         a, c = self.scaled(points)
@@ -138,10 +138,14 @@ class Observability(View):
         return a, points.c[:, chosen] * state[None, :] / output[:, None]
 
     def _check(self, model: FlatModel) -> None:
-        known = {v.name for v in model.states + model.outputs}
-        for name in (*self.nominal, *self.measured):
+        outputs = {v.name for v in model.outputs}
+        known = outputs | {v.name for v in model.states}
+        for name in self.nominal:
             if name not in known:
                 raise unknown_name("state or output", name, known)
+        for name in self.measured:
+            if name not in outputs:
+                raise unknown_name("measured output", name, outputs)
 
     def _columns(self, points: RestPoints) -> tuple[Variable, ...]:
         scale = f"scaled, time scale {self.time_scale:g} s, mode {points.moving.name!r}"

@@ -102,7 +102,8 @@ class RestPoints:
     @cached_property
     def modes(self) -> tuple[PlantMode, ...]:
         """The modes of the plant: moving ones first, each with its matrices at all angles."""
-        return plant_modes(self.model, self.states, self.a, rate=self.rate, speed=self.typical_speed)
+        at_rest = (self.a, self.b, self.rates)
+        return plant_modes(self.model, self.states, at_rest, rate=self.rate, speed=self.typical_speed)
 
     @property
     def moving(self) -> PlantMode:

@@ -281,7 +281,7 @@ class _Bench:
         a[:, n, n] = -1.0 / given.current_time
         if self.drive is not None:
             error = given.current_error * float(np.max(np.abs(self.hold)))
-            a[:, :n, n], rows[:, :, n] = points.b[:, :, self.drive], points.d[:, :, self.drive]
+            a[:, :n, n], rows[:, :, n] = points.moving.b[:, :, self.drive], points.d[:, :, self.drive]
             density[:, n, n] = 2.0 * error**2 / given.current_time
         a[:, :n, n + 1 :], rows[:, :, n + 1 :] = offsets[:, :n], offsets[:, n:]
         slow = np.arange(n + 1, m)
@@ -304,7 +304,7 @@ class _Bench:
 
 
 def holding_current(points: RestPoints) -> tuple[int | None, Array]:
-    """Return the place of the drive's input and what it has to be to hold the machine at each angle.
+    """Return the place of the drive's input and what it has to be to hold the spring at each angle.
 
     Parameters
     ----------
@@ -322,10 +322,10 @@ def holding_current(points: RestPoints) -> tuple[int | None, Array]:
     if place is None:
         return None, np.zeros(len(points.at))
     rate = points.state_names.index(points.rate)
-    effect = points.b[:, rate, place]
+    effect = points.moving.b[:, rate, place]
     if not np.all(effect):
         return None, np.zeros(len(points.at))
-    return place, -points.rates[:, rate] / effect
+    return place, -points.moving.rates[:, rate] / effect
 
 
 def spread_offsets(points: RestPoints, hold: Array) -> Array:

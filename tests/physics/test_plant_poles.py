@@ -115,8 +115,8 @@ def test_two_bodies_that_rub_on_each_other_stick_together(contact: Regularised |
 def test_friction_that_grows_with_the_load_has_another_stiffness_in_each_direction() -> None:
     """T = K·θ·(1 ± µ) for a positive load."""
     share = 0.2
-    inside = Spring(stiffness=K, domain=ROTATION)
-    law = LoadFriction(ratio=share, contact=Regularised(creep_speed=CREEP), spring=inside)
+    inside = (("spring", Spring(stiffness=K, domain=ROTATION)),)
+    law = LoadFriction(ratio=share, contact=Regularised(creep_speed=CREEP), members=inside)
     model = flatten(assembly("geared", body=Inertia(inertia=J), spring=tie(law, "body")))
     ahead, back = rest_points(model, np.array([0.3]), angle="body.angle").modes[:2]
     for mode, sign in ((ahead, 1.0), (back, -1.0)):
