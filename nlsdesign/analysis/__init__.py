@@ -3,13 +3,13 @@
 from .empirical import EmpiricalGramian, empirical_gramian
 from .kalman import EstimateDeviation
 from .modes import PlantMode
-from .noise import NoiseAssumptions
+from .noise_assumptions import NoiseAssumptions
 from .observability import Observability, Unseen
 from .rank_drops import RankDrop, RankDrops, rank_drops
 from .rest_points import RestPoint, RestPoints, rest_points
 from .sensor_ranking import (
-    Candidate,
     RankingAssumptions,
+    SensorCandidate,
     SensorGain,
     SensorRanking,
     rank_sensors,
@@ -18,7 +18,6 @@ from .stability import Stability, least_damped
 from .sweep import Chart, Columns, PointView, View, over_angle
 
 __all__ = [
-    "Candidate",
     "Chart",
     "Columns",
     "EmpiricalGramian",
@@ -32,6 +31,7 @@ __all__ = [
     "RankingAssumptions",
     "RestPoint",
     "RestPoints",
+    "SensorCandidate",
     "SensorGain",
     "SensorRanking",
     "Stability",

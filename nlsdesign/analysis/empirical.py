@@ -131,8 +131,8 @@ def empirical_gramian(
     for sign in (1.0, -1.0):
         changes = []
         for name in states:
-            found = run({name: float(motion[name][0]) + sign * share * size[name]})
-            changes.append(np.array([(found[n] - motion[n]) / size[n] for n in names]))
+            moved_run = run({name: float(motion[name][0]) + sign * share * size[name]})
+            changes.append(np.array([(moved_run[n] - motion[n]) / size[n] for n in names]))
         products = np.einsum("irt,jrt->ijt", np.array(changes), np.array(changes))
         total += np.trapezoid(products, times, axis=-1) / (2.0 * share**2)
     return EmpiricalGramian(states, (total + total.T) / 2.0, float(times[-1] - times[0]), names)

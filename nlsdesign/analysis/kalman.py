@@ -19,7 +19,7 @@ from .batched import (
     symmetric,
     transposed,
 )
-from .noise import NoiseAssumptions, declared_deviation
+from .noise_assumptions import NoiseAssumptions, declared_deviation
 from .rest_points import RestPoints
 from .sweep import Columns, View
 
@@ -97,7 +97,7 @@ class EstimateDeviation(View):
     ----------
     process
         Density of white process noise of each state by name, in unit of the state per √s. Speed needs one. By
-        default that of :class:`~nlsdesign.analysis.noise.NoiseAssumptions`, stated with the columns.
+        default that of :class:`~nlsdesign.analysis.noise_assumptions.NoiseAssumptions`, said by the columns.
     measurement
         Standard deviation of each measured output by name; an encoder has quantum/√12. By default the
         measured angle with the resolution that its sensor declares.
@@ -128,11 +128,11 @@ class EstimateDeviation(View):
         measurement = self.measurement or {points.angle: declared_deviation(points.model, points.angle)}
         _check(points, estimate, process, measurement)
         density = np.diag([process.get(name, 0.0) ** 2 for name in points.state_names])
-        wanted = points.c[:, points.output_names.index(estimate)]
+        wanted = points.moving.c[:, points.output_names.index(estimate)]
         rows = [points.output_names.index(name) for name in measurement]
         spread = np.array(list(measurement.values()))
         best, steady = best_covariances(
-            points.moving.a, density, (points.c[:, rows], spread), self.sample_time
+            points.moving.a, density, (points.moving.c[:, rows], spread), self.sample_time
         )
         alone = self._model_alone(points, density, measurement)
         values = np.column_stack([deviation_of(wanted, each) for each in (alone, best)])
@@ -158,8 +158,8 @@ class EstimateDeviation(View):
         alone = np.zeros_like(points.a)
         if inner:
             own = points.moving.a[:, inner][:, :, inner]
-            found = noise_over_a_sample(own, density[np.ix_(inner, inner)], self.sample_time)
-            alone[np.ix_(range(len(alone)), inner, inner)] = covariance_without_measurement(*found)
+            sampled = noise_over_a_sample(own, density[np.ix_(inner, inner)], self.sample_time)
+            alone[np.ix_(range(len(alone)), inner, inner)] = covariance_without_measurement(*sampled)
         alone[:, angle, angle] = measurement.get(points.angle, 0.0) ** 2
         return alone
 

@@ -53,6 +53,8 @@ class PlantMode:
         What is linearised, in words.
     a, b
         Slopes of the rates of the states in states and inputs, shapes (N, n, n) and (N, n, m).
+    c
+        Slopes of the outputs in the states, shape (N, r, n).
     rates
         What the states would do if the angle were let go, in the mean of both directions, so without dry
         friction; shape (N, n).
@@ -67,6 +69,7 @@ class PlantMode:
     words: str
     a: Array
     b: Array
+    c: Array
     rates: Array
     held: int = 0
     allowed: Array | None = None
@@ -74,25 +77,29 @@ class PlantMode:
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
         """Eigenvalues, shape (N, n − 2·held): without those of what is held and of where it stands."""
-        found = np.linalg.eigvals(self.a).astype(complex)
-        order = np.argsort(np.abs(found), axis=-1)
-        kept: NDArray[np.complex128] = np.take_along_axis(found, order, axis=-1)[:, 2 * self.held :]
+        eigenvalues = np.linalg.eigvals(self.a).astype(complex)
+        order = np.argsort(np.abs(eigenvalues), axis=-1)
+        kept: NDArray[np.complex128] = np.take_along_axis(eigenvalues, order, axis=-1)[:, 2 * self.held :]
         return kept
 
 
 class _Side(NamedTuple):
-    """One direction: rates at a speed and their limit at zero, the same of the slopes, and the modes."""
+    """One direction: rates at a speed and their limit at zero; limits of the slopes; and the modes.
+
+    ``moving`` and ``outputs`` have the slopes in the speeds at the speed itself.
+    """
 
     at_speed: Array
     rates: Array
     slopes: Array
     moving: Array
     inputs: Array
+    outputs: Array
     modes: Array
 
 
 def plant_modes(
-    model: FlatModel, states: Array, at_rest: tuple[Array, Array, Array], *, rate: str, speed: float
+    model: FlatModel, states: Array, at_rest: tuple[Array, Array, Array, Array], *, rate: str, speed: float
 ) -> tuple[PlantMode, ...]:
     """Return the modes of a plant; those in which it moves come first.
 
@@ -103,7 +110,8 @@ def plant_modes(
     states
         Rest states, shape (N, n).
     at_rest
-        Slopes there in states and inputs, and the rates, shapes (N, n, n), (N, n, m) and (N, n).
+        Slopes there of rates in states and inputs, and of outputs in states, and the rates: shapes (N, n, n),
+        (N, n, m), (N, r, n) and (N, n).
     rate
         Name of the rate of the angle that is swept.
     speed
@@ -136,22 +144,18 @@ def plant_modes(
             f"friction of {model.name}", f"turns with the direction, but has no level up to {speed:g} rad/s",
             next_step="smooth it over a smaller speed, or take the sharp law",
         )  # fmt: skip
-    return (*_moving((ahead, back), rates, speed), *equations.stuck(states, at_rest, ahead))
+    return (*_moving((ahead, back), speed), *equations.stuck(states, at_rest, ahead))
 
 
-def _moving(sides: tuple[_Side, _Side], rates: list[int], speed: float) -> list[PlantMode]:
-    matrices = []
-    for side in sides:
-        a = side.slopes.copy()
-        a[:, :, rates] = side.moving[:, :, rates]
-        matrices.append(a)
+def _moving(sides: tuple[_Side, _Side], speed: float) -> list[PlantMode]:
     words = f"dry friction at its sliding level, slopes in the speed at {{}}{speed:.3g} rad/s"
     mean = (sides[0].rates + sides[1].rates) / 2.0
-    if np.max(np.abs(matrices[0] - matrices[1])) <= DIFFERENT * np.max(np.abs(matrices[0])):
-        return [PlantMode("sliding", words.format("±"), matrices[0], sides[0].inputs, mean)]
+    ahead, back = sides
+    if np.max(np.abs(ahead.moving - back.moving)) <= DIFFERENT * np.max(np.abs(ahead.moving)):
+        return [PlantMode("sliding", words.format("±"), ahead.moving, ahead.inputs, ahead.outputs, mean)]
     return [
-        PlantMode(f"sliding_{name}", words.format(sign), a, side.inputs, mean)
-        for name, sign, a, side in zip(("forward", "backward"), "+−", matrices, sides, strict=True)
+        PlantMode(f"sliding_{name}", words.format(sign), side.moving, side.inputs, side.outputs, mean)
+        for name, sign, side in zip(("forward", "backward"), "+−", sides, strict=True)
     ]
 
 
@@ -185,6 +189,8 @@ class _Branches:
             f, _, held = self.sharp.branch(*given, modes)
             self._natural = self.sharp.natural
         slopes = [ca.jacobian(f, s.state), ca.jacobian(held, s.state), ca.jacobian(f, s.input)]
+        # In motion the outputs are those of the modes that the motion has by nature.
+        slopes.append(ca.jacobian(s.output, s.state))
         # The modes follow the inputs, so that all rows can be evaluated in one call.
         self._function = ca.Function(
             "branch",
@@ -196,20 +202,24 @@ class _Branches:
     def side(self, states: Array, speed: float) -> _Side:
         """Return what the equations are at a speed of all bodies, and their limit at zero."""
         modes = self._modes(states, speed)
-        found = [self._at(self._moved(states, share * speed), modes) for share in _SHARES]
-        rates, slopes, _, inputs = (_extrapolated([each[i] for each in found]) for i in range(4))
-        return _Side(found[-1][0], rates, slopes, found[-1][1], inputs, modes)
+        at_speeds = [self._at(self._moved(states, share * speed), modes) for share in _SHARES]
+        limits = [_extrapolated([each[i] for each in at_speeds]) for i in range(5)]
+        last, (rates, slopes, _, inputs, outputs) = at_speeds[-1], limits
+        moving = slopes.copy()
+        moving[:, :, self.rates] = last[1][:, :, self.rates]
+        outputs[:, :, self.rates] = last[4][:, :, self.rates]
+        return _Side(last[0], rates, slopes, moving, inputs, outputs, modes)
 
-    def stuck(self, states: Array, at_rest: tuple[Array, Array, Array], ahead: _Side) -> list[PlantMode]:
+    def stuck(self, states: Array, at_rest: tuple[Array, ...], ahead: _Side) -> list[PlantMode]:
         """Return the mode in which dry friction holds; none where nothing else moves."""
         if self.sharp:
             other = self._modes(states, -1.0)
             rubs = np.array(self.sharp.holds) & np.any(ahead.modes != other, axis=0)
             modes = np.where(rubs, 0.0, ahead.modes)
-            rates, a, rows, b = self._at(states, modes)
+            rates, a, rows, b, _ = self._at(states, modes)
             onto = np.eye(states.shape[1]) - np.linalg.pinv(rows[:, rubs]) @ rows[:, rubs]
             held = int(np.max(np.linalg.matrix_rank(rows[:, rubs])))
-            return _stuck(_Side(rates, rates, a, a, b, modes), onto, held)
+            return _stuck(ahead._replace(rates=rates, slopes=a, inputs=b), onto, held)
         corner = np.zeros_like(at_rest[0])
         corner[:, :, self.rates] = (at_rest[0] - ahead.slopes)[:, :, self.rates]
         left, size, right = np.linalg.svd(corner)
@@ -229,9 +239,9 @@ class _Branches:
         moved[:, self.rates] = speed / (1.0 + 0.5 * np.arange(len(self.rates)))
         return moved
 
-    def _at(self, states: Array, modes: Array) -> tuple[Array, Array, Array, Array]:
+    def _at(self, states: Array, modes: Array) -> tuple[Array, Array, Array, Array, Array]:
         given = np.column_stack([np.tile(self.u, (len(states), 1)), modes])
-        rates, slopes, rows, inputs = evaluate_rows(self._function, states, given, self.p)
+        rates, slopes, rows, inputs, outputs = evaluate_rows(self._function, states, given, self.p)
         if not all(np.all(np.isfinite(each)) for each in (slopes, inputs)):
             raise ValueRangeError(
                 f"slopes of {self._name}", "are not finite in motion",
@@ -243,6 +253,7 @@ class _Branches:
             slopes.reshape(many, n, n),
             rows.reshape(many, -1, n),
             inputs.reshape(many, n, len(self.u)),
+            outputs.reshape(many, -1, n),
         )
 
 

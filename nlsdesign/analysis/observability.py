@@ -135,7 +135,7 @@ class Observability(View):
         state = np.array([sizes.get(name, 1.0) for name in points.state_names])
         output = np.array([sizes.get(points.output_names[i], 1.0) for i in chosen])
         a = self.time_scale * points.moving.a * state[None, :] / state[:, None]
-        return a, points.c[:, chosen] * state[None, :] / output[:, None]
+        return a, points.moving.c[:, chosen] * state[None, :] / output[:, None]
 
     def _check(self, model: FlatModel) -> None:
         outputs = {v.name for v in model.outputs}

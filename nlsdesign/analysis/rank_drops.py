@@ -177,8 +177,8 @@ def rank_drops(
     >>> from nlsdesign.model import flatten
     >>> spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel", "rim")
     >>> pair = assembly("pair", wheel=Inertia(inertia=1e-3), rim=Inertia(inertia=2e-3), spring=spring)
-    >>> found = rank_drops(flatten(pair), angles=[0.0, 0.1], measured=["spring.angle"], angle="wheel.angle")
-    >>> found.detectable
+    >>> drops = rank_drops(flatten(pair), angles=[0.0, 0.1], measured=["spring.angle"], angle="wheel.angle")
+    >>> drops.detectable
     False
     """
     angle = measured_motion(model, angle)
@@ -215,9 +215,9 @@ class _Search:
         singles = self._refined(at[:-1][crossed], at[1:][crossed], _first_change)
         middle, sides = smallest[1:-1], np.stack([smallest[:-2], smallest[2:]])
         lower = np.all(middle <= sides, axis=0) & (middle <= 0.9 * np.max(sides, axis=0))
-        whole_valley = seen[:-2] & seen[1:-1] & seen[2:] & ~crossed[:-1] & ~crossed[1:]
-        valley = np.flatnonzero(lower & whole_valley)
-        lowest = self._refined(at[valley], at[valley + 2], _lowest)
+        undisturbed = seen[:-2] & seen[1:-1] & seen[2:] & ~crossed[:-1] & ~crossed[1:]
+        minima = np.flatnonzero(lower & undisturbed)
+        lowest = self._refined(at[minima], at[minima + 2], _lowest)
         singles = np.concatenate([singles, lowest[self._are_zeros(lowest)]])
         return [self._drop(float(each)) for each in singles] + [self._run(at, rows) for rows in _runs(lost)]
 
@@ -259,8 +259,8 @@ class _Search:
         # The determinant is a straight line over so little: where it changes its sign, it says where.
         line = ends[0] * ends[1] < 0.0
         share = np.where(line, ends[0] / np.where(line, ends[0] - ends[1], 1.0), 0.5)
-        found: Array = low + share * (high - low)
-        return found
+        angles: Array = low + share * (high - low)
+        return angles
 
     def _are_zeros(self, at: Array) -> NDArray[np.bool_]:
         """Tell at which angles the smallest singular value falls to nothing, and is not only low."""

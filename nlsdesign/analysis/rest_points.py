@@ -102,7 +102,7 @@ class RestPoints:
     @cached_property
     def modes(self) -> tuple[PlantMode, ...]:
         """The modes of the plant: moving ones first, each with its matrices at all angles."""
-        at_rest = (self.a, self.b, self.rates)
+        at_rest = (self.a, self.b, self.c, self.rates)
         return plant_modes(self.model, self.states, at_rest, rate=self.rate, speed=self.typical_speed)
 
     @property
@@ -176,8 +176,8 @@ def rest_points(
         [s.time, s.state, s.input, s.parameter],
         [ca.densify(each) for each in (s.derivative, s.output, *slopes)],
     )
-    found = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
-    broken = np.flatnonzero(~np.all([np.all(np.isfinite(each), axis=1) for each in found[2:]], axis=0))
+    results = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
+    broken = np.flatnonzero(~np.all([np.all(np.isfinite(each), axis=1) for each in results[2:]], axis=0))
     if len(broken):
         raise ValueRangeError(
             f"linearisation of {model.name} at {states[broken[0]].tolist()}",
@@ -186,9 +186,11 @@ def rest_points(
         )
     n, m, r = len(model.states), len(model.inputs), len(model.outputs)
     shapes = ((n, n), (n, m), (r, n), (r, m))
-    a, b, c, d = (each.reshape(len(at), *shape) for each, shape in zip(found[2:], shapes, strict=True))
-    speed = like.typical_speed if like is not None else _speed(model, at, found[0], rate_state(model, angle))
-    return RestPoints(model, angle, at, states, found[0], found[1], a, b, c, d, sizes, speed)
+    a, b, c, d = (each.reshape(len(at), *shape) for each, shape in zip(results[2:], shapes, strict=True))
+    speed = (
+        like.typical_speed if like is not None else _speed(model, at, results[0], rate_state(model, angle))
+    )
+    return RestPoints(model, angle, at, states, results[0], results[1], a, b, c, d, sizes, speed)
 
 
 def _speed(model: FlatModel, at: Array, rates: Array, rate: str) -> float:

@@ -24,7 +24,7 @@ from ..model.transform import with_outputs
 from ..quantity import typeset_unit
 from .kalman import best_covariances, deviation_of
 from .modes import limit_at_zero_speed
-from .noise import NoiseAssumptions, declared_deviation
+from .noise_assumptions import NoiseAssumptions, declared_deviation
 from .rest import evaluate_rows
 from .rest_points import RestPoints, rest_points
 
@@ -33,7 +33,7 @@ Sizes = Callable[[str], float]
 
 
 @dataclass(frozen=True)
-class Candidate:
+class SensorCandidate:
     """A change of what is measured.
 
     Parameters
@@ -47,6 +47,11 @@ class Candidate:
         Share of its present count that the sensor of the angle then has.
     faster
         Share of the present sample time.
+
+    Raises
+    ------
+    ValueRangeError
+        If a noise or a share is not positive.
     """
 
     name: str
@@ -73,7 +78,7 @@ class SensorGain:
         The same over the spread of the declared numbers.
     """
 
-    candidate: Candidate
+    candidate: SensorCandidate
     exact: tuple[float, float]
     spread: tuple[float, float]
 
@@ -170,7 +175,7 @@ def rank_sensors(
     angles: Sequence[float] | Array,
     angle: str | None = None,
     estimate: str | None = None,
-    candidates: Sequence[Candidate] | None = None,
+    candidates: Sequence[SensorCandidate] | None = None,
     assumptions: RankingAssumptions | None = None,
 ) -> SensorRanking:
     """Rank further sensors by the deviation of the torque estimate that they leave.
@@ -219,7 +224,7 @@ def rank_sensors(
         with_outputs(model, list(dict.fromkeys([angle, estimate, *signals]))), at, angle=angle
     )
     bench = _Bench(points, estimate, given, declared_deviation(model, angle))
-    present = bench.gain(Candidate("present sensors"))
+    present = bench.gain(SensorCandidate("present sensors"))
     gains = sorted((bench.gain(each) for each in candidates), key=lambda gain: (gain.spread, gain.exact))
     condition = (
         f"{given.noise}; current of the drive known to {given.current_error:.2g} of the largest holding "
@@ -252,9 +257,9 @@ class _Bench:
         self.drive, self.hold = holding_current(points)
         self.exact, self.spread = (self._plant(each) for each in (False, True))
 
-    def gain(self, candidate: Candidate) -> SensorGain:
+    def gain(self, candidate: SensorCandidate) -> SensorGain:
         """Return what a candidate leaves."""
-        found = []
+        deviations = []
         for plant in (self.exact, self.spread):
             names = self.points.output_names
             measured = {self.points.angle: candidate.finer * self.resolution, **candidate.measurement}
@@ -265,8 +270,8 @@ class _Bench:
             spread = np.array(list(measured.values()))
             covariance, _ = best_covariances(plant.a, plant.density, (np.stack(rows, axis=1), spread), step)
             deviation = deviation_of(plant.rows[:, self.estimate], covariance)
-            found.append((float(np.median(deviation)), float(np.max(deviation))))
-        return SensorGain(candidate, found[0], found[1])
+            deviations.append((float(np.median(deviation)), float(np.max(deviation))))
+        return SensorGain(candidate, deviations[0], deviations[1])
 
     def _plant(self, over_spread: bool) -> _Plant:
         points, given, n = self.points, self.given, len(self.points.state_names)
@@ -277,7 +282,7 @@ class _Bench:
         m, k = n + 1 + offsets.shape[-1], offsets.shape[-1]
         a, density = np.zeros((count, m, m)), np.zeros((count, m, m))
         rows = np.zeros((count, points.c.shape[1], m))
-        a[:, :n, :n], rows[:, :, :n] = points.moving.a, points.c
+        a[:, :n, :n], rows[:, :, :n] = points.moving.a, points.moving.c
         a[:, n, n] = -1.0 / given.current_time
         if self.drive is not None:
             error = given.current_error * float(np.max(np.abs(self.hold)))
@@ -367,8 +372,8 @@ def spread_offsets(points: RestPoints, hold: Array) -> Array:
     def at_speed(speed: float) -> Array:
         moved = points.states.copy()
         moved[:, rate] = speed
-        found = evaluate_rows(function, moved, inputs, model.start(model.parameters))[0]
-        return found.reshape(len(points.at), result.shape[0], len(groups))
+        rows = evaluate_rows(function, moved, inputs, model.start(model.parameters))[0]
+        return rows.reshape(len(points.at), result.shape[0], len(groups))
 
     offsets = limit_at_zero_speed(at_speed, points.typical_speed)
     offsets = np.where(np.isfinite(offsets), offsets, 0.0)
@@ -381,52 +386,52 @@ def spread_offsets(points: RestPoints, hold: Array) -> Array:
 
 def _usual(
     points: RestPoints, estimate: str, given: RankingAssumptions
-) -> tuple[list[Candidate], tuple[str, ...]]:
+) -> tuple[list[SensorCandidate], tuple[str, ...]]:
     left_out: list[str] = []
     torque = float(np.max(np.abs(points.outputs[:, points.output_names.index(estimate)])))
     drive, hold = holding_current(points)
     current = float(np.max(np.abs(hold)))
-    found = [
-        Candidate("encoder with half the count", finer=0.5),
-        Candidate("encoder with a quarter of the count", finer=0.25),
-        Candidate("sampling twice as fast", faster=0.5),
-        Candidate("sampling four times as fast", faster=0.25),
-        Candidate("tachometer", {points.rate: given.tachometer * points.typical_speed}),
+    candidates = [
+        SensorCandidate("encoder with half the count", finer=0.5),
+        SensorCandidate("encoder with a quarter of the count", finer=0.25),
+        SensorCandidate("sampling twice as fast", faster=0.5),
+        SensorCandidate("sampling four times as fast", faster=0.25),
+        SensorCandidate("tachometer", {points.rate: given.tachometer * points.typical_speed}),
     ]
     if torque > 0.0:
-        found.append(Candidate("torque sensor", {estimate: given.torque_sensor * torque}))
+        candidates.append(SensorCandidate("torque sensor", {estimate: given.torque_sensor * torque}))
     else:
         left_out.append("torque sensor: the spring has no torque at these angles")
     if drive is not None and current > 0.0:
-        found.append(Candidate("current sensor", {CURRENT: given.current_sensor * current}))
+        candidates.append(SensorCandidate("current sensor", {CURRENT: given.current_sensor * current}))
     else:
         left_out.append("current sensor: nothing drives the measured body by a current here")
-    found += _of_the_load(points, left_out) + _declared(points, estimate)
-    return found, tuple(left_out)
+    candidates += _of_the_load(points, left_out) + _declared(points, estimate)
+    return candidates, tuple(left_out)
 
 
-def _of_the_load(points: RestPoints, left_out: list[str]) -> list[Candidate]:
+def _of_the_load(points: RestPoints, left_out: list[str]) -> list[SensorCandidate]:
     model = points.model
     others = [b for b in model.bodies if not b.prescribed and b.motion != points.angle]
     if not others:
         left_out.append("encoder of the load: no other body moves freely, its angle is known")
     resolution = declared_deviation(model, points.angle)
-    return [Candidate(f"encoder of {b.name}", {b.motion: resolution}) for b in others]
+    return [SensorCandidate(f"encoder of {b.name}", {b.motion: resolution}) for b in others]
 
 
-def _declared(points: RestPoints, estimate: str) -> list[Candidate]:
+def _declared(points: RestPoints, estimate: str) -> list[SensorCandidate]:
     """Return the other sensors that the deck declares, of what the equations know."""
     model = points.model
     known = {v.name for v in model.states + model.signals}
-    found = []
+    candidates = []
     for reading in model.readings:
         if reading.measured == points.angle or reading.measured not in known:
             continue
         if any(model.values.get(f"{s}.{n}", 0.0) for s in reading.sensors for n in ("noise", "quantum")):
             deviation = declared_deviation(model, reading.measured)
             name = f"{reading.sensors[0]}, as declared, of {reading.measured}"
-            found.append(Candidate(name, {reading.measured: deviation}))
-    return found
+            candidates.append(SensorCandidate(name, {reading.measured: deviation}))
+    return candidates
 
 
 def _share(present: float, now: float) -> str:

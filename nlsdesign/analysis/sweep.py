@@ -187,8 +187,8 @@ def over_angle(
     """
     angle = measured_motion(model, angle)
     points = rest_points(model, np.asarray(angles, dtype=float), angle=angle, consistent=consistent)
-    found = [view.over(points) for view in views]
-    columns = tuple(column for each in found for column in each.columns)
-    values = np.column_stack([np.zeros((len(points.at), 0)), *(each.values for each in found)])
-    words = {name: texts for each in found for name, texts in each.words.items()}
+    parts = [view.over(points) for view in views]
+    columns = tuple(column for each in parts for column in each.columns)
+    values = np.column_stack([np.zeros((len(points.at), 0)), *(each.values for each in parts)])
+    words = {name: texts for each in parts for name, texts in each.words.items()}
     return Chart(model.variable(angle), points.at, columns, values, words)

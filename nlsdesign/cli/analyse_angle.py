@@ -46,15 +46,7 @@ _HEADINGS = {
 @out_option("out/analysis")
 @json_option
 def analyse_angle(
-    deck_name: str,
-    first: float,
-    last: float,
-    count: int,
-    measured: str | None,
-    spring: str | None,
-    *,
-    out: Path,
-    as_json: bool,
+    deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None
 ) -> None:
     """Poles sliding and stuck, exact angles that hide a state, and which sensor would help most."""
     import numpy as np
@@ -68,7 +60,7 @@ def analyse_angle(
     from ..model.transform import with_outputs
 
     model = flatten(declare(load_deck(deck_name)))
-    torque, measured = series_spring(model, spring).effort, measured_motion(model, measured)
+    torque, measured = series_spring(model, roles["spring"]).effort, measured_motion(model, roles["measured"])
     unit = model.variable(measured).unit
     if unit != "rad":
         raise UnitError(
@@ -134,14 +126,14 @@ def _as_json(chart: Chart, drops: RankDrops, ranking: SensorRanking | None) -> d
         }
         for drop in drops.drops
     ]
-    found: dict[str, Any] = {"angle": chart.at, **{v.name: chart[v.name] for v in chart.columns}}
-    found["descriptions"] = {v.name: f"[{v.unit}] {v.description}" for v in chart.columns}
-    found |= {"words": dict(chart.words), "unseen": unseen, "detectable": drops.detectable}
-    found["verdict"] = drops.lines()
+    content: dict[str, Any] = {"angle": chart.at, **{v.name: chart[v.name] for v in chart.columns}}
+    content["descriptions"] = {v.name: f"[{v.unit}] {v.description}" for v in chart.columns}
+    content |= {"words": dict(chart.words), "unseen": unseen, "detectable": drops.detectable}
+    content["verdict"] = drops.lines()
     if ranking is not None:
         rows = [dict(zip(ranking.headings, row, strict=True)) for row in ranking.rows()]
-        found["sensors"] = {"rows": rows, "condition": ranking.condition, "left_out": ranking.left_out}
-    return found
+        content["sensors"] = {"rows": rows, "condition": ranking.condition, "left_out": ranking.left_out}
+    return content
 
 
 def _show(chart: Chart, drops: RankDrops, name: str) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm, solve_discrete_are
 
-from nlsdesign.analysis import Candidate, RankingAssumptions, rank_sensors
+from nlsdesign.analysis import RankingAssumptions, SensorCandidate, rank_sensors
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
@@ -128,7 +128,10 @@ def test_a_load_that_moves_freely_can_have_an_encoder() -> None:
 
 
 def test_candidates_of_ones_own_and_what_is_missing() -> None:
-    own = [Candidate("two readings", {"motor.angle": COUNT}), Candidate("no news", {"motor.speed": 1e9})]
+    own = [
+        SensorCandidate("two readings", {"motor.angle": COUNT}),
+        SensorCandidate("no news", {"motor.speed": 1e9}),
+    ]
     ranking = rank_sensors(drive(), angles=[0.5], candidates=own)
     assert {gain.candidate.name for gain in ranking.gains} == {"two readings", "no news"}
     blind = next(gain for gain in ranking.gains if gain.candidate.name == "no news")
@@ -136,7 +139,7 @@ def test_candidates_of_ones_own_and_what_is_missing() -> None:
     with pytest.raises(ValueRangeError, match="declares its quantum or noise"):
         rank_sensors(drive(encoder=False), angles=[0.5])
     with pytest.raises(ValueRangeError, match="must be positive"):
-        Candidate("noiseless", {"motor.angle": 0.0})
+        SensorCandidate("noiseless", {"motor.angle": 0.0})
 
 
 def test_on_the_published_deck_only_a_torque_sensor_helps_over_the_spread() -> None:

@@ -24,6 +24,11 @@ class NoiseAssumptions:
         Standard deviation of what the inner states do of their own, as a share of their typical sizes.
     sample_time
         In s.
+
+    Raises
+    ------
+    ValueRangeError
+        If a share is negative, or the sample time not positive.
     """
 
     torque: float = 0.01
@@ -44,14 +49,14 @@ class NoiseAssumptions:
         """
         names, largest = points.state_names, np.max(np.abs(points.moving.rates), axis=0)
         decay = np.median(np.abs(np.einsum("Nii->Ni", points.moving.a)), axis=0)
-        found = {}
+        densities = {}
         for i, name in enumerate(names):
             if name == points.rate:
-                found[name] = self.torque * float(largest[i]) * math.sqrt(self.sample_time)
+                densities[name] = self.torque * float(largest[i]) * math.sqrt(self.sample_time)
             elif name != points.angle:
                 # With its own decay λ a state of this density has the standard deviation q/√(2λ).
-                found[name] = self.inner * points.sizes[name] * math.sqrt(2.0 * float(decay[i]))
-        return found
+                densities[name] = self.inner * points.sizes[name] * math.sqrt(2.0 * float(decay[i]))
+        return densities
 
     def __str__(self) -> str:
         return (
@@ -76,16 +81,16 @@ def declared_deviation(model: FlatModel, name: str) -> float:
     ValueRangeError
         If no sensor of it declares a resolution.
     """
-    found = []
+    deviations = []
     for reading in model.readings:
         if reading.measured == name:
             numbers = [(model.values.get(f"{s}.noise", 0.0), model.values.get(f"{s}.quantum", 0.0))
                        for s in reading.sensors]  # fmt: skip
             square = sum(noise**2 + quantum**2 / 12.0 for noise, quantum in numbers)
-            found += [math.sqrt(square)] if square > 0.0 else []
-    if not found:
+            deviations += [math.sqrt(square)] if square > 0.0 else []
+    if not deviations:
         raise ValueRangeError(
             f"measurement of '{name}'", "no sensor in the deck declares its quantum or noise",
             next_step=f"give it: measurement={{'{name}': standard deviation}}, or declare an Encoder of it",
         )  # fmt: skip
-    return min(found)
+    return min(deviations)
