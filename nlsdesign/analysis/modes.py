@@ -164,12 +164,9 @@ def _stuck(side: _Side, allowed: Array, held: int) -> list[PlantMode]:
     if allowed.shape[-1] <= 2 * held:
         return []
     words = "dry friction holds the speed at zero, the inner states move"
+    a, b = allowed @ side.slopes @ allowed, allowed @ side.inputs
     rates = np.einsum("Nij,Nj->Ni", allowed, side.rates)
-    return [
-        PlantMode(
-            "stuck", words, allowed @ side.slopes @ allowed, allowed @ side.inputs, rates, held, allowed
-        )
-    ]
+    return [PlantMode("stuck", words, a, b, side.outputs, rates, held, allowed)]
 
 
 class _Branches:
