@@ -14,7 +14,7 @@ from .sensor_ranking import (
     SensorRanking,
     rank_sensors,
 )
-from .stability import Stability, least_damped
+from .stability import Stability, least_damped, sampled_poles
 from .sweep import Chart, Columns, PointView, View, over_angle
 
 __all__ = [
@@ -43,4 +43,5 @@ __all__ = [
     "rank_drops",
     "rank_sensors",
     "rest_points",
+    "sampled_poles",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import unknown_name
+from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel, Variable
 from ..model.roles import spring_torque
 from .modes import PlantMode
@@ -87,6 +87,34 @@ def least_damped(eigenvalues: NDArray[np.complex128]) -> tuple[Array, Array, Arr
     any_ = np.any(swings, axis=-1)
     frequency = np.where(any_, np.abs(imaginary) / (2.0 * np.pi), 0.0)
     return np.max(eigenvalues.real, axis=-1), frequency, np.where(any_, ratio, 1.0)
+
+
+def sampled_poles(matrices: Array, sample_time: float) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Return spectral radius of sampled systems, and what :func:`least_damped` says of the same in time.
+
+    For the error of an observer give the matrices that
+    :func:`~nlsdesign.observer.scheduling.check.error_matrices` takes from it. An eigenvalue z counts as
+    ln(z)/T; one at zero is gone after one sample, which counts as the decay to the rounding of a number.
+
+    Parameters
+    ----------
+    matrices
+        Of x⁺ = Φ·x, shape (N, n, n).
+    sample_time
+        T in s.
+
+    Raises
+    ------
+    ValueRangeError
+        If the sample time is not positive.
+    """
+    if not 0.0 < sample_time < np.inf:
+        raise ValueRangeError(f"sample time {sample_time:g} s", "must be positive")
+    eigenvalues = np.linalg.eigvals(matrices).astype(complex)
+    radius = np.max(np.abs(eigenvalues), axis=-1)
+    vanished = np.abs(eigenvalues) < np.finfo(float).eps
+    in_time = np.log(np.where(vanished, np.finfo(float).eps, eigenvalues)) / sample_time
+    return radius, least_damped(np.asarray(in_time, dtype=complex))
 
 
 def _columns(mode: PlantMode) -> list[Variable]:

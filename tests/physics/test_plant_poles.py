@@ -6,8 +6,18 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.integrate import quad_vec
+from scipy.linalg import expm
 
-from nlsdesign.analysis import Stability, empirical_gramian, over_angle, rank_drops, rest_points
+from nlsdesign.analysis import (
+    Stability,
+    empirical_gramian,
+    least_damped,
+    over_angle,
+    rank_drops,
+    rest_points,
+    sampled_poles,
+)
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
@@ -25,6 +35,8 @@ from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.locations import folder
 from nlsdesign.model import FlatModel, flatten
+from nlsdesign.observer import FixedGrid, design_observer
+from nlsdesign.observer.scheduling.check import error_matrices
 
 J, K, BRANCH, ETA, VISCOUS, LEVEL, CREEP = 2e-3, 5.0, 3.0, 0.04, 1e-3, 0.02, 0.02
 
@@ -79,6 +91,25 @@ def test_sliding_is_the_plant_without_the_corner_and_stuck_what_relaxes(friction
     assert stuck.eigenvalues == pytest.approx(np.full((3, 1), -BRANCH / ETA), rel=1e-9)
 
 
+def test_poles_of_a_sampled_system_are_those_that_it_samples() -> None:
+    step, a = 1e-3, sliding_by_hand()
+    radius, sampled = sampled_poles(np.array([expm(a * step)] * 2), step)
+    eigenvalues = np.linalg.eigvals(a)
+    assert radius == pytest.approx(np.exp(step * np.max(eigenvalues.real)))
+    expected = [float(each[0]) for each in least_damped(eigenvalues[None])]
+    assert [float(each[1]) for each in sampled] == pytest.approx(expected, rel=1e-9)
+    assert expected[1] == pytest.approx(np.max(eigenvalues.imag) / (2.0 * np.pi))
+
+
+def test_the_error_of_an_observer_has_its_poles_over_the_angle() -> None:
+    """The cascade leaves the memory of the rubber to its own decay, −k/η."""
+    model = flatten(declare(load_deck("austin2015_figure_consistent")))
+    observer = design_observer(model, grid=FixedGrid(-0.9, 0.9, points=61))
+    matrices = error_matrices(observer, np.radians([-40.0, 0.0, 5.0, 40.0]))
+    _, (decay, _, _) = sampled_poles(matrices, 1e-3)
+    assert decay == pytest.approx(np.full(4, -1.479e6 / 21e3), rel=1e-6)
+
+
 def test_without_dry_friction_there_is_one_mode() -> None:
     (free,) = rest_points(rubbing(None), np.array([0.1]), angle="body.angle").modes
     assert free.name == "free"
@@ -122,6 +153,10 @@ def test_friction_that_grows_with_the_load_has_another_stiffness_in_each_directi
     for mode, sign in ((ahead, 1.0), (back, -1.0)):
         expected = np.sqrt(K * (1.0 + sign * share) / J)
         assert np.max(mode.eigenvalues.imag) == pytest.approx(expected, rel=1e-9), mode.name
+
+
+def declared(deck: str) -> Assembly:
+    return declare(load_deck(deck))
 
 
 def numbers(deck: str) -> dict[str, dict]:
@@ -184,12 +219,8 @@ def test_the_plant_swings_where_the_smoothed_corner_creeps() -> None:
     assert np.max(np.linalg.eigvals(corner).real) == pytest.approx(-6.9, abs=0.05)
 
 
-def relaxing_deck(name: str) -> Assembly:
-    return declare(load_deck(name))
-
-
 def test_the_angle_of_lost_rank_is_found_between_the_angles_of_a_sweep() -> None:
-    model = flatten(relaxing_deck("austin2015_as_printed"))
+    model = flatten(declared("austin2015_as_printed"))
     for angles in (np.radians([-3.0, 2.0, 45.0]), np.radians(np.linspace(-40.0, 41.0, 60))):
         found = rank_drops(model, angles=angles)
         (drop,) = found.drops
@@ -203,7 +234,7 @@ def test_the_angle_of_lost_rank_is_found_between_the_angles_of_a_sweep() -> None
 
 
 def test_a_dead_zone_hides_the_memory_over_a_range_up_to_where_the_lever_arm_begins() -> None:
-    model = flatten(relaxing_deck("one_sided_cable_drive"))
+    model = flatten(declared("one_sided_cable_drive"))
     found = rank_drops(model, angles=np.radians(np.linspace(-31.0, 53.0, 37)))
     (drop,) = found.drops
     assert drop.open_ended
@@ -218,7 +249,7 @@ def test_a_dead_zone_hides_the_memory_over_a_range_up_to_where_the_lever_arm_beg
 
 def test_a_rank_that_only_comes_near_a_drop_is_no_drop() -> None:
     """Two outputs, θ and θ + 1e-3·z: the memory is seen at zero angle too, if badly."""
-    model = flatten(relaxing_deck("austin2015_figure_consistent"))
+    model = flatten(declared("austin2015_figure_consistent"))
     names = ["motor.angle", "spring.rubber.relaxing.stress"]
     found = rank_drops(model, angles=np.radians(np.linspace(-40.0, 41.0, 60)), measured=names)
     assert found.drops == ()
@@ -240,9 +271,6 @@ def test_what_neither_is_seen_nor_decays_is_not_detectable() -> None:
 
 
 def test_the_empirical_gramian_of_a_linear_model_is_the_gramian() -> None:
-    from scipy.integrate import quad_vec
-    from scipy.linalg import expm
-
     a, horizon = sliding_by_hand(), 0.05
     times = np.linspace(0.0, horizon, 2001)
     model = rubbing(None)
@@ -263,7 +291,7 @@ def test_the_empirical_gramian_of_a_linear_model_is_the_gramian() -> None:
 
 
 def test_at_rest_in_the_dead_zone_a_motion_shows_nothing_of_the_memory() -> None:
-    model = flatten(relaxing_deck("one_sided_cable_drive"))
+    model = flatten(declared("one_sided_cable_drive"))
     times = np.linspace(0.0, 0.05, 51)
     found = empirical_gramian(model, times, start={"motor.angle": -0.5})
     assert found.condition == np.inf
