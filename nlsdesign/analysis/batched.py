@@ -95,7 +95,7 @@ def riccati(transition: Array, information: Array, noise: Array) -> tuple[Array,
 
     P = Φ·(P − P·Cᵀ(C·P·Cᵀ + R)⁻¹C·P)·Φᵀ + Q by structure-preserving doubling: after k steps it is the
     covariance after 2^k samples from a known start. There is no steady state where something that does not
-    decay is not seen. Sources: Anderson 1978; Chu, Fan, Lin and Wang 2004.
+    decay is not seen. Source: Anderson 1978.
 
     Parameters
     ----------

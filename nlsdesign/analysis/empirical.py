@@ -83,7 +83,7 @@ def empirical_gramian(
     """Return the empirical Gramian of a model along a motion.
 
     W = 1/(2c²)·Σ± ∫Δyᵢ±·Δyⱼ± dt, with the outputs' changes Δyᵢ± where state i starts c·Sᵢ higher or lower.
-    For a linear model it is ∫e^(Aᵀt)CᵀCe^(At) dt. Source: Lall, Marsden and Glavaški 2002.
+    For a linear model it is ∫e^(Aᵀt)CᵀCe^(At) dt. Source: Lall et al. 2002.
 
     Parameters
     ----------
