@@ -279,7 +279,7 @@ class _Bench:
         offsets = (
             spread_offsets(points, self.hold) if over_spread else np.zeros((count, n + points.c.shape[1], 0))
         )
-        m, k = n + 1 + offsets.shape[-1], offsets.shape[-1]
+        m = n + 1 + offsets.shape[-1]
         a, density = np.zeros((count, m, m)), np.zeros((count, m, m))
         rows = np.zeros((count, points.c.shape[1], m))
         a[:, :n, :n], rows[:, :, :n] = points.moving.a, points.moving.c
