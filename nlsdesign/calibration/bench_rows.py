@@ -1,0 +1,230 @@
+"""Samples of a bench become rows of least squares: means under smooth windows, each with its noise.
+
+A balance of efforts is multiplied by a smooth window and integrated; by parts the acceleration becomes the
+measured motion times the second derivative of the window, so counts of an encoder are never differentiated
+and the window blurs all terms alike. Source: Shinbrot 1957 (modulating functions).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from .bench_response import BALANCE, BenchResponse, Course
+
+Array = NDArray[np.float64]
+
+_LEAST_SAMPLES, _LONGEST = 13, 0.25
+"""Samples and seconds of a window at least and at most."""
+_SHARE = 0.2
+"""Of the time in which the motion turns once by a radian of its phase: a window sees little of a period."""
+_STRIDE = 0.6
+"""Windows apart, in lengths."""
+_MOVING = 5.0
+"""Standard deviations of the noise of the rate above which a sample moves for certain."""
+
+
+class SampleNoise(NamedTuple):
+    """Standard deviations of a sample.
+
+    Parameters
+    ----------
+    motion, command
+        Of the drive.
+    quantum
+        Count of the motion; zero where there is none.
+    channels
+        Of the measured efforts, in the order of the channels without the balance.
+    """
+
+    motion: float
+    command: float
+    quantum: float
+    channels: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Smooth windows over samples.
+
+    Parameters
+    ----------
+    mean
+        Shape (rows, n): weighted means.
+    second
+        Shape (rows, n): second derivatives of the windowed mean over time, in 1/s².
+    centres
+        Sample in the middle of each row.
+    length
+        Samples of a window.
+    """
+
+    mean: csr_matrix
+    second: csr_matrix
+    centres: NDArray[np.int64]
+    length: int
+
+
+class Row(NamedTuple):
+    """Rows of one channel of one record.
+
+    Parameters
+    ----------
+    channel
+        Name.
+    centres
+        Sample in the middle of each.
+    residual, sigma
+        Measured minus shown in the unit of the channel, and its noise; shape (rows,).
+    slope
+        Of the residual over the factors, shape (rows, columns).
+    size
+        Root mean square of what is compared, in its unit.
+    """
+
+    channel: str
+    centres: NDArray[np.int64]
+    residual: Array
+    sigma: Array
+    slope: Array
+    size: float
+
+
+def windows(count: int, step: float, seconds: float) -> Windows:
+    """Return windows over a record.
+
+    Parameters
+    ----------
+    count
+        Samples.
+    step
+        Between them in s.
+    seconds
+        Length of a window; at least 13 samples are taken.
+    """
+    half = max(_LEAST_SAMPLES // 2, round(0.5 * seconds / step))
+    s = np.arange(-half, half + 1) / (half + 1.0)
+    mean = (1.0 - s**2) ** 4
+    mean /= mean.sum()
+    second = (1.0 - s**2) ** 2 * (56.0 * s**2 - 8.0)
+    # On samples too, a line has no second derivative and t²/2 has one of one.
+    second -= mean * second.sum()
+    second *= 2.0 / float((second * (s * (half + 1.0) * step) ** 2).sum())
+    second -= mean * second.sum()
+    stride = max(1, round(_STRIDE * len(s)))
+    centres = np.arange(half, count - half, stride)
+    columns = (centres[:, None] + np.arange(-half, half + 1)[None]).ravel()
+    rows = np.repeat(np.arange(len(centres)), len(s))
+    shape = (len(centres), count)
+    return Windows(
+        csr_matrix((np.tile(mean, len(centres)), (rows, columns)), shape),
+        csr_matrix((np.tile(second, len(centres)), (rows, columns)), shape),
+        centres,
+        len(s),
+    )
+
+
+def rate_of(motion: Array, step: float, seconds: float) -> tuple[Array, float]:
+    """Return the rate of a sampled motion, and the factor from noise of the motion to that of the rate.
+
+    Parameters
+    ----------
+    motion
+        Shape (n,).
+    step
+        Between samples in s.
+    seconds
+        Length of the window of each.
+    """
+    half = max(_LEAST_SAMPLES // 4, round(0.5 * seconds / step))
+    s = np.arange(-half, half + 1) / (half + 1.0)
+    slope = s * (1.0 - s**2) ** 3
+    slope /= float((slope * s).sum()) * (half + 1.0) * step
+    wide = np.concatenate([2 * motion[0] - motion[half:0:-1], motion, 2 * motion[-1] - motion[-2 : -half - 2 : -1]])
+    rate: Array = np.convolve(wide, slope[::-1], mode="valid")
+    return rate, float(np.linalg.norm(slope))
+
+
+def window_length(motion: Array, step: float) -> float:
+    """Return the length of a window in s that suits a motion: a fifth of a radian of its phase.
+
+    Parameters
+    ----------
+    motion
+        Shape (n,).
+    step
+        Between samples in s.
+    """
+    rate = rate_of(motion, step, 0.03)[0]
+    line = np.polynomial.polynomial.polyfit(np.arange(len(motion)), motion, 1)
+    swing = motion - np.polynomial.polynomial.polyval(np.arange(len(motion)), line)
+    pace = float(np.std(rate - np.mean(rate)) / max(float(np.std(swing)), 1e-12))
+    return min(_LONGEST, max(_LEAST_SAMPLES * step, _SHARE * 2.0 * math.pi / max(pace, 1e-9)))
+
+
+def rows_of(
+    response: BenchResponse, course: Course, measured: Array, noise: SampleNoise, x: Array, masked: NDArray[np.bool_]
+) -> list[Row]:
+    """Return the rows of all channels of one record.
+
+    Parameters
+    ----------
+    response
+        Of the machine on the bench.
+    course
+        Motion, command and weight as measured.
+    measured
+        Efforts, shape (channels without the balance, n).
+    noise
+        Of a sample.
+    x
+        Factors.
+    masked
+        Samples that are faulty, shape (n,).
+    """
+    view = windows(len(course.motion), course.step, window_length(course.motion, course.step))
+    shown = response.along(course, x)
+    sound = np.asarray(view.mean @ masked.astype(float)).ravel() == 0.0
+    counts = np.abs(np.asarray(view.mean @ np.abs(np.gradient(course.motion)))).ravel() * view.length
+    narrow = float(np.linalg.norm(view.mean[0].data)) if len(view.centres) else 1.0
+    # Rounding of a motion that stays within a count does not average out.
+    blur = np.where(counts > 3.0 * noise.quantum, narrow, 1.0)
+    rows, effort = [], 0
+    for k, channel in enumerate(response.channels):
+        mean = np.asarray(view.mean @ shown.value[k]).ravel()
+        slope = view.mean @ shown.slope[k]
+        stiff = np.asarray(view.mean @ np.abs(shown.by_motion[k])).ravel()
+        variance = (noise.motion * stiff * blur) ** 2
+        if channel == BALANCE:
+            second = np.asarray(view.second @ course.motion).ravel()
+            residual, slope = response.inertia * second - mean, -slope
+            by_command = np.abs(response.slope_of_command(shown, k))
+            variance += (noise.command * float(np.median(by_command)) * narrow) ** 2
+            variance += (response.inertia * noise.motion * float(np.linalg.norm(view.second[0].data))) ** 2
+            use = sound & _in_motion(course, noise, view)
+            size = float(np.sqrt(np.mean((by_command * course.command) ** 2)))
+        else:
+            residual = np.asarray(view.mean @ measured[effort]).ravel() - mean
+            slope = -slope
+            variance += (noise.channels[effort] * narrow) ** 2
+            use, size = sound, float(np.sqrt(np.mean(measured[effort] ** 2)))
+            effort += 1
+        sigma = np.sqrt(np.maximum(variance, (1e-6 * size) ** 2 + 1e-24))
+        rows.append(Row(channel, view.centres[use], residual[use], sigma[use], np.asarray(slope)[use], size))
+    return rows
+
+
+def _in_motion(course: Course, noise: SampleNoise, view: Windows) -> NDArray[np.bool_]:
+    """Tell in which windows every sample moves, in one direction: only there dry friction is known."""
+    least = _MOVING * max(noise.motion, 1e-12) * rate_of(course.motion, course.step, 0.5 * view.length * course.step)[1]
+    least = max(least, 1e-3 * float(np.max(np.abs(course.rate))))
+    fast = np.where(np.abs(course.rate) > least, np.sign(course.rate), 0.0)
+    inside = view.mean.copy()
+    inside.data = np.ones_like(inside.data)
+    result: NDArray[np.bool_] = np.abs(np.asarray(inside @ fast)).ravel() >= view.length - 0.5
+    return result
