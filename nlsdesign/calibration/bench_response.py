@@ -8,7 +8,7 @@ machine, and nothing has to be integrated twice.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
@@ -49,16 +49,17 @@ class Course(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What the machine should show, for each channel and sample.
+    """What the machine should show at each sample.
 
     Parameters
     ----------
     value
-        Shape (channels, n).
+        Acceleration of the drive at the measured command, its derivative with respect to the command, and the
+        channels; shape (2 + channels, n).
     slope
-        Over the factors, shape (channels, n, factors).
+        Over the factors, shape (2 + channels, n, factors).
     by_motion
-        Derivative with respect to the motion, shape (channels, n).
+        Derivative with respect to the motion, shape (2 + channels, n).
     """
 
     value: Array
@@ -75,7 +76,9 @@ class BenchResponse:
     model
         Of the bench.
     channels
-        Signals that are compared; the first is the balance of the drive, in units of effort.
+        Measured efforts that are compared with the model.
+    balanced
+        Whether the command is measured, and compared with what the motion needs.
     factors
         Names of the numbers that vary; of those that share one factor the first stands for all. Three follow
         for the instruments: zero of the motion, offset of the command, factor of the weight.
@@ -87,12 +90,14 @@ class BenchResponse:
 
     model: FlatModel
     channels: tuple[str, ...]
+    balanced: bool
     factors: tuple[str, ...]
     inner: tuple[str, ...]
     inertia: float
     _rest: ca.Function
     _step: ca.Function
     _shown: ca.Function
+    _mapped: dict[int, tuple[ca.Function, ca.Function]] = field(default_factory=dict)
 
     @property
     def columns(self) -> int:
@@ -111,36 +116,25 @@ class BenchResponse:
         """
         n, size, columns = len(course.motion), len(self.inner), self.columns
         data = np.vstack([course.motion, course.rate, course.command, course.weight])
+        if n not in self._mapped:
+            self._mapped[n] = self._step.mapaccum("run", n - 1), self._shown.map(n)
+        run, shown = self._mapped[n]
         states, sensitivities = np.zeros((size, n)), np.zeros((n, size, columns))
         if size:
             first = self._at_rest(data[:, 0], x)
-            run = self._step.mapaccum("run", n - 1)
             everywhere = np.tile(x[:, None], (1, n - 1))
             pace = np.full((1, n - 1), course.step)
             rows = run(first, data[:, :-1], data[:, 1:], pace, everywhere).full()
             rows = np.hstack([first[:, None], rows])
             states = rows[:size]
             sensitivities = rows[size:].T.reshape(n, columns, size).transpose(0, 2, 1)
-        results = self._shown.map(n)(states, data, np.tile(x[:, None], (1, n)))
+        results = shown(states, data, np.tile(x[:, None], (1, n)))
         value, by_x, by_inner, by_motion = (r.full() for r in results)
-        count = len(self.channels)
+        count = 2 + len(self.channels)
         slope = by_x.reshape(count, n, columns)
         if size:
             slope = slope + np.einsum("cns,nsk->cnk", by_inner.reshape(count, n, size), sensitivities)
         return Shown(value, slope, by_motion)
-
-    def slope_of_command(self, shown: Shown, channel: int) -> Array:
-        """Return the derivative of a channel with respect to the command, shape (n,).
-
-        Parameters
-        ----------
-        shown
-            From :meth:`along`.
-        channel
-            Its place.
-        """
-        result: Array = shown.slope[channel, :, -2]
-        return result
 
     def _at_rest(self, data: Array, x: Array) -> Array:
         """Return inner states and their slopes where the machine has rested; as declared if it never does."""
@@ -188,15 +182,15 @@ def bench_response(
     if others:
         raise ArrangementError(f"body '{others[0].name}'", "moves too", next_step="clamp it")
     given = _expressions(model, body, prior)
-    inertia = _inertia(model, body.inertia)
-    shown = [inertia * given.acceleration] if balanced else []
-    shown += [given.signals[c] for c in channels]
+    by_command = ca.jacobian(given.acceleration, given.data[2])
+    shown = [given.acceleration, by_command, *(given.signals[c] for c in channels)]
     return BenchResponse(
         model,
-        ((BALANCE,) if balanced else ()) + tuple(channels),
+        tuple(channels),
+        balanced,
         given.factors,
         given.inner,
-        inertia,
+        _inertia(model, body.inertia),
         *_functions(given, ca.vertcat(*shown)),
     )
 

@@ -39,13 +39,16 @@ class SampleNoise(NamedTuple):
     quantum
         Count of the motion; zero where there is none.
     channels
-        Of the measured efforts, in the order of the channels without the balance.
+        Of the measured efforts.
+    window
+        Length of a window in s.
     """
 
     motion: float
     command: float
     quantum: float
     channels: tuple[float, ...]
+    window: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,61 +170,88 @@ def window_length(motion: Array, step: float) -> float:
     return min(_LONGEST, max(_LEAST_SAMPLES * step, _SHARE * 2.0 * math.pi / max(pace, 1e-9)))
 
 
-def rows_of(
-    response: BenchResponse, course: Course, measured: Array, noise: SampleNoise, x: Array, masked: NDArray[np.bool_]
-) -> list[Row]:
-    """Return the rows of all channels of one record.
+class RecordedRun(NamedTuple):
+    """A record on a bench.
+
+    Parameters
+    ----------
+    course
+        Motion, command and weight as measured.
+    measured
+        Efforts, shape (channels, n).
+    noise
+        Of a sample.
+    masked
+        Samples that are faulty, shape (n,).
+    """
+
+    course: Course
+    measured: Array
+    noise: SampleNoise
+    masked: NDArray[np.bool_]
+
+
+def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[Row]:
+    """Return the rows of all channels of one record, the balance of the drive first.
+
+    The balance is solved for the command: its noise is what the balance is uncertain by, and so no number
+    can make the error smaller by making all efforts small.
 
     Parameters
     ----------
     response
         Of the machine on the bench.
-    course
-        Motion, command and weight as measured.
-    measured
-        Efforts, shape (channels without the balance, n).
-    noise
-        Of a sample.
+    run
+        The record.
     x
         Factors.
-    masked
-        Samples that are faulty, shape (n,).
     """
-    view = windows(len(course.motion), course.step, window_length(course.motion, course.step))
+    course, noise = run.course, run.noise
+    view = windows(len(course.motion), course.step, noise.window)
+    if not len(view.centres):
+        return []
     shown = response.along(course, x)
-    sound = np.asarray(view.mean @ masked.astype(float)).ravel() == 0.0
-    counts = np.abs(np.asarray(view.mean @ np.abs(np.gradient(course.motion)))).ravel() * view.length
-    narrow = float(np.linalg.norm(view.mean[0].data)) if len(view.centres) else 1.0
+    mean = np.array([view.mean @ value for value in shown.value])
+    slope = np.array([view.mean @ each for each in shown.slope])
+    stiff = np.array([view.mean @ np.abs(each) for each in shown.by_motion])
+    sound = view.mean @ run.masked.astype(float) == 0.0
+    counts = (view.mean @ np.abs(np.gradient(course.motion))) * view.length
+    narrow = float(np.linalg.norm(view.mean[0].data))
     # Rounding of a motion that stays within a count does not average out.
-    blur = np.where(counts > 3.0 * noise.quantum, narrow, 1.0)
-    rows, effort = [], 0
+    averaged = counts > 3.0 * noise.quantum
+    blur = np.where(averaged, noise.motion * narrow, max(noise.motion, noise.quantum / math.sqrt(12.0)))
+    rows = []
+    if response.balanced:
+        gain = np.where(np.abs(mean[1]) > 1e-6 * np.max(np.abs(mean[1])), mean[1], np.inf)
+        error = (view.second @ course.motion - mean[0]) / gain
+        by_x = -(slope[0] + error[:, None] * slope[1]) / gain[:, None]
+        bend = float(np.linalg.norm(view.second[0].data))
+        variance = (noise.command * narrow) ** 2 + (noise.motion * bend / gain) ** 2
+        variance += (stiff[0] * blur / gain) ** 2
+        use = sound & _in_motion(course, noise, view) & np.isfinite(gain)
+        effort = response.inertia * float(np.median(np.abs(mean[1])))
+        rows.append(_row(BALANCE, view, use, effort * error, effort * np.sqrt(variance), effort * by_x,
+                         effort * course.command))  # fmt: skip
     for k, channel in enumerate(response.channels):
-        mean = np.asarray(view.mean @ shown.value[k]).ravel()
-        slope = view.mean @ shown.slope[k]
-        stiff = np.asarray(view.mean @ np.abs(shown.by_motion[k])).ravel()
-        variance = (noise.motion * stiff * blur) ** 2
-        if channel == BALANCE:
-            second = np.asarray(view.second @ course.motion).ravel()
-            residual, slope = response.inertia * second - mean, -slope
-            by_command = np.abs(response.slope_of_command(shown, k))
-            variance += (noise.command * float(np.median(by_command)) * narrow) ** 2
-            variance += (response.inertia * noise.motion * float(np.linalg.norm(view.second[0].data))) ** 2
-            use = sound & _in_motion(course, noise, view)
-            size = float(np.sqrt(np.mean((by_command * course.command) ** 2)))
-        else:
-            residual = np.asarray(view.mean @ measured[effort]).ravel() - mean
-            slope = -slope
-            variance += (noise.channels[effort] * narrow) ** 2
-            use, size = sound, float(np.sqrt(np.mean(measured[effort] ** 2)))
-            effort += 1
-        sigma = np.sqrt(np.maximum(variance, (1e-6 * size) ** 2 + 1e-24))
-        rows.append(Row(channel, view.centres[use], residual[use], sigma[use], np.asarray(slope)[use], size))
+        error = view.mean @ run.measured[k] - mean[2 + k]
+        variance = (stiff[2 + k] * blur) ** 2 + (noise.channels[k] * narrow) ** 2
+        rows.append(_row(channel, view, sound, error, np.sqrt(variance), -slope[2 + k], run.measured[k]))
     return rows
+
+
+def _row(
+    channel: str, view: Windows, use: NDArray[np.bool_], *parts: Array
+) -> Row:
+    error, sigma, slope, compared = parts
+    size = float(np.sqrt(np.mean(compared**2)))
+    floor = np.maximum(sigma, 1e-6 * size + 1e-12)
+    return Row(channel, view.centres[use], error[use], floor[use], slope[use], size)
 
 
 def _in_motion(course: Course, noise: SampleNoise, view: Windows) -> NDArray[np.bool_]:
     """Tell in which windows every sample moves, in one direction: only there dry friction is known."""
-    least = _MOVING * max(noise.motion, 1e-12) * rate_of(course.motion, course.step, 0.5 * view.length * course.step)[1]
+    factor = rate_of(course.motion, course.step, 0.5 * noise.window)[1]
+    least = _MOVING * max(noise.motion, 1e-12) * factor
     least = max(least, 1e-3 * float(np.max(np.abs(course.rate))))
     fast = np.where(np.abs(course.rate) > least, np.sign(course.rate), 0.0)
     inside = view.mean.copy()

@@ -25,7 +25,7 @@ from ..model.roles import driven_body
 from ..quantity import three_digits, with_unit
 from ..simulation import Prior, declared_prior
 from .bench_response import BALANCE, BenchResponse, Course, bench_response, shared_factors
-from .bench_rows import Row, SampleNoise, rate_of, rows_of, window_length
+from .bench_rows import RecordedRun, Row, SampleNoise, rate_of, rows_of, window_length
 from .bench_test import WEIGHT, CalibrationTest, HungWeightTest
 
 Array = NDArray[np.float64]
@@ -36,6 +36,8 @@ _EVALUATIONS = 60
 _REACH = 12.0
 """Standard deviations of the prior that a number may move."""
 _LEAST_ROWS = 8
+_PER_WINDOW = 24
+"""Samples of a window that are enough."""
 _FITS = 1.5
 """Misfit in units of the noise up to which a record fits: the noise of a sample is itself an estimate."""
 _FOREIGN = 0.1
@@ -198,16 +200,6 @@ def estimate(
     return problem.estimate(ended.x)
 
 
-class _Run(NamedTuple):
-    """A record on a bench."""
-
-    record: Record
-    course: Course
-    measured: Array
-    noise: SampleNoise
-    masked: NDArray[np.bool_]
-
-
 @dataclass(frozen=True, eq=False)
 class _Bench:
     """A machine on the bench, its records, and what its instruments add to the unknowns."""
@@ -215,8 +207,8 @@ class _Bench:
     test: CalibrationRecords
     response: BenchResponse
     own: Prior
-    runs: tuple[_Run, ...]
-    units: tuple[str, ...]
+    runs: tuple[tuple[Record, RecordedRun], ...]
+    units: dict[str, str]
     deviations: Array
 
     @classmethod
@@ -240,15 +232,13 @@ class _Bench:
                                    next_step=f"log '{body.drives[0] if body.drives else 'the current'}'")  # fmt: skip
         own = _with_known(declared_prior(model), known)
         response = bench_response(model, own, channels, balanced=drive is not None)
-        runs = tuple(_run(model, r, (motion, drive, weight), channels) for r in test.records.records)
-        units = tuple(
-            body.domain.effort_unit if c == BALANCE else model.variable(c).unit for c in response.channels
-        )
+        runs = tuple((r, _run(model, r, (motion, drive, weight), channels)) for r in test.records.records)
+        units = {BALANCE: body.domain.effort_unit, **{c: model.variable(c).unit for c in channels}}
         instruments = test.kind.instruments
-        largest = max(float(np.max(np.abs(run.course.command))) for run in runs)
+        largest = max(float(np.max(np.abs(run.course.command))) for _, run in runs)
         deviations = [instruments.zero_angle, instruments.offset * largest, instruments.weight]
         for k in range(len(channels)):
-            size = max(float(np.max(np.abs(run.measured[k]))) for run in runs)
+            size = max(float(np.max(np.abs(run.measured[k]))) for _, run in runs)
             deviations.append(instruments.offset * size)
         return cls(test, response, own, runs, units, np.array(deviations))
 
@@ -256,10 +246,9 @@ class _Bench:
         """Return rows of all records; slopes over factors, instruments, and offsets of the channels."""
         own, offsets = x[: self.response.columns], x[self.response.columns :]
         result = []
-        for run in self.runs:
-            rows = rows_of(self.response, run.course, run.measured, run.noise, own, run.masked)
+        for record, run in self.runs:
             wide, k = [], 0
-            for row in rows:
+            for row in rows_of(self.response, run, own):
                 more = np.zeros((len(row.residual), len(offsets)))
                 residual = row.residual
                 if row.channel != BALANCE:
@@ -267,7 +256,7 @@ class _Bench:
                     residual = residual - offsets[k]
                     k += 1
                 wide.append(row._replace(residual=residual, slope=np.hstack([row.slope, more])))
-            result.append((run.record, wide))
+            result.append((record, wide))
         return result
 
 
@@ -284,23 +273,37 @@ def _with_known(own: Prior, known: Prior) -> Prior:
 
 def _run(
     model: FlatModel, record: Record, signals: tuple[str, str | None, str | None], channels: Sequence[str]
-) -> _Run:
+) -> RecordedRun:
     motion, drive, weight = signals
     still = np.zeros(len(record.trace))
     angle = shown_values(model, record, motion)
     command = still if drive is None else shown_values(model, record, drive)
     hung = still if weight is None else record.trace[weight]
-    rate = rate_of(angle, record.step, 0.5 * window_length(angle, record.step))[0]
-    course = Course(record.step, angle, rate, np.asarray(command), np.asarray(hung))
-    measured = np.array([record.trace[c] for c in channels]).reshape(len(channels), len(record.trace))
-    quantum = record.resolution_of(motion).quantum
-    noise = SampleNoise(
-        _deviation(record, motion),
-        0.0 if drive is None else _deviation(record, drive),
-        quantum,
-        tuple(_deviation(record, c) for c in channels),
+    length = window_length(angle, record.step)
+    rate = rate_of(angle, record.step, 0.5 * length)[0]
+    # A window needs no more than some dozen samples: each stands for the mean of several.
+    several = max(1, int(length / record.step) // _PER_WINDOW)
+    course = Course(
+        record.step * several, *(_means(np.asarray(v), several) for v in (angle, rate, command, hung))
     )
-    return _Run(record, course, measured, noise, record.masked_in(record.trace.signals))
+    measured = np.array([_means(record.trace[c], several) for c in channels])
+    finer = 1.0 / math.sqrt(several)
+    noise = SampleNoise(
+        _deviation(record, motion) * finer,
+        0.0 if drive is None else _deviation(record, drive) * finer,
+        record.resolution_of(motion).quantum,
+        tuple(_deviation(record, c) * finer for c in channels),
+        length,
+    )
+    masked = _means(record.masked_in(record.trace.signals).astype(float), several) > 0.0
+    return RecordedRun(course, measured.reshape(len(channels), len(masked)), noise, masked)
+
+
+def _means(values: Array, several: int) -> Array:
+    """Return the means of every so many samples; what is left over at the end is left out."""
+    whole = len(values) // several * several
+    result: Array = values[:whole].reshape(-1, several).mean(axis=1)
+    return result
 
 
 def _deviation(record: Record, signal: str) -> float:
@@ -345,13 +348,14 @@ class _Problem:
         for bench, where in zip(self.benches, self._maps, strict=True):
             matrix = self.factors(bench, where)
             for record, rows in bench.rows(matrix @ y):
-                for row, unit in zip(rows, bench.units, strict=True):
+                for row in rows:
                     if len(row.residual) < _LEAST_ROWS:
                         continue
                     slope = (row.slope @ matrix) / row.sigma[:, None]
                     time = record.step * row.centres
                     name = f"{bench.test.source}/{record.name}"
-                    result.append((Piece(row.channel, name, time, row.residual / row.sigma, slope), row, unit))
+                    piece = Piece(row.channel, name, time, row.residual / row.sigma, slope)
+                    result.append((piece, row, bench.units[row.channel]))
         if not result:
             raise MeasurementError("records", "hold no stretch in which the machine moves long enough",
                                    next_step="sweep the motor slowly, for at least some seconds")  # fmt: skip
