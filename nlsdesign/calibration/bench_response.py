@@ -117,15 +117,18 @@ class BenchResponse:
         n, size, columns = len(course.motion), len(self.inner), self.columns
         data = np.vstack([course.motion, course.rate, course.command, course.weight])
         if n not in self._mapped:
-            self._mapped[n] = self._step.mapaccum("run", n - 1), self._shown.map(n)
+            carried = self._step.mapaccum("run", n - 1) if n > 1 else self._step
+            self._mapped[n] = carried, self._shown.map(n)
         run, shown = self._mapped[n]
         states, sensitivities = np.zeros((size, n)), np.zeros((n, size, columns))
         if size:
             first = self._at_rest(data[:, 0], x)
             everywhere = np.tile(x[:, None], (1, n - 1))
             pace = np.full((1, n - 1), course.step)
-            rows = run(first, data[:, :-1], data[:, 1:], pace, everywhere).full()
-            rows = np.hstack([first[:, None], rows])
+            rows = first[:, None]
+            if n > 1:
+                later = run(first, data[:, :-1], data[:, 1:], pace, everywhere).full()
+                rows = np.hstack([rows, later])
             states = rows[:size]
             sensitivities = rows[size:].T.reshape(n, columns, size).transpose(0, 2, 1)
         results = shown(states, data, np.tile(x[:, None], (1, n)))
@@ -135,6 +138,19 @@ class BenchResponse:
         if size:
             slope = slope + np.einsum("cns,nsk->cnk", by_inner.reshape(count, n, size), sensitivities)
         return Shown(value, slope, by_motion)
+
+    def resting(self, motion: float, x: Array) -> Shown:
+        """Return what the machine shows where it has rested, as :meth:`along` does; shapes (2 + channels, 1).
+
+        Parameters
+        ----------
+        motion
+            Of the driven body.
+        x
+            Factors, shape (columns,).
+        """
+        still = np.zeros(1)
+        return self.along(Course(1.0, still + motion, still, still, still), x)
 
     def _at_rest(self, data: Array, x: Array) -> Array:
         """Return inner states and their slopes where the machine has rested; as declared if it never does."""
@@ -176,8 +192,11 @@ def bench_response(
     """
     body = driven_body(model)
     if body.prescribed or body.inertia is None or len(body.drives) > 1:
-        raise ArrangementError(f"body '{body.name}'", "has no single drive whose effort could be calibrated",
-                               next_step="declare a motor with a current, or a torque, as its one input")  # fmt: skip
+        raise ArrangementError(
+            f"body '{body.name}'",
+            "has no single drive whose effort could be calibrated",
+            next_step="declare a motor with a current, or a torque, as its one input",
+        )
     others = [b for b in model.bodies if b.name != body.name and not b.prescribed]
     if others:
         raise ArrangementError(f"body '{others[0].name}'", "moves too", next_step="clamp it")
@@ -231,7 +250,6 @@ def shared_factors(prior: Prior) -> dict[str, tuple[str, ...]]:
 
 
 def _expressions(model: FlatModel, body: MovingBody, prior: Prior) -> _Expressions:
-    s = model.symbols()
     named = [v.name for v in model.states]
     inner = tuple(n for n in named if n not in (body.motion, body.rate))
     shapes = shared_factors(prior)
@@ -247,16 +265,16 @@ def _expressions(model: FlatModel, body: MovingBody, prior: Prior) -> _Expressio
         else v.start * ca.exp(factor.get(v.name, ca.SX(0)))
         for v in model.parameters
     ]
-    arguments = [0.0, ca.vertcat(*[held[n] for n in named]), ca.vertcat(*commanded), ca.vertcat(*numbers)]
-    rates, _, signals, _ = model.equations.call([*arguments, np.zeros(0)])
+    arguments = [ca.vertcat(*[held[n] for n in named]), ca.vertcat(*commanded), ca.vertcat(*numbers)]
+    inserted = [ca.SX(0), *arguments, ca.SX(0, 1)]
+    rates, _, signals, _ = model.equations.call(inserted)
     everything = ca.vertcat(rates, signals)
     acts = np.array(ca.DM(ca.jacobian_sparsity(everything, wide), 1).full().any(axis=0)).ravel()
     kept = [k for k in range(len(shapes)) if acts[k]]
     x = ca.SX.sym("x", len(kept) + 3)
     place = {k: i for i, k in enumerate([*kept, *range(len(shapes), len(shapes) + 3)])}
-    narrow = ca.vertcat(*[x[place[k]] if k in place else 0 for k in range(len(shapes) + 3)])
-    rates, signals = ca.substitute([rates, signals], [wide], [narrow])
-    state = ca.substitute([ca.vertcat(*[held[n] for n in named])], [wide], [narrow])[0]
+    narrow = ca.vertcat(*[x[place[k]] if k in place else ca.SX(0) for k in range(len(shapes) + 3)])
+    rates, signals, state = (ca.substitute(each, wide, narrow) for each in (rates, signals, inserted[1]))
     return _Expressions(
         tuple(list(shapes)[k] for k in kept),
         inner,
@@ -294,4 +312,4 @@ def _functions(given: _Expressions, shown: ca.SX) -> tuple[ca.Function, ca.Funct
 def _inertia(model: FlatModel, name: str) -> float:
     if name in model.values:
         return model.values[name]
-    return float(model.evaluate(model.start(model.states))[name])
+    return float(model.evaluate(model.start(model.states).tolist())[name])

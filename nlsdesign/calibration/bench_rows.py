@@ -148,7 +148,9 @@ def rate_of(motion: Array, step: float, seconds: float) -> tuple[Array, float]:
     s = np.arange(-half, half + 1) / (half + 1.0)
     slope = s * (1.0 - s**2) ** 3
     slope /= float((slope * s).sum()) * (half + 1.0) * step
-    wide = np.concatenate([2 * motion[0] - motion[half:0:-1], motion, 2 * motion[-1] - motion[-2 : -half - 2 : -1]])
+    wide = np.concatenate(
+        [2 * motion[0] - motion[half:0:-1], motion, 2 * motion[-1] - motion[-2 : -half - 2 : -1]]
+    )
     rate: Array = np.convolve(wide, slope[::-1], mode="valid")
     return rate, float(np.linalg.norm(slope))
 
@@ -239,9 +241,7 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[Row]:
     return rows
 
 
-def _row(
-    channel: str, view: Windows, use: NDArray[np.bool_], *parts: Array
-) -> Row:
+def _row(channel: str, view: Windows, use: NDArray[np.bool_], *parts: Array) -> Row:
     error, sigma, slope, compared = parts
     size = float(np.sqrt(np.mean(compared**2)))
     floor = np.maximum(sigma, 1e-6 * size + 1e-12)

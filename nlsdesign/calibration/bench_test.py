@@ -90,7 +90,7 @@ class CalibrationTest(ABC):
 
 @dataclass(frozen=True)
 class HungWeightTest(CalibrationTest):
-    """A weight on a lever at the drive's side of the spring, the output clamped, while the current is swept slowly.
+    """A weight on a lever at the drive's side of the spring, while the motor sweeps slowly.
 
     The torque of the weight is known; approaching each angle from both sides tells friction from torque.
     """
@@ -99,11 +99,15 @@ class HungWeightTest(CalibrationTest):
 
     def _equipped(self, clamped: Assembly) -> Assembly:
         if WEIGHT in dict(clamped.parts):
-            raise ArrangementError(f"part '{WEIGHT}'", "is the name of the weight on the bench", next_step="rename it")
+            raise ArrangementError(
+                f"part '{WEIGHT}'", "is the name of the weight on the bench", next_step="rename it"
+            )
         model = flatten(clamped)
         moved = moved_end(model)
         body = next(b for b in model.bodies if b.name == driven_body(model).name)
-        load = ConstantLoad(load=quantity(0.0, body.domain.effort_unit, source="measured"), domain=body.domain)
+        load = ConstantLoad(
+            load=quantity(0.0, body.domain.effort_unit, source="measured"), domain=body.domain
+        )
         return clamped.with_part(WEIGHT, tie(load, moved))
 
 
@@ -119,7 +123,9 @@ class LoadCellTest(CalibrationTest):
         if inside:
             return clamped  # the machine carries a cell of its own
         if CELL in dict(clamped.parts):
-            raise ArrangementError(f"part '{CELL}'", "is the name of the cell on the bench", next_step="rename it")
+            raise ArrangementError(
+                f"part '{CELL}'", "is the name of the cell on the bench", next_step="rename it"
+            )
         gain = quantity(1.0, "1", source="assumed: class of the load cell", spread=self.instruments.cell)
         return clamped.with_part(CELL, TorqueSensor(of=spring.effort, gain=gain))
 

@@ -104,7 +104,11 @@ def _run(
             torque = 2.0 * arm * machine.area * (stress + hung) * (1.0 if angle >= 0.0 else -1.0)
         rows.append((angle, i, torque))
         push = per_ampere * i - torque - weight[k] * machine.weight_factor - machine.damping * speed
-        level = machine.friction + machine.breakaway * np.exp(-((speed / 0.3) ** 2)) if machine.breakaway else machine.friction
+        level = (
+            machine.friction + machine.breakaway * np.exp(-((speed / 0.3) ** 2))
+            if machine.breakaway
+            else machine.friction
+        )
         speed = prox(speed + STEP * push / machine.inertia, STEP * level / machine.inertia)
         angle += STEP * speed
     angles, currents, torques = np.array(rows).T
@@ -174,7 +178,9 @@ def write_calibration_records(
     units = {"angle_rad": "rad", "current_A": "A", "weight_Nm": "N*m", "cell_Nm": "N*m"}
     for name, table in records.items():
         rows = np.array(list(table.values())).T
-        np.savetxt(folder / f"{name}.csv", rows, fmt="%.7g", delimiter=",", header=",".join(table), comments="")
+        np.savetxt(
+            folder / f"{name}.csv", rows, fmt="%.7g", delimiter=",", header=",".join(table), comments=""
+        )
     heads = [head for head in next(iter(records.values())) if head != "t_s"]
     text = "\n".join(f'[columns.{h}]\nsignal = "{signals[h]}"\nunit = "{units[h]}"\n' for h in heads)
     (folder / "records.toml").write_text(text, encoding="utf-8")
