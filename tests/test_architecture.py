@@ -46,8 +46,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 
 # Above the waist a flat model is enough, but for these: a design and a diagnosis give back a changed copy of
-# the assembly, a measured record takes the noise of its sensors, a calibration puts the machine on its bench. The drawing of a cam needs its geometry;
-# adding a missing effect means declaring the assembly again.
+# the assembly, a measured record takes the noise of its sensors, a calibration puts the machine on a bench.
+# The drawing of a cam needs its geometry; adding a missing effect means declaring the assembly again.
 ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),

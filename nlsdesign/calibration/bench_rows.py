@@ -86,6 +86,8 @@ class Row(NamedTuple):
         Measured minus shown in the unit of the channel, and its noise; shape (rows,).
     slope
         Of the residual over the factors, shape (rows, columns).
+    shown
+        What the model shows, in the unit of the channel, shape (rows,).
     size
         Root mean square of what is compared, in its unit.
     """
@@ -95,6 +97,7 @@ class Row(NamedTuple):
     residual: Array
     sigma: Array
     slope: Array
+    shown: Array
     size: float
 
 
@@ -232,20 +235,21 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[Row]:
         variance += (stiff[0] * blur / gain) ** 2
         use = sound & _in_motion(course, noise, view) & np.isfinite(gain)
         effort = response.inertia * float(np.median(np.abs(mean[1])))
-        rows.append(_row(BALANCE, view, use, effort * error, effort * np.sqrt(variance), effort * by_x,
-                         effort * course.command))  # fmt: skip
+        parts = (effort * error, effort * np.sqrt(variance), effort * by_x, effort * mean[1])
+        rows.append(_row(BALANCE, view.centres, use, *parts, effort * course.command))
     for k, channel in enumerate(response.channels):
         error = view.mean @ run.measured[k] - mean[2 + k]
         variance = (stiff[2 + k] * blur) ** 2 + (noise.channels[k] * narrow) ** 2
-        rows.append(_row(channel, view, sound, error, np.sqrt(variance), -slope[2 + k], run.measured[k]))
+        parts = (error, np.sqrt(variance), -slope[2 + k], mean[2 + k])
+        rows.append(_row(channel, view.centres, sound, *parts, run.measured[k]))
     return rows
 
 
-def _row(channel: str, view: Windows, use: NDArray[np.bool_], *parts: Array) -> Row:
-    error, sigma, slope, compared = parts
+def _row(channel: str, centres: NDArray[np.int64], use: NDArray[np.bool_], *parts: Array) -> Row:
+    error, sigma, slope, shown, compared = parts
     size = float(np.sqrt(np.mean(compared**2)))
     floor = np.maximum(sigma, 1e-6 * size + 1e-12)
-    return Row(channel, view.centres[use], error[use], floor[use], slope[use], size)
+    return Row(channel, centres[use], error[use], floor[use], slope[use], shown[use], size)
 
 
 def _in_motion(course: Course, noise: SampleNoise, view: Windows) -> NDArray[np.bool_]:

@@ -34,7 +34,7 @@ class Instruments:
     weight
         Relative: of the mass and its lever together.
     cell
-        Relative: of the gain of the load cell.
+        Relative: of the gain of a load cell, where the deck does not say how well it is known.
     offset
         Of current and cell, relative to the largest value on the record.
 
@@ -126,8 +126,7 @@ class LoadCellTest(CalibrationTest):
             raise ArrangementError(
                 f"part '{CELL}'", "is the name of the cell on the bench", next_step="rename it"
             )
-        gain = quantity(1.0, "1", source="assumed: class of the load cell", spread=self.instruments.cell)
-        return clamped.with_part(CELL, TorqueSensor(of=spring.effort, gain=gain))
+        return clamped.with_part(CELL, TorqueSensor(of=spring.effort))
 
 
 @dataclass(frozen=True)

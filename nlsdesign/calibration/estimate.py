@@ -266,9 +266,9 @@ def _told_by(
 def _foreign(m: Misfit, size: float) -> MeasurementError:
     return MeasurementError(
         f"record '{m.record}': {m.channel}",
-        f"misses the model by {with_unit(three_digits(m.residual), m.unit)}, {three_digits(m.ratio)} times its "
-        f"noise and {100 * m.residual / size:.0f} % of what was measured, so no number of it can be trusted",
-        next_step="check units, signs and set-up; if they are right, ask `nlsdesign diagnose` what is missing",
+        f"misses the model by {with_unit(three_digits(m.residual), m.unit)}, {three_digits(m.ratio)} times "
+        f"its noise and {100 * m.residual / size:.0f} % of what was measured: no number of it can be trusted",
+        next_step="check units, signs and set-up; if they are right, ask `nlsdesign diagnose`",
     )
 
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
 from ..errors import ArrangementError, InfeasibleError, unknown_name
-from ..model import FlatModel, flatten
+from ..model import flatten
 from ..model.roles import series_spring
 from ..simulation import Prior, declared_prior
 from .bench_response import bench_response
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, LoadCellTest
-from .planned_run import planned_bench, sweep_end
+from .planned_run import drive_ratio, planned_bench, sweep_end
 from .unknowns import Unknowns
 
 Array = NDArray[np.float64]
@@ -84,9 +84,12 @@ class CalibrationPlan:
     angles
         Of the torques, in rad of the series spring.
     ranked_by
-        Name of the error by which they are ranked; the torque of the spring where it is empty.
+        Name of the error by which they are ranked; where it is empty the torque of the spring decides, or in
+        a machine without one all numbers alike.
     left_out
         Why a kind cannot be done, by its title.
+    reach
+        Largest motion of the drive that was planned, by title: as far as its current allows.
     """
 
     now: BoughtBy
@@ -94,6 +97,7 @@ class CalibrationPlan:
     angles: Array
     ranked_by: str = ""
     left_out: Mapping[str, str] = field(default_factory=dict)
+    reach: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for ``plan.json``: errors before and after, and spreads by number."""
@@ -113,6 +117,7 @@ class CalibrationPlan:
                 for each in self.ranked
             ],
             "left_out": dict(self.left_out),
+            "reach": dict(self.reach),
         }
 
 
@@ -154,7 +159,7 @@ def what_calibration_buys(
     wanted = dict(errors or {})
     if rank_by and rank_by not in wanted:
         raise unknown_name("error", rank_by, wanted)
-    angles, slopes = _torque_slopes(flatten(LoadCellTest().on_bench(actuator)), known)
+    angles, slopes = _torque_slopes(actuator, known)
 
     def bought(titles: Sequence[str], learned: Prior) -> BoughtBy:
         sizes = {name: float(error(learned)) for name, error in wanted.items()}
@@ -169,8 +174,16 @@ def what_calibration_buys(
     found = [bought([b.title], _learned(Unknowns(known, [b]))) for b in benches]
     if len(benches) > 1:
         found.append(bought([b.title for b in benches], _learned(Unknowns(known, benches))))
-    ranked = sorted(found, key=lambda each: each.errors[rank_by] if rank_by else each.torque_rms)
-    return CalibrationPlan(bought((), known), tuple(ranked), angles, rank_by, left_out)
+
+    def place(each: BoughtBy) -> float:
+        if rank_by:
+            return each.errors[rank_by]
+        # Without a spring all numbers count alike.
+        return each.torque_rms if len(angles) else float(np.sum(np.log(each.known.deviations)))
+
+    ranked = sorted(found, key=place)
+    reach = {b.title: max(float(np.max(np.abs(r.course.motion))) for _, r in b.runs) for b in benches}
+    return CalibrationPlan(bought((), known), tuple(ranked), angles, rank_by, left_out, reach)
 
 
 def _learned(unknowns: Unknowns) -> Prior:
@@ -180,15 +193,18 @@ def _learned(unknowns: Unknowns) -> Prior:
     return unknowns.learned(still, covariance)
 
 
-def _torque_slopes(model: FlatModel, known: Prior) -> tuple[Array, Array]:
+def _torque_slopes(actuator: Assembly, known: Prior) -> tuple[Array, Array]:
     """Return angles, and derivatives of the relaxed torque with respect to the logarithms of the numbers."""
+    if not flatten(actuator).springs:
+        return np.zeros(0), np.zeros((0, len(known.names)))
+    model = flatten(LoadCellTest().on_bench(actuator))
     spring = series_spring(model)
     response = bench_response(model, known, [spring.effort], balanced=False)
     end = sweep_end(model)
-    angles = np.linspace(-end, end, _ANGLES)
+    angles, ratio = np.linspace(-end, end, _ANGLES), drive_ratio(model)
     slopes = np.zeros((_ANGLES, len(known.names)))
     for k, angle in enumerate(angles):
-        at_rest = response.resting(float(angle), np.zeros(response.columns))
+        at_rest = response.resting(ratio * float(angle), np.zeros(response.columns))
         for j, name in enumerate(response.factors):
             slopes[k, known.place(name)] = at_rest.slope[2, 0, j]
     return angles, slopes

@@ -1,4 +1,4 @@
-"""The run that a calibration is planned with: motions of the machine as declared, and the current they need."""
+"""The runs that a calibration is planned with: motions of the machine as declared, and the current needed."""
 
 from __future__ import annotations
 
@@ -21,9 +21,12 @@ from .unknowns import BenchEvidence, bench_evidence, bench_prior
 
 Array = NDArray[np.float64]
 
-_SAMPLES = 500.0
-"""Hz of a planned record: more adds nothing to windows of tenths of a second."""
-_SLOW, _QUICK = ((0.25, 8.0, 1.0),), ((0.25, 8.0, 1.0), (1.0, 4.0, 1.0), (5.0, 3.0, 0.5))
+_SAMPLES = 1000.0
+"""Hz at which a bench is taken to log."""
+_PER_WINDOW = 24
+"""Samples of a window that are enough; each stands for the mean of several."""
+_SLOW = (0.25, 8.0, 1.0)
+_QUICK = (_SLOW, (1.0, 4.0, 1.0), (5.0, 3.0, 0.5))
 """Frequency in Hz, duration in s, share of the amplitude of each sweep."""
 _PART = 0.75
 """Of the contour that a sweep uses."""
@@ -37,6 +40,8 @@ _COUNT = 2.0 * math.pi / 8192.0
 """Count of the encoder in rad where none is declared, assumed: 13 bit."""
 _FINE = 2e-3
 """Noise of current and cell where none is declared, assumed: share of the largest value."""
+_LONGEST = 0.25
+"""Longest window in s."""
 _FREE_SPEED, _FREE_PERIOD, _FREE_TIME = 25.0, 2.0, 8.0
 """Free run: rad/s, s, s."""
 
@@ -45,6 +50,7 @@ class _Sweep(NamedTuple):
     """A motion over time, and the weight that hangs meanwhile."""
 
     name: str
+    step: float
     motion: Array
     weight: float
 
@@ -80,7 +86,7 @@ def planned_bench(model: FlatModel, kind: CalibrationTest, known: Prior) -> Benc
             raise InfeasibleError(
                 f"{kind.title} of '{model.name}'",
                 f"needs more than {_CURRENT:g} of the limit of its drive for any motion worth the name",
-                next_step="check the limit of the current, or calibrate with a load cell and an outside drive",
+                next_step="check the limit of the current in the deck",
             )
 
 
@@ -117,27 +123,41 @@ def _sweeps(
     model: FlatModel, kind: CalibrationTest, response: BenchResponse, share: float
 ) -> Sequence[_Sweep]:
     if isinstance(kind, FreeRunTest):
-        time = np.arange(0.0, _FREE_TIME, 1.0 / _SAMPLES)
+        step = _step(_LONGEST)
+        time = np.arange(0.0, _FREE_TIME, step)
         turn = 2.0 * math.pi / _FREE_PERIOD
         # Speed as a sine whose size changes, so that acceleration and speed are told apart.
-        rate = (
-            share
-            * _FREE_SPEED
-            * _begun(time)
-            * np.sin(turn * time)
-            * (1.0 + 0.5 * np.sin(0.31 * turn * time))
-        )
-        return [_Sweep("free run", np.cumsum(rate) / _SAMPLES, 0.0)]
-    end = share * sweep_end(model) * _ratio(model)
+        size = share * _FREE_SPEED * (1.0 + 0.5 * np.sin(0.31 * turn * time))
+        return [_Sweep("free run", step, np.cumsum(size * _begun(time) * np.sin(turn * time)) * step, 0.0)]
+    end = share * sweep_end(model) * drive_ratio(model)
+    both = _pulls_both_ways(response, end)
     if isinstance(kind, HungWeightTest):
         held = response.resting(end, np.zeros(response.columns))
-        torque = _WEIGHT * response.inertia * abs(float(held.value[0, 0])) / max(abs(_ratio(model)), 1.0)
-        return [_Sweep(f"weight {w:.3g} N·m", _sine(end, *_SLOW[0]), w) for w in (0.0, torque, -torque)]
-    return [_Sweep(f"{f:g} Hz", _sine(end, f, seconds, part), 0.0) for f, seconds, part in _QUICK]
+        torque = _WEIGHT * response.inertia * abs(float(held.value[0, 0])) * abs(drive_ratio(model))
+        weights = (0.0, torque, -torque) if both else (0.0, torque, 2.0 * torque)
+        return [_sine(f"weight {w:.3g} N·m", end, _SLOW, both)._replace(weight=w) for w in weights]
+    return [_sine(f"{sweep[0]:g} Hz", end, sweep, both) for sweep in _QUICK]
 
 
-def _ratio(model: FlatModel) -> float:
-    """Return the turns of the driven body for one of the spring."""
+def _pulls_both_ways(response: BenchResponse, end: float) -> bool:
+    """Tell whether the spring resists to both sides."""
+    still = np.zeros(response.columns)
+    forth, back = (abs(float(response.resting(angle, still).value[0, 0])) for angle in (end, -end))
+    return back > 0.1 * forth
+
+
+def _step(window: float) -> float:
+    return max(1, int(window * _SAMPLES) // _PER_WINDOW) / _SAMPLES
+
+
+def drive_ratio(model: FlatModel) -> float:
+    """Return the turns of the driven body for one of the spring.
+
+    Parameters
+    ----------
+    model
+        Of the machine.
+    """
     if not model.springs:
         return 1.0
     body, spring = driven_body(model), series_spring(model)
@@ -155,13 +175,17 @@ def _begun(time: Array) -> Array:
     return result
 
 
-def _sine(end: float, frequency: float, seconds: float, part: float) -> Array:
-    time = np.arange(0.0, seconds, 1.0 / _SAMPLES)
-    return part * end * _begun(time) * np.sin(2.0 * math.pi * frequency * (time - 0.2))
+def _sine(name: str, end: float, sweep: tuple[float, float, float], both: bool) -> _Sweep:
+    frequency, seconds, part = sweep
+    step = _step(min(_LONGEST, 0.2 / frequency))
+    time = np.arange(0.0, seconds, step)
+    phase = 2.0 * math.pi * frequency * (time - 0.2)
+    shape = np.sin(phase) if both else 0.5 - 0.5 * np.cos(phase)
+    return _Sweep(name, step, part * end * _begun(time) * shape, 0.0)
 
 
 def _run(model: FlatModel, response: BenchResponse, sweep: _Sweep) -> tuple[str, RecordedRun]:
-    step = 1.0 / _SAMPLES
+    step = sweep.step
     rate = np.gradient(sweep.motion, step)
     still = np.zeros(len(rate))
     course = Course(step, sweep.motion, rate, still, still + sweep.weight)
@@ -172,20 +196,24 @@ def _run(model: FlatModel, response: BenchResponse, sweep: _Sweep) -> tuple[str,
     measured = shown.value[2:]
     count = _declared(model, driven_body(model).motion, "quantum") or _COUNT
     drive = next(iter(driven_body(model).drives), "")
-    noises = [_declared(model, c, "noise") or _FINE * float(np.max(np.abs(m))) for c, m in
-              zip(response.channels, measured, strict=True)]  # fmt: skip
+    noises = [
+        _declared(model, c, "noise") or _FINE * float(np.max(np.abs(m)))
+        for c, m in zip(response.channels, measured, strict=True)
+    ]
+    most = min(_limit(model), 10.0 * float(np.max(np.abs(command))))
+    finer = 1.0 / math.sqrt(max(1.0, step * _SAMPLES))
     noise = SampleNoise(
-        count / math.sqrt(12.0),
-        _declared(model, drive, "noise") or _FINE * min(_limit(model), 10.0 * float(np.max(np.abs(command)))),
+        count / math.sqrt(12.0) * finer,
+        (_declared(model, drive, "noise") or _FINE * most) * finer,
         count,
-        tuple(noises),
+        tuple(n * finer for n in noises),
         window_length(sweep.motion, step),
     )
     return sweep.name, RecordedRun(course, measured, noise, np.zeros(len(rate), dtype=bool))
 
 
 def _declared(model: FlatModel, signal: str, which: str) -> float:
-    """Return the declared count or noise of what reads a signal, or of a reading; zero where there is none."""
+    """Return the declared count or noise of what reads a signal; zero where there is none."""
     for reading in model.readings:
         if signal in (reading.measured, reading.signal):
             for law in reading.laws:

@@ -48,8 +48,8 @@ class BenchEvidence:
     units
         Of each channel.
     deviations
-        Of the instruments: zero of the motion, offset of the command, factor of the weight, offsets of the
-        channels.
+        Of the instruments: zero of the motion, offset of the command, factor of the weight, then offset and
+        gain of each channel.
     """
 
     title: str
@@ -73,17 +73,18 @@ class BenchEvidence:
         x
             Factors, then instruments; shape (unknowns,).
         """
-        own, offsets = x[: self.response.columns], x[self.response.columns :]
+        own, cells = x[: self.response.columns], x[self.response.columns :]
         result = []
         for name, run in self.runs:
-            wide, k = [], 0
+            wide = []
             for row in rows_of(self.response, run, own):
-                more = np.zeros((len(row.residual), len(offsets)))
+                more = np.zeros((len(row.residual), len(cells)))
                 residual = row.residual
                 if row.channel != BALANCE:
-                    more[:, k] = -1.0
-                    residual = residual - offsets[k]
-                    k += 1
+                    k = 2 * self.response.channels.index(row.channel)
+                    more[:, k], more[:, k + 1] = -1.0, -row.shown
+                    residual = residual - cells[k] - cells[k + 1] * row.shown
+                    row = row._replace(slope=(1.0 + cells[k + 1]) * row.slope)
                 if len(residual) >= LEAST_ROWS:
                     wide.append(row._replace(residual=residual, slope=np.hstack([row.slope, more])))
             result.append((name, run.course.step, wide))
@@ -123,8 +124,9 @@ def bench_evidence(
     instruments = kind.instruments
     largest = max(float(np.max(np.abs(run.course.command))) for _, run in runs)
     deviations = [instruments.zero_angle, instruments.offset * largest, instruments.weight]
-    for k in range(len(channels)):
-        deviations.append(instruments.offset * max(float(np.max(np.abs(run.measured[k]))) for _, run in runs))
+    for k, channel in enumerate(channels):
+        most = max(float(np.max(np.abs(run.measured[k]))) for _, run in runs)
+        deviations += [instruments.offset * most, 0.0 if _gain_is_free(model, channel) else instruments.cell]
     body = driven_body(model)
     return BenchEvidence(
         kind.title,
@@ -135,6 +137,12 @@ def bench_evidence(
         {BALANCE: body.domain.effort_unit, **{c: model.variable(c).unit for c in channels}},
         np.array(deviations),
     )
+
+
+def _gain_is_free(model: FlatModel, channel: str) -> bool:
+    """Tell whether the deck says itself how well the gain of a cell is known."""
+    reading = reading_of(model.readings, channel)
+    return any("gain" in law.parameters() and law.parameters()["gain"].spread > 0.0 for law in reading.laws)
 
 
 def recorded_bench(
