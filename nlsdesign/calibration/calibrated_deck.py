@@ -18,13 +18,15 @@ from ..quantity import Quantity, parse_unit, three_digits, to_resolution, typese
 from ..simulation import Prior
 from ..writing import write_text
 from .bench_response import shared_factors
-from .estimate import Estimate
+from .estimate import FITS, Estimate
 
 _MOVED = 0.01
 """Standard deviations of the prior, or share of them, below which a number is left as it was declared."""
 _TOGETHER = 1.0 / 3.0
 """A product or quotient is told where it is known so many times better than either of its numbers."""
 _TOLD = 8
+_RARE = 0.0027
+"""Chance below which all numbers together are suspect: three standard deviations of one."""
 
 
 class CalibratedNumber(NamedTuple):
@@ -83,17 +85,25 @@ class Calibration:
         """Return what a table does not say: suspects, misfits, combinations, what the deck cannot hold."""
         found = self.estimate
         suspect = [
-            f"suspect: {name} moved by {found.strain[name]:+.1f} standard deviations of what was declared: "
-            "the declared value or spread is wrong, or the records show something that the deck lacks; ask "
-            "`nlsdesign diagnose`."
+            f"suspect: {name} moved by {found.strain[name]:+.1f} standard deviations of what was declared, "
+            f"{abs(found.doubt[name]):.1f} times what such records would by chance: its declared value or spread, "
+            "or that of another number of the same product, is wrong, or the records show something that the "
+            "deck lacks; ask `nlsdesign diagnose`."
             for name in found.suspects
         ]
+        if found.chance < _RARE and not suspect:
+            most = sorted(found.strain, key=lambda name: -abs(found.strain[name]))[:4]
+            suspect = [
+                "suspect: taken together the numbers moved further than their spreads allow (one machine in "
+                f"{1.0 / max(found.chance, 1e-12):.0g} would), most of all {', '.join(most)}: a declared "
+                "value or spread is wrong, or the records show something that the deck lacks."
+            ]
         misfit = [
             f"The model misses '{m.channel}' of record '{m.record}' by "
-            f"{with_unit(three_digits(m.residual), m.unit)}, {three_digits(m.ratio)} times its noise; every "
-            "standard deviation was widened for it."
+            f"{with_unit(three_digits(m.residual), m.unit)}, {three_digits(m.ratio)} times its noise; "
+            f"standard deviations were widened by {three_digits(found.inflated)}."
             for m in found.misfits
-            if m.ratio >= found.inflated > 1.0 or (found.inflated > 1.0 and m.ratio > 1.5)
+            if m.ratio > FITS
         ]
         joint = [
             "A deck holds the spread of each number alone; what is known of products and quotients stands in "
@@ -106,6 +116,7 @@ class Calibration:
         return {
             "numbers": [n._asdict() for n in self.numbers],
             "suspects": list(self.estimate.suspects),
+            "chance": self.estimate.chance,
             "widened_by": self.estimate.inflated,
             "records": [{**m._asdict(), "ratio": m.ratio} for m in self.estimate.misfits],
             "words": list(self.words()),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from ..components.assembly.named_parts import Assembly
 from ..errors import ConvergenceError, MeasurementError
@@ -33,12 +35,16 @@ _ENOUGH = 0.1
 """Gain of half a sum of squares that no longer matters: it moves no number by half a standard deviation."""
 _REACH = 12.0
 """Standard deviations of the prior that a number may move."""
-_FITS = 1.5
+FITS = 1.5
 """Misfit in units of the noise up to which a record fits: the noise of a sample is itself an estimate."""
 _FOREIGN = 0.1
 """Share of what is measured that a model may miss; beyond it the record is of another machine or unit."""
 _LEARNED = 0.97
 """Share of the earlier standard deviation below which something was learned of a number."""
+_LEAST_TOLD = 0.02
+"""Share of the variance of a number that records must tell to put its declared value in doubt."""
+_TELLS = 0.1
+"""Share of the variance before, below which a direction is told by the records."""
 _SUSPECT = 3.0
 """Standard deviations of the prior beyond which a number is suspect."""
 
@@ -73,6 +79,8 @@ class Misfit(NamedTuple):
         Root mean square of what the model leaves over, and what noise alone would.
     rows
         How many windows of the record counted.
+    passes
+        How many times the motion went one way.
     """
 
     record: str
@@ -81,6 +89,7 @@ class Misfit(NamedTuple):
     residual: float
     noise: float
     rows: int
+    passes: int
 
     @property
     def ratio(self) -> float:
@@ -98,6 +107,11 @@ class Estimate:
         What was known, and is; the values of ``after`` are the estimates.
     strain
         How far each number has moved, in standard deviations of the prior, by name.
+    doubt
+        The same, in standard deviations of what such records would move it by chance: several numbers of one
+        product are in doubt alike.
+    chance
+        How often a machine as declared would need numbers as far from the declared ones, all taken together.
     misfits
         Of each channel and record.
     told_by
@@ -109,19 +123,29 @@ class Estimate:
     before: Prior
     after: Prior
     strain: dict[str, float]
+    doubt: dict[str, float]
+    chance: float
     misfits: tuple[Misfit, ...]
     told_by: dict[str, str]
     files: tuple[str, ...]
 
     @property
     def suspects(self) -> tuple[str, ...]:
-        """Numbers that moved further than three standard deviations of their prior."""
-        return tuple(name for name, z in self.strain.items() if abs(z) > _SUSPECT)
+        """Numbers whose declared value or spread is in doubt by more than three standard deviations."""
+        return tuple(name for name, z in self.doubt.items() if abs(z) > _SUSPECT)
 
     @property
     def inflated(self) -> float:
-        """Factor by which standard deviations were widened, as the model does not fit within the noise."""
-        return max([1.0, *(m.ratio / _FITS for m in self.misfits)])
+        """Factor by which standard deviations were widened, as the model does not fit within the noise.
+
+        What a model lacks comes again with every pass of the motion, so passes do not average it out.
+        """
+        return _widened(self.misfits)
+
+
+def _widened(misfits: Sequence[Misfit]) -> float:
+    passes = sum(m.passes for m in misfits)
+    return 1.0 + max([0.0, *(m.ratio / FITS - 1.0 for m in misfits)]) * math.sqrt(passes)
 
 
 def load_calibration(
@@ -213,37 +237,55 @@ def estimate(
 
     reach = np.full(unknowns.count, _REACH)
     ended = minimise(rows, np.zeros(unknowns.count), (-reach, reach), evaluations=_EVALUATIONS, least=_ENOUGH)
-    if not ended.converged:
-        raise ConvergenceError(
-            "calibration", "did not converge", next_step="check the units and the set-up of the records"
-        )
-    return _estimated(unknowns, ended.x)
-
-
-def _estimated(unknowns: Unknowns, y: Array) -> Estimate:
-    found = unknowns.pieces(y)
+    found = unknowns.pieces(ended.x)
     misfits = tuple(_misfit(piece, row, bench.units[row.channel]) for bench, piece, row in found)
     for m, (_, _, row) in zip(misfits, found, strict=True):
         if m.ratio > _SUSPECT and m.residual > _FOREIGN * row.size:
             raise _foreign(m, row.size)
+    if not ended.converged:
+        raise ConvergenceError(
+            "calibration", "did not converge", next_step="check the units and the set-up of the records"
+        )
+    return _estimated(unknowns, ended.x, found, misfits)
+
+
+def _estimated(
+    unknowns: Unknowns,
+    y: Array,
+    found: Sequence[tuple[BenchEvidence, Piece, Row]],
+    misfits: tuple[Misfit, ...],
+) -> Estimate:
     robust = []
     for _, piece, _ in found:
         residual, slope = huber_rows(piece.residual, piece.slope, _HUBER)
         robust.append(piece._replace(residual=residual, slope=slope))
     covariance = robust_covariance(robust, np.eye(unknowns.count))
-    widened = max([1.0, *(m.ratio / _FITS for m in misfits)]) ** 2
-    after = unknowns.learned(y, widened * covariance)
+    after = unknowns.learned(y, _widened(misfits) ** 2 * covariance)
     known, size = unknowns.known, len(unknowns.shapes)
     deviations = known.only(unknowns.shapes).deviations
-    strain = (unknowns.root @ y[:size]) / np.where(deviations > 0.0, deviations, 1.0)
+    scale = np.where(deviations > 0.0, deviations, 1.0)
+    strain = (unknowns.root @ y[:size]) / scale
+    # Of a number that shares its part in a product the records tell a share of the strain only.
+    left = np.diag(unknowns.root @ covariance[:size, :size] @ unknowns.root.T) / scale**2
+    doubt = strain / np.sqrt(np.maximum(1.0 - left, _LEAST_TOLD))
     return Estimate(
         known,
         after,
         dict(zip(unknowns.shapes, strain.tolist(), strict=True)),
+        dict(zip(unknowns.shapes, doubt.tolist(), strict=True)),
+        _chance(y[:size], covariance[:size, :size]),
         misfits,
         _told_by(unknowns, found, after),
         tuple(bench.source for bench in unknowns.benches),
     )
+
+
+def _chance(y: Array, covariance: Array) -> float:
+    """Return how often numbers as declared would move as far in the directions that the records tell."""
+    strength, axes = np.linalg.eigh(covariance)
+    told = strength < _TELLS
+    squares = float(np.sum((axes[:, told].T @ y) ** 2))
+    return float(chi2.sf(squares, max(1, int(np.sum(told)))))
 
 
 def _told_by(
@@ -276,6 +318,5 @@ def _misfit(piece: Piece, row: Row, unit: str) -> Misfit:
     # The median of the squares would hide a misfit; a clipped mean square forgives an outlier only.
     clipped = np.minimum(np.abs(piece.residual), max(_HUBER, 3.0 * float(np.median(np.abs(piece.residual)))))
     noise = float(np.sqrt(np.mean(row.sigma**2)))
-    return Misfit(
-        piece.record, row.channel, unit, float(np.sqrt(np.mean(clipped**2))) * noise, noise, len(row.sigma)
-    )
+    residual = float(np.sqrt(np.mean(clipped**2))) * noise
+    return Misfit(piece.record, row.channel, unit, residual, noise, len(row.sigma), row.passes)
