@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..components.assembly.named_parts import Assembly
+from ..deck import Written
 from ..errors import ExportError, MeasurementError, NlsError
 from ..quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
 from ..simulation import Prior
@@ -44,6 +45,8 @@ class CalibratedNumber(NamedTuple):
         How far it moved, in standard deviations of what was known.
     told_by
         What it is known from; empty where the records say nothing of it.
+    members
+        How many numbers of a row share its factor; the first stands for all.
     """
 
     name: str
@@ -54,6 +57,7 @@ class CalibratedNumber(NamedTuple):
     spread_after: float
     strain: float
     told_by: str
+    members: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +90,9 @@ class Calibration:
         found = self.estimate
         suspect = [
             f"suspect: {name} moved by {found.strain[name]:+.1f} standard deviations of what was declared, "
-            f"{abs(found.doubt[name]):.1f} times what such records would by chance: its declared value or spread, "
-            "or that of another number of the same product, is wrong, or the records show something that the "
-            "deck lacks; ask `nlsdesign diagnose`."
+            f"{abs(found.doubt[name]):.1f} times what such records would by chance: its declared value or "
+            "spread, or that of another number of the same product, is wrong, or the records show something "
+            "that the deck lacks; ask `nlsdesign diagnose`."
             for name in found.suspects
         ]
         if found.chance < _RARE and not suspect:
@@ -153,7 +157,6 @@ def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) 
         rows.setdefault(before.names[k].partition("[")[0], []).append(k)
     when = (day or date.today()).isoformat()
     files = ", ".join(Path(f).name or f for f in found.files)
-    new: dict[str, Quantity | float | tuple[float, ...]] = {}
     kept = []
     machine = actuator
     for name, places in rows.items():
@@ -164,10 +167,11 @@ def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) 
             machine = machine.with_values(new)
         except NlsError as error:
             kept.append(f"{name} stays as declared: {error}")  # the others are still of use
+    shared = shared_factors(before)
+    shared = shared_factors(before)
+    refused = {text.partition(" ")[0] for text in kept}
     taken = [
-        k
-        for k in changed
-        if not any(text.startswith(before.names[k].partition("[")[0] + " ") for text in kept)
+        k for k in changed if before.names[k] in shared and before.names[k].partition("[")[0] not in refused
     ]
     numbers = tuple(
         CalibratedNumber(
@@ -179,6 +183,7 @@ def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) 
             spreads[before.names[k]],
             strain[before.names[k]],
             found.told_by.get(before.names[k], ""),
+            len(shared[before.names[k]]),
         )
         for k in taken
     )
@@ -190,8 +195,10 @@ def _calibrated_row(old: Quantity, name: str, places: Sequence[int], found: Esti
     names = found.after.names
     for k in places:
         index = int(names[k].partition("[")[2].rstrip("]")) - 1 if "[" in names[k] else 0
-        value = float(found.after.values[k])
-        values[index] = to_resolution(value, abs(value) * float(found.after.deviations[k]))
+        factor = parse_unit(old.unit).factor
+        value = float(found.after.values[k]) / factor
+        error = abs(value) * float(found.after.deviations[k])
+        values[index] = Written(repr(to_resolution(value, error))).times(factor)
     members = [n for n in names if n.partition("[")[0] == name]
     spread = float(f"{max(spreads[n] for n in members):.3g}")
     few = len(values) <= 4
@@ -335,7 +342,7 @@ def shown_numbers(numbers: Sequence[CalibratedNumber]) -> list[tuple[str, ...]]:
     """
     return [
         (
-            n.name,
+            n.name if n.members == 1 else f"{n.name} and {n.members - 1} more, one factor",
             f"{n.before / parse_unit(n.unit).factor:.4g} ± {100 * n.spread_before:.2g} %",
             f"{n.after / parse_unit(n.unit).factor:.4g} ± {100 * n.spread_after:.2g} %",
             typeset_unit(n.unit),

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import ConvergenceError, MeasurementError
-from ..identification import RecordSet, load_record
+from ..errors import ConvergenceError, MeasurementError, ValueRangeError, unknown_name
+from ..identification import Finding, RecordSet, load_record
 from ..identification.estimation.covariance import Piece, robust_covariance
 from ..identification.estimation.levenberg_marquardt import minimise
 from ..identification.records.table_files import table_files
@@ -23,7 +23,7 @@ from ..model import flatten
 from ..quantity import three_digits, with_unit
 from ..simulation import Prior, declared_prior
 from .bench_rows import Row
-from .bench_test import CalibrationTest
+from .bench_test import WEIGHT, CalibrationTest
 from .unknowns import BenchEvidence, Unknowns, recorded_bench
 
 Array = NDArray[np.float64]
@@ -41,10 +41,12 @@ _FOREIGN = 0.1
 """Share of what is measured that a model may miss; beyond it the record is of another machine or unit."""
 _LEARNED = 0.97
 """Share of the earlier standard deviation below which something was learned of a number."""
-_LEAST_TOLD = 0.02
+_LEAST_TOLD = 0.1
 """Share of the variance of a number that records must tell to put its declared value in doubt."""
 _TELLS = 0.1
 """Share of the variance before, below which a direction is told by the records."""
+_SAME = 1e-9
+"""Share by which two readings of one number may differ."""
 _SUSPECT = 3.0
 """Standard deviations of the prior beyond which a number is suspect."""
 
@@ -180,10 +182,51 @@ def load_calibration(
     records = RecordSet(
         tuple(record for one in sets for record in one.records),
         sets[0].columns,
-        tuple(finding for one in sets for finding in one.findings),
+        tuple(finding for one in sets for finding in one.findings if not _hangs(finding, one)),
         tuple(remark for one in sets for remark in one.remarks),
     )
     return CalibrationRecords(kind, records, str(folder))
+
+
+def _hangs(finding: Finding, records: RecordSet) -> bool:
+    """Tell whether a finding says that a weight stays the same, as it should."""
+    heads = [c.name for c in records.columns if c.signal == f"{WEIGHT}.torque"]
+    return "constant" in finding.text and any(f"column '{head}'" in finding.place for head in heads)
+
+
+def prior_of(actuator: Assembly, given: Prior | None) -> Prior:
+    """Return what is known of a machine: as given, or the declared spreads.
+
+    Parameters
+    ----------
+    actuator
+        As declared.
+    given
+        Of this machine.
+
+    Raises
+    ------
+    UnknownNameError
+        If the machine has no such number.
+    ValueRangeError
+        If a number stands for another value in the deck.
+    """
+    model = flatten(actuator)
+    if given is None:
+        return declared_prior(model)
+    values = model.values
+    for name, value in zip(given.names, given.values, strict=True):
+        if name not in values:
+            raise unknown_name("number", name, values)
+        if abs(values[name] - value) > _SAME * abs(value):
+            raise ValueRangeError(
+                f"{name} = {value:g} in what is known, {values[name]:g} in the deck",
+                "must be the same: what is known is known about these values",
+                next_step="give the deck that was written with it",
+            )
+    numbers = [model.variable(name) for name in given.names]
+    ends = [np.array([getattr(v, end) for v in numbers], dtype=float) for end in ("minimum", "maximum")]
+    return Prior(given.names, given.values, given.covariance, *ends)
 
 
 def estimate(
@@ -214,7 +257,7 @@ def estimate(
     """
     if not tests:
         raise MeasurementError("calibration", "has no records", next_step="give those of at least one kind")
-    known = prior or declared_prior(flatten(actuator))
+    known = prior_of(actuator, prior)
     benches = [
         recorded_bench(
             flatten(test.kind.on_bench(actuator)),

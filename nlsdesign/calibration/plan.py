@@ -13,9 +13,10 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ArrangementError, InfeasibleError, unknown_name
 from ..model import flatten
 from ..model.roles import series_spring
-from ..simulation import Prior, declared_prior
+from ..simulation import Prior
 from .bench_response import bench_response
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, LoadCellTest
+from .estimate import prior_of
 from .planned_run import drive_ratio, planned_bench, sweep_end
 from .unknowns import Unknowns
 
@@ -155,7 +156,7 @@ def what_calibration_buys(
     UnknownNameError
         If there is no error of that name.
     """
-    known = prior or declared_prior(flatten(actuator))
+    known = prior_of(actuator, prior)
     wanted = dict(errors or {})
     if rank_by and rank_by not in wanted:
         raise unknown_name("error", rank_by, wanted)

@@ -37,6 +37,7 @@ class Machine:
     strains: tuple[float, ...] = tuple(e / 0.0125 for e in RUBBER.engage)
     modulus: float = RUBBER.k
     viscosity: float = RUBBER.eta
+    stiffness: float = 0.0  # N·m/rad: of a linear spring in the place of cam and rubber
     breakaway: float = 0.0  # beyond sliding friction, falls over 0.3 rad/s; nobody declares it
     zero: float = 0.0  # rad, of the encoder
     weight_factor: float = 1.0
@@ -91,8 +92,8 @@ def _run(
         if wanted is not None and wanted_rate is not None:
             i += k_p * (wanted[k] - angle) + k_d * (wanted_rate[k] - speed)
             i = min(max(i, -20.0), 20.0)
-        torque = 0.0
-        if spring:
+        torque = machine.stiffness * angle if spring else 0.0
+        if spring and not machine.stiffness:
             place = abs(angle) / GRID
             j = int(place)
             share = place - j
