@@ -6,30 +6,30 @@ It never adds an effect to a machine: what does not fit is refused, or widens wh
 
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, Instruments, LoadCellTest
 from .calibrated_deck import (
+    CalibratedMachine,
     CalibratedNumber,
-    Calibration,
     calibrated,
     known_together,
     read_joint_numbers,
     shown_numbers,
     write_calibration,
 )
-from .estimate import CalibrationRecords, Estimate, Misfit, estimate, load_calibration
+from .estimate import CalibrationRecords, ChannelMisfit, Estimate, estimate, load_calibration
 from .plan import BoughtBy, CalibrationPlan, what_calibration_buys
 
 __all__ = [
     "BoughtBy",
+    "CalibratedMachine",
     "CalibratedNumber",
-    "Calibration",
     "CalibrationPlan",
     "CalibrationRecords",
     "CalibrationTest",
+    "ChannelMisfit",
     "Estimate",
     "FreeRunTest",
     "HungWeightTest",
     "Instruments",
     "LoadCellTest",
-    "Misfit",
     "calibrated",
     "estimate",
     "known_together",

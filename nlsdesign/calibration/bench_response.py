@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 BALANCE = "balance of the drive"
 
 
-class Course(NamedTuple):
+class BenchCourse(NamedTuple):
     """What is known of a run at evenly spaced times, arrays of shape (n,).
 
     Parameters
@@ -104,7 +104,7 @@ class BenchResponse:
         """Number of factors, those of the instruments included."""
         return len(self.factors) + 3
 
-    def along(self, course: Course, x: Array) -> Shown:
+    def along(self, course: BenchCourse, x: Array) -> Shown:
         """Return what the machine shows along a course.
 
         Parameters
@@ -150,7 +150,7 @@ class BenchResponse:
             Factors, shape (columns,).
         """
         still = np.zeros(1)
-        return self.along(Course(1.0, still + motion, still, still, still), x)
+        return self.along(BenchCourse(1.0, still + motion, still, still, still), x)
 
     def _at_rest(self, data: Array, x: Array) -> Array:
         """Return inner states and their slopes where the machine has rested; as declared if it never does."""

@@ -1,8 +1,8 @@
 """Samples of a bench become rows of least squares: means under smooth windows, each with its noise.
 
 A balance of efforts is multiplied by a smooth window and integrated; by parts the acceleration becomes the
-measured motion times the second derivative of the window, so counts of an encoder are never differentiated
-and the window blurs all terms alike. Source: Shinbrot 1957 (modulating functions).
+measured motion times the second derivative of the window (a modulating function), so counts of an encoder are
+never differentiated twice and the window blurs all terms alike.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from .bench_response import BALANCE, BenchResponse, Course
+from .bench_response import BALANCE, BenchCourse, BenchResponse
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ _LEAST_SAMPLES, _LONGEST = 13, 0.25
 _SHARE = 0.2
 """Of the time in which the motion turns once by a radian of its phase: a window sees little of a period."""
 _STRIDE = 0.6
-"""Windows apart, in lengths."""
+"""SmoothWindows apart, in lengths."""
 _MOVING = 5.0
 """Standard deviations of the noise of the rate above which a sample moves for certain."""
 
@@ -52,7 +52,7 @@ class SampleNoise(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class SmoothWindows:
     """Smooth windows over samples.
 
     Parameters
@@ -73,7 +73,7 @@ class Windows:
     length: int
 
 
-class Row(NamedTuple):
+class BenchRows(NamedTuple):
     """Rows of one channel of one record.
 
     Parameters
@@ -104,7 +104,7 @@ class Row(NamedTuple):
     passes: int
 
 
-def windows(count: int, step: float, seconds: float) -> Windows:
+def windows(count: int, step: float, seconds: float) -> SmoothWindows:
     """Return windows over a record.
 
     Parameters
@@ -130,7 +130,7 @@ def windows(count: int, step: float, seconds: float) -> Windows:
     columns = (centres[:, None] + np.arange(-half, half + 1)[None]).ravel()
     rows = np.repeat(np.arange(len(centres)), len(s))
     shape = (len(centres), count)
-    return Windows(
+    return SmoothWindows(
         csr_matrix((np.tile(mean, len(centres)), (rows, columns)), shape),
         csr_matrix((np.tile(second, len(centres)), (rows, columns)), shape),
         centres,
@@ -193,13 +193,13 @@ class RecordedRun(NamedTuple):
         Samples that are faulty, shape (n,).
     """
 
-    course: Course
+    course: BenchCourse
     measured: Array
     noise: SampleNoise
     masked: NDArray[np.bool_]
 
 
-def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[Row]:
+def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRows]:
     """Return the rows of all channels of one record, the balance of the drive first.
 
     The balance is solved for the command: its noise is what the balance is uncertain by, and so no number
@@ -250,14 +250,16 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[Row]:
     return rows
 
 
-def _row(channel: str, centres: NDArray[np.int64], use: NDArray[np.bool_], *parts: Array, passes: int) -> Row:
+def _row(
+    channel: str, centres: NDArray[np.int64], use: NDArray[np.bool_], *parts: Array, passes: int
+) -> BenchRows:
     error, sigma, slope, shown, compared = parts
     size = float(np.sqrt(np.mean(compared**2)))
     floor = np.maximum(sigma, 1e-6 * size + 1e-12)
-    return Row(channel, centres[use], error[use], floor[use], slope[use], shown[use], size, passes)
+    return BenchRows(channel, centres[use], error[use], floor[use], slope[use], shown[use], size, passes)
 
 
-def _in_motion(course: Course, noise: SampleNoise, view: Windows) -> NDArray[np.bool_]:
+def _in_motion(course: BenchCourse, noise: SampleNoise, view: SmoothWindows) -> NDArray[np.bool_]:
     """Tell in which windows every sample moves, in one direction: only there dry friction is known."""
     factor = rate_of(course.motion, course.step, 0.5 * noise.window)[1]
     least = _MOVING * max(noise.motion, 1e-12) * factor

@@ -61,7 +61,7 @@ class CalibratedNumber(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class CalibratedMachine:
     """A machine with calibrated numbers.
 
     Parameters
@@ -128,7 +128,7 @@ class Calibration:
         }
 
 
-def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) -> Calibration:
+def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) -> CalibratedMachine:
     """Return a machine with the numbers that a calibration has found.
 
     A row of numbers has one spread in a deck: it takes the largest of its numbers, so nothing is called
@@ -187,7 +187,7 @@ def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) 
         )
         for k in taken
     )
-    return Calibration(machine, found, numbers, tuple(kept))
+    return CalibratedMachine(machine, found, numbers, tuple(kept))
 
 
 def _calibrated_row(old: Quantity, name: str, places: Sequence[int], found: Estimate, how: str) -> Quantity:
@@ -240,7 +240,9 @@ def _percent(deviation: float) -> str:
     return f"{100.0 * math.expm1(deviation):.2g} %"
 
 
-def write_calibration(result: Calibration, folder: Path, *, deck: Path | None = None) -> dict[str, Path]:
+def write_calibration(
+    result: CalibratedMachine, folder: Path, *, deck: Path | None = None
+) -> dict[str, Path]:
     """Write the calibrated deck, what is known jointly, and the result; never over the deck that was read.
 
     Parameters
@@ -285,7 +287,7 @@ def write_calibration(result: Calibration, folder: Path, *, deck: Path | None = 
     return paths
 
 
-def _joint_text(result: Calibration) -> str:
+def _joint_text(result: CalibratedMachine) -> str:
     after = result.estimate.after
     machine = result.actuator.quantities()
 

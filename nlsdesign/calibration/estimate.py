@@ -22,7 +22,7 @@ from ..identification.statistics.losses import huber_rows
 from ..model import flatten
 from ..quantity import three_digits, with_unit
 from ..simulation import Prior, declared_prior
-from .bench_rows import Row
+from .bench_rows import BenchRows
 from .bench_test import WEIGHT, CalibrationTest
 from .unknowns import BenchEvidence, Unknowns, recorded_bench
 
@@ -36,7 +36,7 @@ _ENOUGH = 0.1
 _REACH = 12.0
 """Standard deviations of the prior that a number may move."""
 FITS = 1.5
-"""Misfit in units of the noise up to which a record fits: the noise of a sample is itself an estimate."""
+"""Residual in units of the noise up to which a record fits: the noise of a sample is itself an estimate."""
 _FOREIGN = 0.1
 """Share of what is measured that a model may miss; beyond it the record is of another machine or unit."""
 _LEARNED = 0.97
@@ -70,7 +70,7 @@ class CalibrationRecords:
     source: str = ""
 
 
-class Misfit(NamedTuple):
+class ChannelMisfit(NamedTuple):
     """How well one channel of one record fits.
 
     Parameters
@@ -127,7 +127,7 @@ class Estimate:
     strain: dict[str, float]
     doubt: dict[str, float]
     chance: float
-    misfits: tuple[Misfit, ...]
+    misfits: tuple[ChannelMisfit, ...]
     told_by: dict[str, str]
     files: tuple[str, ...]
 
@@ -145,7 +145,7 @@ class Estimate:
         return _widened(self.misfits)
 
 
-def _widened(misfits: Sequence[Misfit]) -> float:
+def _widened(misfits: Sequence[ChannelMisfit]) -> float:
     passes = sum(m.passes for m in misfits)
     return 1.0 + max([0.0, *(m.ratio / FITS - 1.0 for m in misfits)]) * math.sqrt(passes)
 
@@ -236,8 +236,7 @@ def estimate(
 
     Each record is simulated along its measured motion; measured efforts and the balance of the drive are
     compared, windows of the record are rows. Outliers count as Huber says (Huber 1964). The covariance is
-    that of what the residuals scatter (Liang and Zeger 1986), widened where the model does not fit within
-    the noise.
+    that of what the residuals scatter, widened where the model does not fit within the noise.
 
     Parameters
     ----------
@@ -295,8 +294,8 @@ def estimate(
 def _estimated(
     unknowns: Unknowns,
     y: Array,
-    found: Sequence[tuple[BenchEvidence, Piece, Row]],
-    misfits: tuple[Misfit, ...],
+    found: Sequence[tuple[BenchEvidence, Piece, BenchRows]],
+    misfits: tuple[ChannelMisfit, ...],
 ) -> Estimate:
     robust = []
     for _, piece, _ in found:
@@ -332,7 +331,7 @@ def _chance(y: Array, covariance: Array) -> float:
 
 
 def _told_by(
-    unknowns: Unknowns, found: Sequence[tuple[BenchEvidence, Piece, Row]], after: Prior
+    unknowns: Unknowns, found: Sequence[tuple[BenchEvidence, Piece, BenchRows]], after: Prior
 ) -> dict[str, str]:
     """Return which bench alone would leave the least uncertainty of each number that became better known."""
     alone = {}
@@ -348,7 +347,7 @@ def _told_by(
     return told
 
 
-def _foreign(m: Misfit, size: float) -> MeasurementError:
+def _foreign(m: ChannelMisfit, size: float) -> MeasurementError:
     return MeasurementError(
         f"record '{m.record}': {m.channel}",
         f"misses the model by {with_unit(three_digits(m.residual), m.unit)}, {three_digits(m.ratio)} times "
@@ -357,9 +356,9 @@ def _foreign(m: Misfit, size: float) -> MeasurementError:
     )
 
 
-def _misfit(piece: Piece, row: Row, unit: str) -> Misfit:
+def _misfit(piece: Piece, row: BenchRows, unit: str) -> ChannelMisfit:
     # The median of the squares would hide a misfit; a clipped mean square forgives an outlier only.
     clipped = np.minimum(np.abs(piece.residual), max(_HUBER, 3.0 * float(np.median(np.abs(piece.residual)))))
     noise = float(np.sqrt(np.mean(row.sigma**2)))
     residual = float(np.sqrt(np.mean(clipped**2))) * noise
-    return Misfit(piece.record, row.channel, unit, residual, noise, len(row.sigma), row.passes)
+    return ChannelMisfit(piece.record, row.channel, unit, residual, noise, len(row.sigma), row.passes)

@@ -135,7 +135,7 @@ def what_calibration_buys(
     Each is planned as a motion of the machine with its declared numbers, counts and noises; where the deck
     declares no noise, one is assumed. The Fisher information of all its samples is added to what is known,
     the errors of the instruments are unknowns of their own, so the result is the least covariance that such a
-    record can leave to first order (the Bayesian bound of Van Trees 1968). Each kind alone, and all together.
+    record can leave to first order, the Bayesian Cramér–Rao bound. Each kind alone, and all together.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from ..model import FlatModel
 from ..model.readings import reading_of
 from ..model.roles import driven_body, series_spring
 from ..simulation import Prior
-from .bench_response import BenchResponse, Course, bench_response
+from .bench_response import BenchCourse, BenchResponse, bench_response
 from .bench_rows import RecordedRun, SampleNoise, window_length
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest
 from .unknowns import BenchEvidence, bench_evidence, bench_prior
@@ -188,7 +188,7 @@ def _run(model: FlatModel, response: BenchResponse, sweep: _Sweep) -> tuple[str,
     step = sweep.step
     rate = np.gradient(sweep.motion, step)
     still = np.zeros(len(rate))
-    course = Course(step, sweep.motion, rate, still, still + sweep.weight)
+    course = BenchCourse(step, sweep.motion, rate, still, still + sweep.weight)
     free = response.along(course, np.zeros(response.columns))
     command = (np.gradient(rate, step) - free.value[0]) / free.value[1]
     course = course._replace(command=command)

@@ -17,8 +17,8 @@ from ..model import FlatModel
 from ..model.readings import reading_of
 from ..model.roles import driven_body
 from ..simulation import Prior, declared_prior
-from .bench_response import BALANCE, BenchResponse, Course, bench_response, shared_factors
-from .bench_rows import RecordedRun, Row, SampleNoise, rate_of, rows_of, window_length
+from .bench_response import BALANCE, BenchCourse, BenchResponse, bench_response, shared_factors
+from .bench_rows import BenchRows, RecordedRun, SampleNoise, rate_of, rows_of, window_length
 from .bench_test import WEIGHT, CalibrationTest, HungWeightTest
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ class BenchEvidence:
         """Number of factors and of what the instruments may be wrong by."""
         return len(self.response.factors) + len(self.deviations)
 
-    def rows(self, x: Array) -> list[tuple[str, float, list[Row]]]:
+    def rows(self, x: Array) -> list[tuple[str, float, list[BenchRows]]]:
         """Return name, time between samples, and rows of all records.
 
         Parameters
@@ -225,7 +225,7 @@ def _run(
     rate = rate_of(angle, record.step, 0.5 * length)[0]
     # A window needs no more than some dozen samples: each stands for the mean of several.
     several = max(1, int(length / record.step) // _PER_WINDOW)
-    course = Course(
+    course = BenchCourse(
         record.step * several, *(_means(np.asarray(v), several) for v in (angle, rate, command, hung))
     )
     measured = np.array([_means(record.trace[c], several) for c in channels])
@@ -280,13 +280,18 @@ class Unknowns:
         self._places = list(np.cumsum([len(self.shapes), *(b.unknowns for b in benches)]))
         self.count = int(self._places[-1])
 
-    def pieces(self, y: Array) -> list[tuple[BenchEvidence, Piece, Row]]:
+    def pieces(self, y: Array) -> list[tuple[BenchEvidence, Piece, BenchRows]]:
         """Return the rows of all records in units of their noise.
 
         Parameters
         ----------
         y
             Unknowns, shape (count,).
+
+        Raises
+        ------
+        MeasurementError
+            If the machine moves nowhere long enough.
         """
         result = []
         for bench, place in zip(self.benches, self._places, strict=False):

@@ -25,8 +25,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.option("--kind", "kinds", multiple=True, type=click.Choice(KINDS),
               help="What was done; repeatable, once for each --records.")  # fmt: skip
 @click.option("--records", "folders", multiple=True, type=click.Path(path_type=Path),
-              help="Folder of records of that kind; repeatable.")  # fmt: skip
-@click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
+              help="Folder of records of that kind, with its records.toml; repeatable.")  # fmt: skip
 @click.option("--known", type=_file, default=None,
               help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip
 @click.option("--plan", is_flag=True, help="Rank calibrations by what they would buy; needs no records.")
@@ -36,7 +35,6 @@ def calibrate(
     deck_name: str,
     kinds: tuple[str, ...],
     folders: tuple[Path, ...],
-    mapping: Path | None,
     known: Path | None,
     plan: bool,
     out: Path,
@@ -79,7 +77,7 @@ def calibrate(
         )
     with steps.step("read"):
         tests = [
-            load_calibration(actuator, _kind(kind), folder, mapping=mapping)
+            load_calibration(actuator, _kind(kind), folder)
             for kind, folder in zip(kinds, folders, strict=True)
         ]
     with steps.step("estimate"):
@@ -117,8 +115,8 @@ def _show_plan(ranked: CalibrationPlan, as_json: bool) -> None:
     rows = [("nothing", f"{1e3 * ranked.now.torque_rms:.3g}", "")]
     for each in ranked.ranked:
         best = list(each.narrowed(ranked.now.known).items())[:4]
-        told = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in best)
-        rows.append((each.title, f"{1e3 * each.torque_rms:.3g}", told))
+        spreads = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in best)
+        rows.append((each.title, f"{1e3 * each.torque_rms:.3g}", spreads))
     show_table("What a calibration buys", ("calibration", "spring torque, mN·m", "spreads, best four"), rows)
     for title, reason in ranked.left_out.items():
         click.echo(f"{title} is left out: {reason}")

@@ -1,4 +1,4 @@
-"""Calibrations of machines that the rig simulates without model code of the package: the truth lies within."""
+"""Calibrations of machines that the rig simulates without model code of the package: where the truth lies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nlsdesign.calibration import Estimate, estimate
 from nlsdesign.calibration.bench_response import bench_response
 from nlsdesign.calibration.bench_test import LoadCellTest
 from nlsdesign.model import flatten
-from tests.calibrated import CAM, deck, misses, read, recorded, truth
+from tests.calibrated import deck, misses, read, recorded, truth
 from tests.renamed import exchanged, renamed
 from tests.rig.calibration_bench import Logger, Machine, drawn_machine, torque_curve
 

@@ -25,7 +25,7 @@ from nlsdesign.calibration import (
     what_calibration_buys,
     write_calibration,
 )
-from nlsdesign.calibration.bench_response import Course, bench_response
+from nlsdesign.calibration.bench_response import BenchCourse, bench_response
 from nlsdesign.calibration.bench_rows import windows
 from nlsdesign.components import Assembly, CoulombFriction
 from nlsdesign.components.assembly.deck_writer import declare
@@ -75,7 +75,7 @@ def test_the_balance_of_a_linear_spring_is_that_of_newton() -> None:
     model = flatten(HungWeightTest().on_bench(deck(LINEAR)))
     response = bench_response(model, declared_prior(model), [])
     time = 1e-3 * np.arange(50)
-    course = Course(1e-3, 0.3 + 0.2 * time, np.full(50, 0.2), 5.0 + time, np.full(50, -0.4))
+    course = BenchCourse(1e-3, 0.3 + 0.2 * time, np.full(50, 0.2), 5.0 + time, np.full(50, -0.4))
     shown = response.along(course, np.zeros(response.columns))
     effort = 4.0 * 0.055 * course.command + 0.4 - 3.4 * course.motion - 1e-3 * 0.2 - 0.02
     assert shown.value[0] == pytest.approx(effort / 5.97e-4, rel=1e-9)
@@ -89,7 +89,7 @@ def test_friction_turns_at_once_on_the_bench() -> None:
     response = bench_response(model, declared_prior(model), [])
     still = np.zeros(2)
     shown = response.along(
-        Course(1e-3, still, np.array([1e-3, -1e-3]), still, still), np.zeros(response.columns)
+        BenchCourse(1e-3, still, np.array([1e-3, -1e-3]), still, still), np.zeros(response.columns)
     )
     assert shown.value[0] * 5.97e-4 == pytest.approx([-0.020001, 0.020001], rel=1e-6)
     assert rub is not None
@@ -103,7 +103,7 @@ def test_slopes_are_those_of_differences(name: str, kind: CalibrationTest) -> No
     response = bench_response(model, declared_prior(model), cells)
     time = 4e-3 * np.arange(150)
     ratio = 12.0 if name.startswith("one") else 1.0
-    course = Course(
+    course = BenchCourse(
         4e-3, ratio * 0.4 * (1.0 - np.cos(6.0 * time)) + 0.05, ratio * 2.4 * np.sin(6.0 * time) + 1e-2,
         0.3 + np.sin(time), 0.2 + 0.0 * time,
     )  # fmt: skip
