@@ -90,8 +90,6 @@ class BenchRows(NamedTuple):
         What the model shows, in the unit of the channel, shape (rows,).
     size
         Root mean square of what is compared, in its unit.
-    passes
-        How many times the motion went one way: what a model lacks comes again with each.
     """
 
     channel: str
@@ -101,7 +99,6 @@ class BenchRows(NamedTuple):
     slope: Array
     shown: Array
     size: float
-    passes: int
 
 
 def windows(count: int, step: float, seconds: float) -> SmoothWindows:
@@ -228,8 +225,6 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRo
     # Rounding of a motion that stays within a count does not average out.
     averaged = counts > 3.0 * noise.quantum
     blur = np.where(averaged, noise.motion * narrow, max(noise.motion, noise.quantum / math.sqrt(12.0)))
-    forth = np.sign(course.rate[np.abs(course.rate) > 0.1 * np.max(np.abs(course.rate))])
-    passes = 1 + int(np.count_nonzero(np.diff(forth)))
     rows = []
     if response.balanced:
         gain = np.where(np.abs(mean[1]) > 1e-6 * np.max(np.abs(mean[1])), mean[1], np.inf)
@@ -241,22 +236,20 @@ def rows_of(response: BenchResponse, run: RecordedRun, x: Array) -> list[BenchRo
         use = sound & _in_motion(course, noise, view) & np.isfinite(gain)
         effort = response.inertia * float(np.median(np.abs(mean[1])))
         parts = (effort * error, effort * np.sqrt(variance), effort * by_x, effort * mean[1])
-        rows.append(_row(BALANCE, view.centres, use, *parts, effort * course.command, passes=passes))
+        rows.append(_row(BALANCE, view.centres, use, *parts, effort * course.command))
     for k, channel in enumerate(response.channels):
         error = view.mean @ run.measured[k] - mean[2 + k]
         variance = (stiff[2 + k] * blur) ** 2 + (noise.channels[k] * narrow) ** 2
         parts = (error, np.sqrt(variance), -slope[2 + k], mean[2 + k])
-        rows.append(_row(channel, view.centres, sound, *parts, run.measured[k], passes=passes))
+        rows.append(_row(channel, view.centres, sound, *parts, run.measured[k]))
     return rows
 
 
-def _row(
-    channel: str, centres: NDArray[np.int64], use: NDArray[np.bool_], *parts: Array, passes: int
-) -> BenchRows:
+def _row(channel: str, centres: NDArray[np.int64], use: NDArray[np.bool_], *parts: Array) -> BenchRows:
     error, sigma, slope, shown, compared = parts
     size = float(np.sqrt(np.mean(compared**2)))
     floor = np.maximum(sigma, 1e-6 * size + 1e-12)
-    return BenchRows(channel, centres[use], error[use], floor[use], slope[use], shown[use], size, passes)
+    return BenchRows(channel, centres[use], error[use], floor[use], slope[use], shown[use], size)
 
 
 def _in_motion(course: BenchCourse, noise: SampleNoise, view: SmoothWindows) -> NDArray[np.bool_]:

@@ -15,8 +15,8 @@ from scipy.stats import chi2
 from ..components.assembly.named_parts import Assembly
 from ..errors import ConvergenceError, MeasurementError, ValueRangeError, unknown_name
 from ..identification import Finding, RecordSet, load_record
-from ..identification.estimation.covariance import Piece, robust_covariance
-from ..identification.estimation.levenberg_marquardt import minimise
+from ..identification.estimation.covariance import Piece, inverse_information, robust_covariance
+from ..identification.estimation.levenberg_marquardt import Minimum, minimise
 from ..identification.records.table_files import table_files
 from ..identification.statistics.losses import huber_rows
 from ..model import flatten
@@ -81,8 +81,6 @@ class ChannelMisfit(NamedTuple):
         Root mean square of what the model leaves over, and what noise alone would.
     rows
         How many windows of the record counted.
-    passes
-        How many times the motion went one way.
     """
 
     record: str
@@ -91,7 +89,6 @@ class ChannelMisfit(NamedTuple):
     residual: float
     noise: float
     rows: int
-    passes: int
 
     @property
     def ratio(self) -> float:
@@ -140,14 +137,15 @@ class Estimate:
     def inflated(self) -> float:
         """Factor by which standard deviations were widened, as the model does not fit within the noise.
 
-        What a model lacks comes again with every pass of the motion, so passes do not average it out.
+        What a model lacks does not average out over the windows of a record, as noise does.
         """
         return _widened(self.misfits)
 
 
 def _widened(misfits: Sequence[ChannelMisfit]) -> float:
-    passes = sum(m.passes for m in misfits)
-    return 1.0 + max([0.0, *(m.ratio / FITS - 1.0 for m in misfits)]) * math.sqrt(passes)
+    rows = sum(m.rows for m in misfits)
+    beyond = max([0.0, *((m.ratio / FITS) ** 2 - 1.0 for m in misfits)])
+    return math.sqrt(1.0 + beyond * rows)
 
 
 def load_calibration(
@@ -269,16 +267,7 @@ def estimate(
     ]
     unknowns = Unknowns(known, benches)
 
-    def rows(y: Array) -> tuple[Array, Array]:
-        residuals, slopes = [y], [np.eye(len(y))]
-        for _, piece, _ in unknowns.pieces(y):
-            residual, slope = huber_rows(piece.residual, piece.slope, _HUBER)
-            residuals.append(residual)
-            slopes.append(slope)
-        return np.concatenate(residuals), np.vstack(slopes)
-
-    reach = np.full(unknowns.count, _REACH)
-    ended = minimise(rows, np.zeros(unknowns.count), (-reach, reach), evaluations=_EVALUATIONS, least=_ENOUGH)
+    ended = _fitted(unknowns, np.zeros(unknowns.count), 1.0)
     found = unknowns.pieces(ended.x)
     misfits = tuple(_misfit(piece, row, bench.units[row.channel]) for bench, piece, row in found)
     for m, (_, _, row) in zip(misfits, found, strict=True):
@@ -288,7 +277,36 @@ def estimate(
         raise ConvergenceError(
             "calibration", "did not converge", next_step="check the units and the set-up of the records"
         )
-    return _estimated(unknowns, ended.x, found, misfits)
+    widened = _widened(misfits)
+    if widened > 1.0:
+        # What the model lacks counts as noise, so that it does not drag numbers from what was declared.
+        ended = _fitted(unknowns, ended.x, widened)
+        found = unknowns.pieces(ended.x)
+    result = _estimated(unknowns, ended.x, found, misfits)
+    if widened > 1.0 and not result.told_by:
+        worst = max(misfits, key=lambda m: m.ratio)
+        raise MeasurementError(
+            f"record '{worst.record}': {worst.channel}",
+            f"misses the model by {with_unit(three_digits(worst.residual), worst.unit)}, "
+            f"{three_digits(worst.ratio)} times its noise: too much to learn anything from these records",
+            next_step="check that deck and records are of one machine; ask `nlsdesign diagnose`",
+        )
+    return result
+
+
+def _fitted(unknowns: Unknowns, start: Array, widened: float) -> Minimum:
+    """Return the most likely unknowns where everything measured is so many times as noisy as it should be."""
+
+    def rows(y: Array) -> tuple[Array, Array]:
+        residuals, slopes = [y], [np.eye(len(y))]
+        for _, piece, _ in unknowns.pieces(y):
+            residual, slope = huber_rows(piece.residual / widened, piece.slope / widened, _HUBER)
+            residuals.append(residual)
+            slopes.append(slope)
+        return np.concatenate(residuals), np.vstack(slopes)
+
+    reach = np.full(unknowns.count, _REACH)
+    return minimise(rows, start, (-reach, reach), evaluations=_EVALUATIONS, least=_ENOUGH)
 
 
 def _estimated(
@@ -297,12 +315,8 @@ def _estimated(
     found: Sequence[tuple[BenchEvidence, Piece, BenchRows]],
     misfits: tuple[ChannelMisfit, ...],
 ) -> Estimate:
-    robust = []
-    for _, piece, _ in found:
-        residual, slope = huber_rows(piece.residual, piece.slope, _HUBER)
-        robust.append(piece._replace(residual=residual, slope=slope))
-    covariance = robust_covariance(robust, np.eye(unknowns.count))
-    after = unknowns.learned(y, _widened(misfits) ** 2 * covariance)
+    covariance = _covariance(unknowns, found, _widened(misfits))
+    after = unknowns.learned(y, covariance)
     known, size = unknowns.known, len(unknowns.shapes)
     deviations = known.only(unknowns.shapes).deviations
     scale = np.where(deviations > 0.0, deviations, 1.0)
@@ -320,6 +334,20 @@ def _estimated(
         _told_by(unknowns, found, after),
         tuple(bench.source for bench in unknowns.benches),
     )
+
+
+def _covariance(
+    unknowns: Unknowns, found: Sequence[tuple[BenchEvidence, Piece, BenchRows]], widened: float
+) -> Array:
+    """Return the covariance of the unknowns: of what the residuals scatter, or of what the model misses."""
+    if widened > 1.0:
+        slopes = np.vstack([piece.slope for _, piece, _ in found]) / widened
+        return inverse_information(np.eye(unknowns.count) + slopes.T @ slopes)
+    robust = []
+    for _, piece, _ in found:
+        residual, slope = huber_rows(piece.residual, piece.slope, _HUBER)
+        robust.append(piece._replace(residual=residual, slope=slope))
+    return robust_covariance(robust, np.eye(unknowns.count))
 
 
 def _chance(y: Array, covariance: Array) -> float:
@@ -361,4 +389,4 @@ def _misfit(piece: Piece, row: BenchRows, unit: str) -> ChannelMisfit:
     clipped = np.minimum(np.abs(piece.residual), max(_HUBER, 3.0 * float(np.median(np.abs(piece.residual)))))
     noise = float(np.sqrt(np.mean(row.sigma**2)))
     residual = float(np.sqrt(np.mean(clipped**2))) * noise
-    return ChannelMisfit(piece.record, row.channel, unit, residual, noise, len(row.sigma), row.passes)
+    return ChannelMisfit(piece.record, row.channel, unit, residual, noise, len(row.sigma))
