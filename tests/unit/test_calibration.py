@@ -26,7 +26,7 @@ from nlsdesign.calibration import (
     write_calibration,
 )
 from nlsdesign.calibration.bench_response import BenchCourse, bench_response
-from nlsdesign.calibration.bench_rows import windows
+from nlsdesign.calibration.bench_rows import RecordedRun, SampleNoise, rows_of, windows
 from nlsdesign.components import Assembly, CoulombFriction
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
@@ -65,7 +65,7 @@ def test_a_window_moves_two_derivatives_onto_itself() -> None:
         (np.ones_like(time), 0.0 * time),
         (time, 0.0 * time),
         (0.5 * time**2, np.ones_like(time)),
-        (np.sin(9.0 * time), -81.0 * np.sin(9.0 * time)),
+        (np.sin(40.0 * time), -1600.0 * np.sin(40.0 * time)),
     ):
         size = max(1.0, float(np.max(np.abs(second))))
         assert view.second @ motion == pytest.approx(view.mean @ second, abs=2e-4 * size)
@@ -80,6 +80,44 @@ def test_the_balance_of_a_linear_spring_is_that_of_newton() -> None:
     effort = 4.0 * 0.055 * course.command + 0.4 - 3.4 * course.motion - 1e-3 * 0.2 - 0.02
     assert shown.value[0] == pytest.approx(effort / 5.97e-4, rel=1e-9)
     assert shown.value[1] == pytest.approx(np.full(50, 0.22 / 5.97e-4), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", [CAM, "austin2015_as_printed"])
+def test_slow_samples_show_the_same_relaxation(name: str) -> None:
+    """As printed the rubber relaxes within a fifth of the slow step."""
+    model = flatten(LoadCellTest().on_bench(deck(name)))
+    response = bench_response(model, declared_prior(model), ["spring.torque"])
+    torque = []
+    for step, every in ((4e-3, 1), (2.5e-4, 16)):
+        time = step * np.arange(round(1.2 / step))
+        angle, rate = 0.3 + 0.2 * np.sin(7.0 * time), 1.4 * np.cos(7.0 * time)
+        shown = response.along(
+            BenchCourse(step, angle, rate, 0.0 * time, 0.0 * time), np.zeros(response.columns)
+        )
+        torque.append(shown.value[2][::every])
+    # The run begins at rest: the first moment is another course for each step.
+    assert torque[0][25:] == pytest.approx(torque[1][25:], rel=2e-3)
+
+
+def test_standstill_says_nothing_of_the_balance() -> None:
+    model = flatten(HungWeightTest().on_bench(deck(LINEAR)))
+    response = bench_response(model, declared_prior(model), [])
+    time = 4e-3 * np.arange(1500)
+    moving = (time > 1.0) & (time < 5.0)
+    rate = np.where(moving, 0.1 * np.sign(np.sin(2.0 * math.pi * (time - 1.0) / 2.0)), 0.0)
+    course = BenchCourse(4e-3, np.cumsum(rate) * 4e-3, rate, 0.0 * time, 0.0 * time)
+    noise = SampleNoise(1e-5, 0.01, 1e-5, (), 0.1)
+    (rows,) = rows_of(
+        response,
+        RecordedRun(course, np.zeros((0, 1500)), noise, np.zeros(1500, dtype=bool)),
+        np.zeros(response.columns),
+    )
+    told = time[rows.centres]
+    assert len(told) > 20
+    for turn in (1.0, 2.0, 3.0, 4.0, 5.0):
+        assert np.min(np.abs(told - turn)) > 0.04, "a window reaches over a reversal or into rest"
+    assert told.min() > 1.0
+    assert told.max() < 5.0
 
 
 def test_friction_turns_at_once_on_the_bench() -> None:
