@@ -98,6 +98,11 @@ class Prior:
         size = float(self.deviations[i] * self.deviations[j])
         return float(self.covariance[i, j]) / size if size > 0.0 else 0.0
 
+    @property
+    def root(self) -> Array:
+        """R with R·Rᵀ = covariance, shape (numbers, numbers): the x are R times independent unit normals."""
+        return _root(self.covariance)
+
     def place(self, name: str) -> int:
         """Return the place of a number in the vectors.
 
@@ -144,7 +149,7 @@ class Prior:
             Values in SI by name, each of shape (count,).
         """
         normal = np.random.default_rng(seed).standard_normal((count, len(self.names)))
-        factors = np.exp(normal @ _root(self.covariance).T)
+        factors = np.exp(normal @ self.root.T)
         drawn = self.values * factors
         if len(self.minimum):
             drawn = np.maximum(drawn, self.minimum)
@@ -161,7 +166,7 @@ class Prior:
             Fisher information on the logarithms of the numbers, shape (numbers, numbers): the slopes of
             whitened measurements, J, give JᵀJ.
         """
-        root = _root(self.covariance)
+        root = self.root
         gained = np.eye(root.shape[1]) + root.T @ information @ root
         covariance = root @ np.linalg.solve(gained, root.T)
         return replace(self, covariance=0.5 * (covariance + covariance.T))
@@ -203,7 +208,7 @@ def declared_prior(model: FlatModel, longest_row: int = LONGEST_ROW) -> Prior:
     >>> from nlsdesign import quantity
     >>> from nlsdesign.components import Inertia, assembly
     >>> from nlsdesign.model import flatten
-    >>> wheel = Inertia(inertia=quantity(1e-3, "kg*m^2", "assumed: an example", spread=0.1))
+    >>> wheel = Inertia(inertia=quantity(1e-3, "kg*m^2", source="assumed", spread=0.1))
     >>> known = declared_prior(flatten(assembly("wheel", wheel=wheel)))
     >>> known.names, known.deviations.round(4).tolist()
     (('wheel.inertia',), [0.0953])
