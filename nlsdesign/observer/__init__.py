@@ -1,14 +1,25 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
+from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
+from .adaptive.bound import SensedTorque, TorqueBound, torque_bound
+from .adaptive.directions import UncertainDirections
+from .adaptive.duty import Duty
+from .adaptive.settings import AdaptiveSettings, Trust
 from .scheduling.check import ErrorStability, check_stability
 from .scheduling.forms import Minimal, PaperForm, StateForm
 from .scheduling.gains import CascadeGain, GainRule, PolePlacement, SteadyStateKalman
 from .scheduling.run import observe
-from .scheduling.scheduled import ObserverDesign, design_observer, design_observer_with_details
+from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
+from .spread.choice import ObserverOfChoice, choose_observer, design_observer
+from .spread.errors import SpreadErrors, observer_errors
+from .spread.trial import Trial, bench_trial
 
 __all__ = [
+    "AdaptiveDesign",
+    "AdaptiveSettings",
     "CascadeGain",
+    "Duty",
     "ErrorStability",
     "FixedGrid",
     "GainRule",
@@ -16,12 +27,24 @@ __all__ = [
     "GridByTolerance",
     "Minimal",
     "ObserverDesign",
+    "ObserverOfChoice",
     "PaperForm",
     "PolePlacement",
+    "SensedTorque",
+    "SpreadErrors",
     "StateForm",
     "SteadyStateKalman",
+    "TorqueBound",
+    "Trial",
+    "Trust",
+    "UncertainDirections",
+    "bench_trial",
     "check_stability",
+    "choose_observer",
+    "design_adaptive_observer",
     "design_observer",
     "design_observer_with_details",
     "observe",
+    "observer_errors",
+    "torque_bound",
 ]

@@ -1,8 +1,9 @@
 """The step of an observer and its slopes along uncertain directions, as entries of one table over the angle.
 
-The inner states are driven by the measured angle alone, so what they do to angle and speed is known at both ends
-of a sample, like the torque at rest: it runs linearly between a(θ_k)·z_k and a(θ_{k+1})·z_{k+1}. Held at the
-beginning instead, it would be late by half a sample, and a filter that learns would take that for damping.
+The inner states are driven by the measured angle alone, so what they do to angle and speed is known at both
+ends of a sample, like the torque at rest: it runs linearly between a(θ_k)·z_k and a(θ_{k+1})·z_{k+1}. Held
+at the beginning instead, it would be late by half a sample, and a filter that learns would take that for
+damping.
 
 Torques are linear in the slow states, but what they do to the speed is divided by the inertia, which may be
 uncertain too: the product of ten per cent here and ten there is one per cent of the whole torque. So all that

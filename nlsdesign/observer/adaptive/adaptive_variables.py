@@ -13,7 +13,7 @@ from .filter_equations import FilterEquations, pairs
 Array = NDArray[np.float64]
 
 DEVIATION, SPREAD = "deviation", "standard_deviation"
-"""What is added to the name of the estimate for slow states, and for the deviation that the filter expects."""
+"""Endings of the name of the estimate: slow states, and the deviation that the filter expects."""
 
 
 def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> FlatModel:

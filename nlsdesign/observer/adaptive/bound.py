@@ -1,7 +1,8 @@
 """The least error that any estimator of the torque can have with these sensors: Bayesian Cramér–Rao bound.
 
-The unknown numbers are p = p₀·exp(L·ξ) with ξ of unit variance; angle readings y_k have white Gaussian errors with
-the variance of the encoder's rounding, quantum²/12; the input is known. To first order along one trajectory
+The unknown numbers are p = p₀·exp(L·ξ) with ξ of unit variance; angle readings y_k have white Gaussian errors
+with the variance of the encoder's rounding, quantum²/12; the input is known. To first order along one
+trajectory
 
     J_k = I + Σ_{i≤k} hᵢᵀhᵢ / r,   h = ∂θ/∂ξ,   var τ_k ≥ g_k J_k⁻¹ g_kᵀ,   g = ∂τ/∂ξ,
 

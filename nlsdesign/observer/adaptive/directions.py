@@ -1,8 +1,8 @@
 """Which combinations of uncertain numbers a machine notices: few directions in the space of all of them.
 
-Every number of the prior is p = p₀·exp(x) with x = L·ξ and independent ξ of unit variance. Most ξ change nothing
-that matters, and many change the same: the moduli of a rubber, its section and its length all scale the torque.
-The effects of the ξ, each in N·m, are the columns of one matrix:
+Every number of the prior is p = p₀·exp(x) with x = L·ξ and independent ξ of unit variance. Most ξ change
+nothing that matters, and many change the same: the moduli of a rubber, its section and its length all scale
+the torque. The effects of the ξ, each in N·m, are the columns of one matrix:
 
 - the torque of the spring at rest, over the angles of the duty;
 - the part of it that relaxes at the frequencies of the duty, and what another rate of relaxation does to it;

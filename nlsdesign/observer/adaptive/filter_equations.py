@@ -1,4 +1,4 @@
-"""Writes the filter of an adaptive observer: two halves of a sample, their slopes, and the correction between."""
+"""The filter of an adaptive observer: two halves of a sample, their slopes, and the correction between."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ class FilterEquations:
         return ca.SX(ca.mtimes(jacobian, ca.diag(np.concatenate([self.units, np.ones(self.slow)]))))
 
     def _carried(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
-        """Return the slopes of one half of a sample, those of the slow states, which stay, below the others."""
+        """Return the slopes of one half of a sample; slow states, which stay, below the others."""
         upper = ca.mtimes(ca.diag(1.0 / self.units), self._slopes(expression, of, slow))
         return ca.SX(ca.vertcat(upper, ca.horzcat(ca.SX(self.slow, self.n), ca.SX.eye(self.slow))))
 

@@ -92,19 +92,28 @@ def design_observer_with_details(
     form: StateForm | None = None,
     grid: Grid | None = None,
 ) -> ObserverDesign:
-    """Design an observer and return it with its table error and start values.
+    """Design a scheduled observer at the declared numbers, with its table error and start values.
 
     Parameters
     ----------
-    model, estimate, measured, sample_time, gain, form, grid
-        As for :func:`design_observer`, which also says what is raised.
+    model, estimate, measured, sample_time, grid
+        As for :func:`~nlsdesign.observer.design_observer`.
+    gain
+        Rule for the correction; :class:`~nlsdesign.observer.scheduling.gains.CascadeGain` by default.
+    form
+        Which states are carried; :class:`~nlsdesign.observer.scheduling.forms.Minimal` by default.
 
     Raises
     ------
+    UnknownNameError
+        If a name does not exist.
     ValueRangeError
-        If the sample time is not between 0 and 1 s, or the model is discrete.
+        If the sample time is not between 0 and 1 s, the model is discrete, or the estimate is far from linear
+        in the inner states.
     ArrangementError
-        If what is measured is not an angle.
+        If what is measured is not an angle, or the equations cannot be scheduled over one.
+    ConvergenceError
+        If a gain cannot be found, or the table does not keep its error bound.
     """
     if not 0.0 < sample_time < 1.0:
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
@@ -138,58 +147,6 @@ def whole_contour(model: FlatModel) -> GridByTolerance:
     cams = [cam for spring in model.springs for cam in spring.cams]
     end = min((model.values[cam.last_angle] for cam in cams if cam.last_angle), default=math.pi / 2.0)
     return GridByTolerance(-end, end)
-
-
-def design_observer(
-    model: FlatModel,
-    *,
-    estimate: str | None = None,
-    measured: str | None = None,
-    sample_time: float = 1e-3,
-    gain: GainRule | None = None,
-    form: StateForm | None = None,
-    grid: Grid | None = None,
-) -> FlatModel:
-    """Design an observer that estimates a torque from a measured angle and the known inputs.
-
-    Its inputs are the measured angle and the inputs of the model, held over the coming sample; its outputs
-    the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have
-    carries an ending: ``.memory`` is what goes from sample to sample, ``.innovation`` the measured minus
-    the expected angle, ``.estimate`` the estimate of the angle itself, whose name the input has.
-
-    Parameters
-    ----------
-    model
-        Continuous, load fixed.
-    estimate
-        Output or signal that is wanted; by default the torque of the series spring.
-    measured
-        State that is measured and over which everything is scheduled; by default the motion of the driven
-        body.
-    sample_time
-        In s.
-    gain
-        Rule for the correction; :class:`~nlsdesign.observer.scheduling.gains.CascadeGain` by default.
-    form
-        Which states are carried; :class:`~nlsdesign.observer.scheduling.forms.Minimal` by default.
-    grid
-        Range and number of grid points; :func:`whole_contour` by default.
-
-    Raises
-    ------
-    UnknownNameError
-        If a name does not exist.
-    ArrangementError
-        If the equations cannot be scheduled over one angle, or the structure does not say what is estimated
-        or measured.
-    ValueRangeError
-        If the estimate is far from linear in the inner states, or a setting is out of range.
-    ConvergenceError
-        If a gain cannot be found, or the table does not keep its error bound.
-    """
-    return design_observer_with_details(
-        model, estimate=estimate, measured=measured, sample_time=sample_time, gain=gain, form=form, grid=grid
-    ).model
 
 
 class _Writer:

@@ -1,8 +1,8 @@
 """A bench on which observers are compared: sines of the torque, one frequency after the other, load fixed.
 
-The motor is led along the angles that the declared machine would have, by a position servo with feedforward from
-declared numbers, so that machines with other numbers move nearly alike. Every observer reads the same encoder
-and the same current; none is part of the loop.
+The motor is led along the angles that the declared machine would have, by a position servo with feedforward
+from declared numbers, so that machines with other numbers move nearly alike. Every observer reads the same
+encoder and the same current; none is part of the loop.
 """
 
 from __future__ import annotations
