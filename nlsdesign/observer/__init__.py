@@ -1,10 +1,10 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from .adaptive.bound import SensedTorque, TorqueBound, torque_bound
+from .adaptive.estimator_bound import SensedTorque, EstimatorBound, estimator_bound
 from .adaptive.directions import UncertainDirections
 from .adaptive.duty import Duty
-from .adaptive.settings import AdaptiveSettings, Trust
+from .adaptive.adaptive_settings import AdaptiveSettings, Trust
 from .scheduling.check import ErrorStability, check_stability
 from .scheduling.forms import Minimal, PaperForm, StateForm
 from .scheduling.gains import CascadeGain, GainRule, PolePlacement, SteadyStateKalman
@@ -12,8 +12,8 @@ from .scheduling.run import observe
 from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer
-from .spread.errors import SpreadErrors, observer_errors
-from .spread.trial import Trial, bench_trial
+from .spread.spread_errors import SpreadErrors, observer_errors
+from .spread.bench_trial import Trial, bench_trial
 
 __all__ = [
     "AdaptiveDesign",
@@ -34,7 +34,7 @@ __all__ = [
     "SpreadErrors",
     "StateForm",
     "SteadyStateKalman",
-    "TorqueBound",
+    "EstimatorBound",
     "Trial",
     "Trust",
     "UncertainDirections",
@@ -46,5 +46,5 @@ __all__ = [
     "design_observer_with_details",
     "observe",
     "observer_errors",
-    "torque_bound",
+    "estimator_bound",
 ]

@@ -39,7 +39,7 @@ from .adaptive_variables import filter_model
 from .directions import UncertainDirections, uncertain_directions
 from .duty import Duty, operating_points
 from .filter_equations import FilterEquations, FilterNoise
-from .settings import AdaptiveSettings, Trust
+from .adaptive_settings import AdaptiveSettings, Trust
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...symbolic import Expression
 from ..scheduling.table import Compact
 from .adaptive_step import AdaptiveStep
-from .settings import Trust
+from .adaptive_settings import Trust
 
 Array = NDArray[np.float64]
 

@@ -13,12 +13,12 @@ from ...model.roles import measured_motion, spring_torque
 from ...simulation.sampled_batch import run_batch
 from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
 from ..adaptive.adaptive_variables import SPREAD
-from ..adaptive.settings import AdaptiveSettings
+from ..adaptive.adaptive_settings import AdaptiveSettings
 from ..scheduling.forms import StateForm
 from ..scheduling.gains import GainRule
 from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
 from ..scheduling.table import Grid
-from .trial import bench_trial
+from .bench_trial import bench_trial
 
 
 @dataclass(frozen=True, eq=False)

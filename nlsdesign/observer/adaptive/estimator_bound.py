@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueBound:
+class EstimatorBound:
     """Least standard deviation of an estimate along a run.
 
     Parameters
@@ -73,7 +73,7 @@ class SensedTorque:
     substeps: int = 6
 
 
-def torque_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: SensedTorque) -> TorqueBound:
+def estimator_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: SensedTorque) -> EstimatorBound:
     """Return the bound along the trajectory that known inputs cause from the start values of a model.
 
     Parameters
@@ -120,7 +120,7 @@ def torque_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: SensedTo
     have = np.flatnonzero(np.isfinite(variance))
     variance = np.interp(np.arange(count), have, variance[have])
     time: Array = sensed.sample_time * np.arange(float(count))
-    return TorqueBound(time, np.sqrt(np.maximum(variance, 0.0)), np.sqrt(before))
+    return EstimatorBound(time, np.sqrt(np.maximum(variance, 0.0)), np.sqrt(before))
 
 
 def _variational(model: FlatModel, prior: Prior, sensed: SensedTorque) -> tuple[ca.Function, ca.Function]:
@@ -165,7 +165,7 @@ def _variational(model: FlatModel, prior: Prior, sensed: SensedTorque) -> tuple[
     return ca.Function("step", [x, u], [at]), read
 
 
-def rms_over(bounds: list[TorqueBound], first: float, last: float) -> float:
+def rms_over(bounds: list[EstimatorBound], first: float, last: float) -> float:
     """Return the root mean square of the bound over a stretch of several runs.
 
     Parameters

@@ -17,8 +17,8 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior, declared_prior
 from ...simulation.sampled_batch import PLANT, BatchTrace, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
-from ..adaptive.bound import SensedTorque, rms_over, torque_bound
-from .trial import Trial
+from ..adaptive.estimator_bound import SensedTorque, rms_over, estimator_bound
+from .bench_trial import Trial
 
 Array = NDArray[np.float64]
 
@@ -287,5 +287,5 @@ def _bound(trial: Trial, known: Prior, rows: Mapping[str, Array], driven: Array,
     for i in chosen:
         values = {name: float(rows[f"{PLANT}.{name}"][i]) for name in known.names}
         # One sample passes before a computed input acts.
-        bounds.append(torque_bound(trial.model.with_values(values), known, driven[i][None, :], sensed))
+        bounds.append(estimator_bound(trial.model.with_values(values), known, driven[i][None, :], sensed))
     return np.array([rms_over(bounds, first, last) for _, first, last in trial.stretches])
