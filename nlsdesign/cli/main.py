@@ -13,9 +13,10 @@ from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose, simulate
-from .export import export, observer
+from .export import export
 from .fit import fit
 from .materials import materials
+from .observer import observer
 from .parts import parts
 from .studies import study
 

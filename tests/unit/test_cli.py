@@ -232,3 +232,18 @@ def test_a_folder_that_cannot_be_made_after_all_is_one_message(
     status, _, err = run("analyse", "--deck", DECK, "--out", str(tmp_path / "new"))
     assert status == 2
     assert "new: cannot be made (Read-only file system) -> name another folder" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "Missing option '--deck'"),
+        (("unheard-of",), "No such command 'unheard-of'"),
+    ],
+)
+def test_the_observer_asks_for_a_deck_or_a_command_that_exists(
+    words: tuple[str, ...], said: str, run: Run
+) -> None:
+    status, out, err = run("observer", *words)
+    assert (status, out) == (2, "")
+    assert said in err
