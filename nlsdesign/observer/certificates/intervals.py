@@ -88,6 +88,7 @@ def enclose(function: ca.Function, boxes: Sequence[Sequence[tuple[ArrayLike, Arr
     ]
     places = [_dense_places(function.sparsity_out(i)) for i in range(function.n_out())]
     work: list[Bounds] = [(np.zeros(1), np.zeros(1))] * function.sz_w()
+    shares = _Shares()
     undecided = np.zeros(shape, dtype=bool)
     with np.errstate(all="ignore"):
         for k in range(function.n_instructions()):
@@ -99,21 +100,62 @@ def enclose(function: ca.Function, boxes: Sequence[Sequence[tuple[ArrayLike, Arr
             if kind == ca.OP_OUTPUT:
                 low, high = results[to[0]]
                 low[..., places[to[0]][to[1]]], high[..., places[to[0]][to[1]]] = work[of[0]]
-            elif kind == ca.OP_INPUT:
-                work[to[0]] = given[of[0]][of[1]]
+                continue
+            if kind == ca.OP_INPUT:
+                value = given[of[0]][of[1]]
             elif kind == ca.OP_CONST:
-                value = np.array(function.instruction_constant(k))
-                work[to[0]] = value, value
+                value = (np.array(function.instruction_constant(k)),) * 2
             elif kind in _OPERATIONS:
-                operands = [work[i] for i in of[: _OPERANDS.get(kind, 1)]]
-                work[to[0]] = _OPERATIONS[kind](*operands)
+                of = of[: _OPERANDS.get(kind, 1)]
+                value = _OPERATIONS[kind](*[work[i] for i in of])
+                if shares.is_share(kind, of):
+                    value = np.maximum(value[0], 0.0), np.minimum(value[1], 1.0)
                 if kind == ca.OP_FLOOR:
-                    undecided |= np.broadcast_to(work[to[0]][0] != work[to[0]][1], shape)
+                    undecided |= np.broadcast_to(value[0] != value[1], shape)
             else:
                 raise ArrangementError(
                     f"bounds of '{function.name()}'", f"uses operation {kind}, whose range is not known here"
                 )
+            shares.follow(kind, to[0], of)
+            work[to[0]] = value
     return Enclosure(tuple(Range(low, high) for low, high in results), undecided)
+
+
+class _Shares:
+    """Knows which quotients are p/(p + q) of two truth values: the slope of the greater of two numbers."""
+
+    def __init__(self) -> None:
+        self.truths: dict[int, int] = {}
+        self.sums: dict[int, tuple[int, int]] = {}
+        self.count = 0
+
+    def is_share(self, kind: int, of: Sequence[int]) -> bool:
+        """Return whether an operation is such a quotient; it lies between zero and one.
+
+        Parameters
+        ----------
+        kind, of
+            Operation and the places of its operands.
+        """
+        return kind == ca.OP_DIV and self.truths.get(of[0], -1) in self.sums.get(of[1], ())
+
+    def follow(self, kind: int, to: int, of: Sequence[int]) -> None:
+        """Take note of what an operation writes where.
+
+        Parameters
+        ----------
+        kind, to, of
+            Operation, the place of its result and those of its operands.
+        """
+        summed = kind == ca.OP_ADD and all(i in self.truths for i in of)
+        pair = (self.truths[of[0]], self.truths[of[1]]) if summed else None
+        self.truths.pop(to, None)
+        self.sums.pop(to, None)
+        if pair is not None:
+            self.sums[to] = pair
+        elif kind in (ca.OP_LE, ca.OP_LT):
+            self.count += 1
+            self.truths[to] = self.count
 
 
 def _dense_places(sparsity: ca.Sparsity) -> list[int]:
@@ -128,12 +170,21 @@ def _outward(low: Array, high: Array, units: int = 1) -> Bounds:
     return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
 
 
+def _sum(a: Array, b: Array) -> tuple[Array, Array]:
+    """Return a sum and what rounding took from it, exactly."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
+
+
 def _add(a: Bounds, b: Bounds) -> Bounds:
-    return _outward(a[0] + b[0], a[1] + b[1])
+    (low, low_error), (high, high_error) = _sum(a[0], b[0]), _sum(a[1], b[1])
+    wide = _outward(low, high)
+    return np.where(low_error == 0.0, low, wide[0]), np.where(high_error == 0.0, high, wide[1])
 
 
 def _subtract(a: Bounds, b: Bounds) -> Bounds:
-    return _outward(a[0] - b[1], a[1] - b[0])
+    return _add(a, _negate(b))
 
 
 def _negate(a: Bounds) -> Bounds:
@@ -149,12 +200,19 @@ def multiply(a: Bounds, b: Bounds) -> Bounds:
         Lower and upper bounds.
     """
     products = np.array(np.broadcast_arrays(a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]))
-    low, high = _outward(np.min(products, axis=0), np.max(products, axis=0))
-    # Exactly zero times anything finite is exactly zero: widened, it would become tiny dust everywhere.
-    nothing = ((a[0] == 0.0) & (a[1] == 0.0) & np.isfinite(b[0]) & np.isfinite(b[1])) | (
-        (b[0] == 0.0) & (b[1] == 0.0) & np.isfinite(a[0]) & np.isfinite(a[1])
-    )
-    return np.where(nothing, 0.0, low), np.where(nothing, 0.0, high)
+    zero = (a[0] == 0.0) | (a[1] == 0.0) | (b[0] == 0.0) | (b[1] == 0.0)
+    low, high = np.min(products, axis=0), np.max(products, axis=0)
+    # Products of whole numbers are exact: places in a table are counted so.
+    whole = (a[0] == np.round(a[0])) & (a[1] == np.round(a[1])) & (b[0] == np.round(b[0]))
+    whole &= (b[1] == np.round(b[1])) & (np.maximum(np.abs(low), np.abs(high)) < 2.0**52)
+    wide = _outward_but_zero(low, high, zero)
+    return np.where(whole, low, wide[0]), np.where(whole, high, wide[1])
+
+
+def _outward_but_zero(low: Array, high: Array, zero: NDArray[np.bool_]) -> Bounds:
+    """Return bounds rounded outward, but for a zero that is exact because an operand is zero."""
+    wide = _outward(low, high)
+    return np.where(zero & (low == 0.0), 0.0, wide[0]), np.where(zero & (high == 0.0), 0.0, wide[1])
 
 
 def _inverse(a: Bounds) -> Bounds:
@@ -165,7 +223,12 @@ def _inverse(a: Bounds) -> Bounds:
 
 def _divide(a: Bounds, b: Bounds) -> Bounds:
     quotients = np.array(np.broadcast_arrays(a[0] / b[0], a[0] / b[1], a[1] / b[0], a[1] / b[1]))
-    low, high = _outward(np.min(quotients, axis=0), np.max(quotients, axis=0))
+    low, high = np.min(quotients, axis=0), np.max(quotients, axis=0)
+    # Whole numbers that divide without remainder are exact: places in a table are counted so.
+    whole = (a[0] == a[1]) & (b[0] == b[1]) & (low == np.round(low)) & (low * b[0] == a[0])
+    whole &= (np.abs(a[0]) < 2.0**52) & (b[0] == np.round(b[0]))
+    wide = _outward_but_zero(low, high, (a[0] == 0.0) | (a[1] == 0.0))
+    low, high = np.where(whole, low, wide[0]), np.where(whole, high, wide[1])
     through = (b[0] <= 0.0) & (b[1] >= 0.0)
     return np.where(through, -np.inf, low), np.where(through, np.inf, high)
 
