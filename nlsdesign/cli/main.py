@@ -17,6 +17,7 @@ from .export import export
 from .fit import fit
 from .materials import materials
 from .observer import observer
+from .observer_certificate import verify_certificate
 from .parts import parts
 from .studies import study
 
@@ -27,6 +28,7 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
+observer.add_command(verify_certificate)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
     *(cosimulation, simulate, fit, diagnose, study),

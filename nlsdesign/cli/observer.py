@@ -60,6 +60,9 @@ def observer_of(
 @measured_option
 @out_option("out/observer")
 @real_option
+@click.option("--certificate", "certified", is_flag=True, help="Also write what is proved of it.")
+@click.option("--decay", type=float, metavar="PER_SECOND", help="Design one certified gain with this decay.")
+@click.option("--with-spread", is_flag=True, help="Certify for all parameters within their spread.")
 def observer(
     context: click.Context,
     /,
@@ -67,6 +70,9 @@ def observer(
     sample_time: float,
     out: Path,
     real: str,
+    certified: bool,
+    decay: float | None,
+    with_spread: bool,
     **roles: str | None,
 ) -> None:
     """Design the torque observer and write it as C with a self-test."""
@@ -80,10 +86,20 @@ def observer(
     from ..export import export_c
     from ..model import flatten
 
-    model = observer_of(flatten(declare(load_deck(deck_name))), sample_time, **roles)
-    source = export_c(model, out, real=real, name="observer")
-    click.echo(str(model))
-    click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
+    deck = load_deck(deck_name)
+    plant = flatten(declare(deck))
+    if not certified:
+        if decay is not None or with_spread:
+            raise click.UsageError("--decay and --with-spread belong to --certificate", ctx=context)
+        model = observer_of(plant, sample_time, **roles)
+        source = export_c(model, out, real=real, name="observer")
+        click.echo(str(model))
+        click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
+        return
+    from .observer_certificate import write_certified
+
+    write_certified(plant, deck, out, sample_time=sample_time, real=real, decay=decay,
+                    with_spread=with_spread, **roles)  # fmt: skip
 
 
 def _refuse_misplaced(context: click.Context) -> None:

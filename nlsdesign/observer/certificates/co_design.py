@@ -122,7 +122,7 @@ class GainProblem:
         gain = np.linalg.solve(lyapunov, np.tensordot(found, y, 1))
         contracted = self.corners - gain @ self.output_matrix @ self.corners
         holds = contraction(lyapunov, contracted) <= math.exp(-decay * self.sample_time) * (1.0 + 1e-9)
-        return GainAndLyapunov(gain, lyapunov) if holds else None
+        return GainAndLyapunov(np.asarray(gain, dtype=np.float64), lyapunov) if holds else None
 
 
 def _noise(p: Array, y: Array) -> Inequality:
@@ -213,9 +213,9 @@ def fastest(found: Callable[[float], Found | None], highest: float) -> tuple[flo
 class CertifiedGain:
     """One gain for every angle, designed together with the Lyapunov function that proves it.
 
-    The table over the angle stays as it is; only the correction is constant. Dry friction of the plant is part
-    of the design, as the sector of slopes of the braked speed. Among the gains that are fast enough, the one
-    is taken that lets the least of a wrong measurement into the error.
+    The table over the angle stays as it is; only the correction is constant. Dry friction of the
+    plant is part of the design, as the sector of slopes of the braked speed. Among the gains that are fast
+    enough, the one is taken that lets the least of a wrong measurement into the error.
 
     Raises
     ------
@@ -300,10 +300,10 @@ class CertifiedGain:
         if carried is None or carried[0] < wanted * MARGIN:
             most = 0.0 if carried is None else carried[0] / (2.0 * math.pi * MARGIN)
             by_condition = free is not None and free[0] >= wanted * MARGIN
-            limit = f"P of condition {self.condition:g}" if by_condition else "what the sample rate carries"
+            beyond = f"P of condition {self.condition:g}" if by_condition else "what the sample rate carries"
             return ValueRangeError(
                 f"bandwidth {self.bandwidth:g} Hz",
-                f"is beyond {limit}, at one sample every {problem.sample_time:g} s; "
+                f"is beyond {beyond}, at one sample every {problem.sample_time:g} s; "
                 f"the fastest with a proof is {most:.3g} Hz",
                 next_step=f"ask for at most {0.98 * most:.3g} Hz, or sample faster",
             )

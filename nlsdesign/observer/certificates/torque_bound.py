@@ -1,7 +1,7 @@
 """How far the estimated torque can be from the true one, for every motion and every current.
 
-It holds where nothing corrects the inner states of the rubber: they are driven by the measured angle alone, so
-current, inertia and friction never enter the torque. Each inner state obeys ż = a·(r(θ) − z); observer and
+It holds where nothing corrects the inner states of the rubber: they are driven by the measured angle alone,
+so current, inertia and friction never enter the torque. Each inner state obeys ż = a·(r(θ) − z); observer and
 rubber filter nearly the same rest value r with nearly the same rate a, and the bound adds up what differs.
 All ranges are verified by interval arithmetic over cells of the angle, not sampled.
 """
@@ -44,7 +44,7 @@ class Assumptions:
     speed
         Largest speed in rad/s.
     angle_error
-        Largest deviation of the measured from the true angle in rad, half a count of the encoder for instance.
+        Largest deviation of the measured from the true angle in rad, half a count of the encoder, say.
     spreads
         Relative half range of each parameter that may differ from its declared value, by name.
     real
@@ -210,7 +210,8 @@ class _Bounding:
 
     def _steepness(self, cells: Bounds) -> Array:
         slope = self.view.ranges(self.view.torque, cells, self._carried(cells))[1].magnitude[:, 0]
-        return slope + np.sum(self.view.ranges(self.view.rest, cells)[1].magnitude, axis=1)
+        steep: Array = slope + np.sum(self.view.ranges(self.view.rest, cells)[1].magnitude, axis=1)
+        return steep
 
     def _carried(self, cells: Bounds, *, whole: bool = False) -> Array:
         """Return where the inner states can be at each angle, shape (cells, inner, 2).
@@ -218,9 +219,10 @@ class _Bounding:
         They follow their rest value; it moves no faster than its slope times the largest speed, so they lag
         behind it by no more than that over their rate, and never leave the range of all rest values.
         """
-        rest, lead, _, rate = self.view.ranges(self.view.rest, cells, whole=whole)
+        rest, _, _, rate = self.view.ranges(self.view.rest, cells, whole=whole)
         slow = self.lead * self.assumed.speed / np.min(rate.lower, axis=0, initial=np.inf)
-        return np.clip(np.stack([rest.lower - slow, rest.upper + slow], axis=2), self.box[0], self.box[1])
+        box: Array = np.clip(np.stack([rest.lower - slow, rest.upper + slow], axis=2), *self.box)
+        return box
 
     def _rest_deviation(self, cells: Bounds) -> Array:
         """Return how far parameters move the rest value, shape (cells, inner)."""
@@ -314,7 +316,7 @@ class _Bounding:
         return np.array(table), np.array(rounding)
 
     def _reading_error(self, key: str, weight: float, k: int) -> float:
-        """Return the largest distance of what is read from weight × rest value, by the middle of each cell."""
+        """Return the largest distance of what is read from weight × rest value, by cells."""
         middle = (self.cells[0] + self.cells[1]) / 2.0
         half = (self.cells[1] - self.cells[0]) / 2.0
         value, slope = self._read(key, middle)
