@@ -32,9 +32,11 @@ class SpringView:
     nominal, spread
         Their values and half ranges, shape (parameters,).
     rest
-        ``casadi.Function`` (θ, z, p) -> (r, ∂r/∂θ, ∂r/∂p, a).
+        ``casadi.Function`` (θ, z, p) -> (r, ∂r/∂θ, a).
     torque
-        ``casadi.Function`` (θ, z, p) -> (τ, ∂τ/∂θ, ∂τ/∂z, ∂τ/∂p).
+        ``casadi.Function`` (θ, z, p) -> (τ, ∂τ/∂θ, ∂τ/∂z).
+    rest_by_parameter, torque_by_parameter
+        ``casadi.Function`` (θ, z, p) -> (∂r/∂p,) and (∂τ/∂p,).
     affine
         Whether the torque is affine in z.
     """
@@ -45,6 +47,8 @@ class SpringView:
     spread: Array
     rest: ca.Function
     torque: ca.Function
+    rest_by_parameter: ca.Function
+    torque_by_parameter: ca.Function
     affine: bool
 
     def ranges(
@@ -55,7 +59,7 @@ class SpringView:
         Parameters
         ----------
         function
-            :attr:`rest` or :attr:`torque`.
+            One of the functions above.
         cells
             Lower and upper angles, shape (cells,).
         z
@@ -159,8 +163,10 @@ def spring_view(
         uncertain=tuple(uncertain),
         nominal=np.array([values[n] for n in uncertain]),
         spread=np.array([abs(values[n]) * spreads[n] for n in uncertain]),
-        rest=function("rest", [rest, ca.jacobian(rest, theta), ca.jacobian(rest, p), forgetting]),
-        torque=function("torque", [torque, ca.jacobian(torque, theta), slope, ca.jacobian(torque, p)]),
+        rest=function("rest", [rest, ca.jacobian(rest, theta), forgetting]),
+        torque=function("torque", [torque, ca.jacobian(torque, theta), slope]),
+        rest_by_parameter=function("rest_by_parameter", [ca.jacobian(rest, p)]),
+        torque_by_parameter=function("torque_by_parameter", [ca.jacobian(torque, p)]),
         affine=not places or not ca.depends_on(slope, z),
     )
 

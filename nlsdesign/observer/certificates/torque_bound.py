@@ -219,14 +219,14 @@ class _Bounding:
         They follow their rest value; it moves no faster than its slope times the largest speed, so they lag
         behind it by no more than that over their rate, and never leave the range of all rest values.
         """
-        rest, _, _, rate = self.view.ranges(self.view.rest, cells, whole=whole)
+        rest, _, rate = self.view.ranges(self.view.rest, cells, whole=whole)
         slow = self.lead * self.assumed.speed / np.min(rate.lower, axis=0, initial=np.inf)
         box: Array = np.clip(np.stack([rest.lower - slow, rest.upper + slow], axis=2), *self.box)
         return box
 
     def _rest_deviation(self, cells: Bounds) -> Array:
         """Return how far parameters move the rest value, shape (cells, inner)."""
-        slopes = self.view.ranges(self.view.rest, cells, whole=True)[2].magnitude
+        slopes = self.view.ranges(self.view.rest_by_parameter, cells, whole=True)[0].magnitude
         by = slopes.reshape(len(cells[0]), len(self.view.uncertain), len(self.inner))
         moved: Array = np.einsum("cpi,p->ci", by, self.view.spread)
         return moved
@@ -249,7 +249,7 @@ class _Bounding:
         torque = view.ranges(view.torque, cells, around)
         per = np.max(torque[2].magnitude, axis=0, initial=0.0)
         steep = float(np.max(torque[1].magnitude))
-        moved = view.ranges(view.torque, cells, z, whole=True)[3].magnitude
+        moved = view.ranges(view.torque_by_parameter, cells, z, whole=True)[0].magnitude
         size = float(np.max(torque[0].magnitude))
         direct = {
             "encoder": steep * assumed.angle_error,
@@ -283,8 +283,8 @@ class _Bounding:
         """Return how far parameters move each inner state: where it rests, and how fast it goes there."""
         if not self.inner:
             return np.zeros(0)
-        nominal = self.view.ranges(self.view.rest, self.cells)[3].upper[0]
-        spread = self.view.ranges(self.view.rest, self.cells, whole=True)[3]
+        nominal = self.view.ranges(self.view.rest, self.cells)[2].upper[0]
+        spread = self.view.ranges(self.view.rest, self.cells, whole=True)[2]
         ends = np.array([np.min(spread.lower, axis=0), np.max(spread.upper, axis=0)]) / nominal
         slower = np.max([[_lag_difference(float(r)) for r in row] for row in ends], axis=0)
         jump = slower * (np.max(z[:, :, 1], axis=0) - np.min(z[:, :, 0], axis=0))
@@ -298,7 +298,7 @@ class _Bounding:
         if not self.inner:
             return np.zeros(0), np.zeros(0)
         design, time = self.design, self.design.step.sample_time
-        rest, rate = (self.view.ranges(self.view.rest, self.cells)[k] for k in (0, 3))
+        rest, rate = (self.view.ranges(self.view.rest, self.cells)[k] for k in (0, 2))
         kept, n = self._kept(), len(design.step.plant.names)
         table, rounding = [], []
         for k, name in enumerate(self.inner):
