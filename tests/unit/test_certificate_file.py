@@ -1,4 +1,4 @@
-"""Files of proof: a touched character fails, a forged one is refuted, and what is unreadable is said to be."""
+"""Files of proof: a touched character fails, and what is unreadable is said to be."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_another_deck_and_another_c_file_fail(folder: Path, run: Run, tmp_path: 
 def test_any_touched_digit_fails(
     folder: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
-    """Of P, of an assumption, of a hash, of the deck, of a sentence: each is refused, or said to be unreadable."""
+    """Of P, of an assumption, of a hash, of the deck, of a sentence: refused, or said to be unreadable."""
     text = (folder / "certificate.json").read_text(encoding="utf-8")
     places = [m.start() for m in re.finditer(r"\d", text)]
     place = data.draw(st.sampled_from(places))
@@ -130,8 +130,10 @@ def test_a_range_holds_every_value(
     """Every operation that laws of the package use, at a point of the box, by CasADi."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     expressions = [
-        x + y, x - y, x * y, x / (2 + y * y), x**3, ca.sqrt(1 + x * x), ca.tanh(x) * ca.exp(y), ca.sin(x) + ca.cos(y),
-        ca.fmax(x, y) - ca.fmin(x, 0.5), ca.floor(3 * x), ca.fabs(x) * ca.sign(y), ca.if_else(x > y, x * y, -y),
+        x + y, x - y, x * y, x / (2 + y * y), x**3, ca.sqrt(1 + x * x), ca.tanh(x) * ca.exp(y),
+        ca.sin(x) + ca.cos(y),
+        ca.fmax(x, y) - ca.fmin(x, 0.5), ca.floor(3 * x), ca.fabs(x) * ca.sign(y),
+        ca.if_else(x > y, x * y, -y),
         ca.log1p(ca.exp(x)), ca.atan(x / 0.3), ca.jacobian(ca.fmax(x, y) ** 2, x), ca.expm1(x * y), x ** (-2),
     ]  # fmt: skip
     function = ca.Function("f", [x, y], [ca.vertcat(*expressions)])

@@ -2,7 +2,7 @@
 
 With Y = P·M the inequality ρ²P ⪰ (A − MCA)ᵀP(A − MCA) is linear in P and Y, by Schur's complement, for every
 corner A = F(q)·Φ. What is found here is a proposal: a certificate checks it in exact arithmetic on the table.
-Source: Boyd et al. 1994, sec. 5.1 and 7.2; Sontag 1995 for what a disturbance does.
+Source: Boyd et al. 1994, sec. 5.1.
 """
 
 from __future__ import annotations
