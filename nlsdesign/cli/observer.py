@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -70,10 +70,8 @@ def observer(
     sample_time: float,
     out: Path,
     real: str,
-    certified: bool,
     decay: float | None,
-    with_spread: bool,
-    **roles: str | None,
+    **options: Any,
 ) -> None:
     """Design the torque observer and write it as C with a self-test."""
     if context.invoked_subcommand is not None:
@@ -88,18 +86,19 @@ def observer(
 
     deck = load_deck(deck_name)
     plant = flatten(declare(deck))
+    certified, with_spread = options.pop("certified"), options.pop("with_spread")
     if not certified:
         if decay is not None or with_spread:
             raise click.UsageError("--decay and --with-spread belong to --certificate", ctx=context)
-        model = observer_of(plant, sample_time, **roles)
+        model = observer_of(plant, sample_time, **options)
         source = export_c(model, out, real=real, name="observer")
         click.echo(str(model))
         click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
         return
-    from .observer_certificate import write_certified
+    from .observer_certificate import ToProve, write_certified
 
-    write_certified(plant, deck, out, sample_time=sample_time, real=real, decay=decay,
-                    with_spread=with_spread, **roles)  # fmt: skip
+    wanted = ToProve(decay, with_spread, real)
+    write_certified(plant, deck, out, sample_time=sample_time, wanted=wanted, **options)
 
 
 def _refuse_misplaced(context: click.Context) -> None:

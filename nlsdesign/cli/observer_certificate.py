@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,17 +18,27 @@ if TYPE_CHECKING:
 CERTIFICATE = "certificate.json"
 
 
+@dataclass(frozen=True)
+class ToProve:
+    """What is to be proved of an observer.
+
+    Parameters
+    ----------
+    decay
+        Of one certified gain in 1/s; the default gain is certified without it.
+    with_spread
+        Whether parameters may be anywhere within their spread.
+    real
+        ``"double"`` or ``"float"``.
+    """
+
+    decay: float | None
+    with_spread: bool
+    real: str
+
+
 def write_certified(
-    plant: FlatModel,
-    deck: Deck,
-    out: Path,
-    *,
-    sample_time: float,
-    real: str,
-    decay: float | None,
-    with_spread: bool,
-    spring: str | None = None,
-    measured: str | None = None,
+    plant: FlatModel, deck: Deck, out: Path, *, sample_time: float, wanted: ToProve, **roles: str | None
 ) -> None:
     """Write an observer as C, with a certificate beside it.
 
@@ -40,14 +50,10 @@ def write_certified(
         Folder.
     sample_time
         In s.
-    real
-        ``"double"`` or ``"float"``.
-    decay
-        Of one certified gain in 1/s; the default gain is certified without it.
-    with_spread
-        Whether parameters may be anywhere within their spread.
-    spring, measured
-        Names where the structure leaves them open.
+    wanted
+        What is to be proved.
+    roles
+        ``spring`` and ``measured``, where the structure leaves them open.
     """
     from ..export import export_c
     from ..model.roles import measured_motion, series_spring
@@ -55,14 +61,15 @@ def write_certified(
     from ..observer.scheduling.scheduled import design_observer_with_details
 
     design = design_observer_with_details(
-        plant, estimate=series_spring(plant, spring).effort, measured=measured_motion(plant, measured),
-        sample_time=sample_time, gain=None if decay is None else CertifiedGain(decay=decay),
+        plant, estimate=series_spring(plant, roles.get("spring")).effort,
+        measured=measured_motion(plant, roles.get("measured")),
+        sample_time=sample_time, gain=None if wanted.decay is None else CertifiedGain(decay=wanted.decay),
     )  # fmt: skip
-    spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if with_spread else {}
-    assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=real)
+    spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if wanted.with_spread else {}
+    assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real)
     text = deck.path.read_text(encoding="utf-8-sig")
-    proved = certify(plant, design, assumptions=assumed, decay=decay, deck=(deck.name, text))
-    source = export_c(design.model, out, real=real, name="observer")
+    proved = certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
+    source = export_c(design.model, out, real=wanted.real, name="observer")
     proved = replace(proved, code=_hashes(source.header, source.source))
     path = write_certificate(proved, out / CERTIFICATE)
     for sentence in proved.statement:
@@ -74,8 +81,8 @@ def _hashes(*files: Path) -> dict[str, str]:
     from ..observer.certificates.certificate import hashes_of_code
 
     (folder,) = {file.parent for file in files}
-    found = hashes_of_code(folder)
-    return {file.name: found[file.name] for file in files}
+    result = hashes_of_code(folder)
+    return {file.name: result[file.name] for file in files}
 
 
 @click.command("verify")
@@ -96,14 +103,14 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None
     name, text = proved.deck
     model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
-    found = verify(proved, untouched=untouched, model=model, deck=given, code=code)
+    result = verify(proved, untouched=untouched, model=model, deck=given, code=code)
     if as_json:
-        checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in found.checks]
-        show_json({"holds": found.holds, "statement": list(proved.statement), "checks": checks})
+        checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]
+        show_json({"holds": result.holds, "statement": list(proved.statement), "checks": checks})
     else:
         for sentence in proved.statement:
             click.echo(sentence)
-        click.echo(str(found))
-        click.echo("the certificate holds" if found.holds else "the certificate DOES NOT HOLD")
-    if not found.holds:
+        click.echo(str(result))
+        click.echo("the certificate holds" if result.holds else "the certificate DOES NOT HOLD")
+    if not result.holds:
         sys.exit(1)

@@ -101,7 +101,7 @@ class Certificate:
         causes = ", ".join(f"{name} {1e3 * value:.3g}" for name, value in t.causes.items())
         second = (
             "Once a wrong start is forgotten, the estimated torque is at the instants of sampling within "
-            f"{1e3 * t.total:.4g} mN*m of that of the deck's model ({causes} mN*m), for every current "
+            f"{1e3 * t.total:.4g} mN·m of that of the deck's model ({causes} mN·m), for every current "
             f"and friction, every motion from {a.angles[0]:.4g} to {a.angles[1]:.4g} rad with at most "
             f"{a.speed:g} rad/s, an angle measured to {a.angle_error:.3g} rad, and "
             f"{sum(v > 0.0 for v in a.spreads.values())} parameters of the spring anywhere in their ranges, "
@@ -148,7 +148,7 @@ def certify(
         If the decay that is asked for is faster than can be proved, with the fastest that can; or the gain
         differs from angle to angle.
     """
-    polytope, time = error_polytope(design), design.step.sample_time
+    polytope = error_polytope(design)
     if any(e.column is not None for row in polytope.correction for e in row):
         raise ValueRangeError(
             "gain of the observer", "differs from angle to angle; a certificate is for one constant gain",
@@ -158,28 +158,7 @@ def certify(
     if not np.all(np.isfinite(errors)):
         raise ConvergenceError("certificate", "the slope of dry friction has no bound over the speeds")
 
-    def trial(rate: float) -> Array | None:
-        found = lyapunov_function(errors, math.exp(-2.0 * rate * time), condition / 1.001)
-        if found is None:
-            return None
-        rounded = np.array([[float(f"{v:.10g}") for v in row] for row in found])
-        return rounded if contracts(polytope, rounded, rate) else None
-
-    best = fastest(trial, 20.0 / time) if decay is None else None
-    if decay is None and best is not None:
-        decay = float(f"{0.98 * best[0]:.6g}")
-    lyapunov = None if decay is None else trial(decay)
-    if decay is None or lyapunov is None:
-        best = best or fastest(trial, 20.0 / time)
-        if best is None:
-            raise ConvergenceError(
-                "certificate", f"no quadratic Lyapunov function of condition {condition:g} was found",
-                next_step="design the observer with CertifiedGain, or allow a larger condition",
-            )  # fmt: skip
-        raise ValueRangeError(
-            f"decay {decay:g} 1/s", f"cannot be proved; the fastest that can is {best[0]:.4g} 1/s",
-            next_step=f"ask for at most {0.98 * best[0]:.3g} 1/s",
-        )  # fmt: skip
+    decay, lyapunov = _proved(polytope, errors, decay, condition)
     assumed = assumptions or declared_assumptions(model, design)
     try:
         torque: TorqueBound | str = torque_bound(model, design, assumed)
@@ -192,6 +171,39 @@ def certify(
         polytope=polytope, lyapunov=lyapunov, decay=decay, condition=condition, assumptions=assumed,
         torque=torque, code={} if code is None else hashes_of_code(code),
     )  # fmt: skip
+
+
+def _proved(
+    polytope: ErrorPolytope, errors: Array, decay: float | None, condition: float
+) -> tuple[float, Array]:
+    """Return a decay and P, proposed by the solver, rounded, and decided in fractions."""
+    time = polytope.sample_time
+
+    def proposed(rate: float) -> Array | None:
+        p = lyapunov_function(errors, math.exp(-2.0 * rate * time), condition / 1.001)
+        if p is None:
+            return None
+        rounded = np.array([[float(f"{v:.10g}") for v in row] for row in p])
+        return rounded if contracts(polytope, rounded, rate) else None
+
+    if decay is not None:
+        lyapunov = proposed(decay)
+        if lyapunov is not None:
+            return decay, lyapunov
+    best = fastest(proposed, 20.0 / time)
+    if best is None:
+        raise ConvergenceError(
+            "certificate", f"no quadratic Lyapunov function of condition {condition:g} was found",
+            next_step="design the observer with CertifiedGain, or allow a larger condition",
+        )  # fmt: skip
+    if decay is not None:
+        raise ValueRangeError(
+            f"decay {decay:g} 1/s", f"cannot be proved; the fastest that can is {best[0]:.4g} 1/s",
+            next_step=f"ask for at most {0.98 * best[0]:.3g} 1/s",
+        )  # fmt: skip
+    slower = float(f"{0.98 * best[0]:.6g}")
+    lyapunov = proposed(slower)
+    return best if lyapunov is None else (slower, lyapunov)
 
 
 def declared_assumptions(model: FlatModel, design: ObserverDesign) -> Assumptions:
@@ -270,9 +282,9 @@ def hashes_of_code(folder: Path) -> dict[str, str]:
     """
     try:
         files = sorted(f for f in folder.iterdir() if f.suffix in (".c", ".h"))
-        found = {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
+        result = {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
     except OSError as error:
         raise MeasurementError(str(folder), f"cannot be read ({error.strerror or error})") from None
-    if not found:
+    if not result:
         raise MeasurementError(str(folder), "has no C files")
-    return found
+    return result

@@ -14,7 +14,7 @@ from ...errors import MeasurementError, NlsError
 from ...writing import write_text
 from ..scheduling.gains import ConstantGain
 from .certificate import Certificate
-from .polytope import ErrorPolytope, Reading
+from .polytope import EntryReading, ErrorPolytope
 from .torque_bound import Assumptions, TorqueBound
 
 FORMAT = "nlsdesign observer certificate 1"
@@ -122,13 +122,13 @@ def _certificate(content: dict[str, Any]) -> Certificate:
     p, a, o, torque = (content[k] for k in ("polytope", "assumptions", "observer", "torque"))
     gain = ConstantGain(tuple(tuple(float(v) for v in row) for row in o["gain"]))
     matrix = tuple(
-        tuple(Reading(float(f), None if c is None else int(c)) for f, c in r) for r in p["transition"]
+        tuple(EntryReading(float(f), None if c is None else int(c)) for f, c in r) for r in p["transition"]
     )
     polytope = ErrorPolytope(
         states=tuple(p["states"]), sizes=tuple(p["sizes"]), moving=(p["moving"][0], p["moving"][1]),
         seen=tuple(p["seen"]), sample_time=p["sample_time"],
         columns=tuple((low, high) for low, high in p["columns"]), transition=matrix,
-        correction=tuple(tuple(Reading(v, None) for v in row) for row in gain.rows),
+        correction=tuple(tuple(EntryReading(v, None) for v in row) for row in gain.rows),
         friction=(p["friction"][0], p["friction"][1]),
     )  # fmt: skip
     n = len(polytope.states)

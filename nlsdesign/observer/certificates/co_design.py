@@ -24,7 +24,7 @@ from .polytope import friction_slopes, scaling
 from .semidefinite import Inequality, minimised
 
 Array = NDArray[np.float64]
-Found = TypeVar("Found")
+Sought = TypeVar("Sought")
 
 MARGIN = 1.02
 """How much faster than what is asked for a gain is designed, so that rounding does not spoil the proof."""
@@ -113,13 +113,13 @@ class GainProblem:
             keep = math.exp(-2.0 * moving_decay * self.sample_time)
             if moving_decay > decay:
                 inequalities.append(_contraction(p[block], moved[block], keep))
-        found = minimised(cost, inequalities)
-        if found is None:
+        result = minimised(cost, inequalities)
+        if result is None:
             return None
-        lyapunov = np.tensordot(found, p, 1)
+        lyapunov = np.tensordot(result, p, 1)
         if np.min(np.linalg.eigvalsh(lyapunov)) <= 0.5:
             return None
-        gain = np.linalg.solve(lyapunov, np.tensordot(found, y, 1))
+        gain = np.linalg.solve(lyapunov, np.tensordot(result, y, 1))
         contracted = self.corners - gain @ self.output_matrix @ self.corners
         holds = contraction(lyapunov, contracted) <= math.exp(-decay * self.sample_time) * (1.0 + 1e-9)
         return GainAndLyapunov(np.asarray(gain, dtype=np.float64), lyapunov) if holds else None
@@ -180,32 +180,32 @@ def lyapunov_function(errors: Array, keep: float, condition: float) -> Array | N
     inequalities += [
         Inequality(np.zeros((n, n)), keep * p - e.T @ p @ e - margin) for e in errors
     ]  # ρ²P − EᵀPE ⪰ margin
-    found = minimised(cost, inequalities)
-    if found is None or found[-1] <= 0.0:
+    result = minimised(cost, inequalities)
+    if result is None or result[-1] <= 0.0:
         return None
-    return np.tensordot(found, p, 1)
+    return np.tensordot(result, p, 1)
 
 
-def fastest(found: Callable[[float], Found | None], highest: float) -> tuple[float, Found] | None:
+def fastest(at_decay: Callable[[float], Sought | None], highest: float) -> tuple[float, Sought] | None:
     """Return the largest decay, within a thousandth, at which something is found, and what; by bisection.
 
     Parameters
     ----------
-    found
-        Takes a decay in 1/s.
+    at_decay
+        Takes a decay in 1/s and returns what is sought, or ``None``.
     highest
         Where the search begins; nothing faster is tried.
     """
-    best, at, low, high = found(highest), highest, 0.0, highest
+    best, at, low, high = at_decay(highest), highest, 0.0, highest
     if best is not None:
         return at, best
     while high > 1e-9 * highest and high - low > 1e-3 * low:
         middle = math.sqrt(low * high) if low else high / 4.0
-        trial = found(middle)
-        if trial is None:
+        tried = at_decay(middle)
+        if tried is None:
             high = middle
         else:
-            low, best = middle, trial
+            low, best = middle, tried
     return None if best is None else (low, best)
 
 
@@ -283,9 +283,9 @@ class CertifiedGain:
                 best = fastest(lambda d: problem.solved(d, wanted * MARGIN, corrected=rows), wanted * MARGIN)  # noqa: B023
                 trials = [] if best is None else [best[0] if best[0] >= wanted else 0.97 * best[0], best[0]]
             for decay in trials:
-                found = problem.solved(decay, wanted * MARGIN, corrected=rows)
-                if found is not None:
-                    return found
+                result = problem.solved(decay, wanted * MARGIN, corrected=rows)
+                if result is not None:
+                    return result
         raise self._refusal(problem)
 
     def _refusal(self, problem: GainProblem) -> ValueRangeError:

@@ -34,7 +34,7 @@ REFINEMENTS, TOLERANCE = 20, 2e-3
 """How often a range of speeds is halved, and how much wider than its middle the bounds may stay."""
 
 
-class Reading(NamedTuple):
+class EntryReading(NamedTuple):
     """How an entry is read: ``factor`` × column, or ``factor`` alone where ``column`` is ``None``."""
 
     factor: float
@@ -71,8 +71,8 @@ class ErrorPolytope:
     seen: tuple[int, ...]
     sample_time: float
     columns: tuple[tuple[float, float], ...]
-    transition: tuple[tuple[Reading, ...], ...]
-    correction: tuple[tuple[Reading, ...], ...]
+    transition: tuple[tuple[EntryReading, ...], ...]
+    correction: tuple[tuple[EntryReading, ...], ...]
     friction: tuple[float, float]
 
     def exact_corners(self) -> Iterator[Matrix]:
@@ -91,7 +91,7 @@ class ErrorPolytope:
         """Return the same corners as floating-point numbers, shape (corners, n, n)."""
         return np.array([[[float(v) for v in row] for row in corner] for corner in self.exact_corners()])
 
-    def _read(self, entries: Sequence[Sequence[Reading]]) -> list[Matrix]:
+    def _read(self, entries: Sequence[Sequence[EntryReading]]) -> list[Matrix]:
         used = sorted({e.column for row in entries for e in row if e.column is not None})
         result = []
         for values in corners(*([self.columns[c][end] for c in used] for end in (0, 1))):
@@ -123,9 +123,9 @@ def error_polytope(design: ObserverDesign) -> ErrorPolytope:
     plant, compact = design.step.plant, design.compact
     n, seen = len(plant.states), tuple(int(np.argmax(row)) for row in plant.output_matrix)
 
-    def read(kind: str, width: int) -> tuple[tuple[Reading, ...], ...]:
+    def read(kind: str, width: int) -> tuple[tuple[EntryReading, ...], ...]:
         places = [[compact.places[f"{kind}[{i}][{j}]"] for j in range(width)] for i in range(n)]
-        return tuple(tuple(Reading(p.factor, p.column) for p in row) for row in places)
+        return tuple(tuple(EntryReading(p.factor, p.column) for p in row) for row in places)
 
     ranges = [(float(np.min(c)), float(np.max(c))) for c in compact.values.T]
     return ErrorPolytope(
@@ -207,11 +207,11 @@ def _braked_slopes(function: ca.Function, cells: Array, sample_time: float) -> t
                               enclose(function, [[(cells[0], cells[1])]]).outputs)  # fmt: skip
     time = (np.array(sample_time), np.array(sample_time))
     x = multiply(time, slope)
-    mean, bent = (
+    mean, curved = (
         (f(x[0]) * (1.0 - 1e-9), f(x[1]) * (1.0 + 1e-9)) for f in (_mean_exponential, _bent_exponential)
     )
     first = multiply(x, mean)
-    second = multiply(multiply(time, rate), multiply(bent, multiply(time, curvature)))
+    second = multiply(multiply(time, rate), multiply(curved, multiply(time, curvature)))
     least, greatest = 1.0 + first[0] + second[0] - 1e-12, 1.0 + first[1] + second[1] + 1e-12
     # Where friction would turn the speed around, it stops it: the slope is zero.
     change = multiply(multiply(time, rate), mean)

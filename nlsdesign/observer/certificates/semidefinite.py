@@ -57,9 +57,9 @@ def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
         sparse.csc_matrix((count, count)), np.asarray(cost, dtype=float), sparse.csc_matrix(np.vstack(rows)),
         np.concatenate(sides), cones, settings,
     )  # fmt: skip
-    found = solver.solve()
-    x = np.array(found.x)
-    return x if str(found.status) in SOLVED and np.all(np.isfinite(x)) else None
+    solution = solver.solve()
+    x = np.array(solution.x)
+    return x if str(solution.status) in SOLVED and np.all(np.isfinite(x)) else None
 
 
 def _triangle(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

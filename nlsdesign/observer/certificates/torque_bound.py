@@ -37,6 +37,13 @@ SLACK = 1.0 + 1e-9
 class Assumptions:
     """Under which a bound on the torque holds.
 
+    Raises
+    ------
+    ValueRangeError
+        If a number is not finite or negative, or a range is empty.
+    UnknownNameError
+        If the number type does not exist.
+
     Parameters
     ----------
     angles
@@ -148,7 +155,7 @@ class _Bounding:
             )
         self.design, self.assumed = design, assumptions
         self.inner = tuple(n for n in plant.names if n not in (plant.angle, plant.speed))
-        self._refuse_corrected()
+        _refuse_corrected(design, self.inner)
         self.view: SpringView = spring_view(
             model, self.inner, estimate=plant.estimate.name, angle=plant.angle,
             spreads=dict(assumptions.spreads),
@@ -171,21 +178,6 @@ class _Bounding:
             self.view.ranges(self.view.rest, cells, whole=True)[1].magnitude, axis=0, initial=0.0
         )
         return lead
-
-    def _refuse_corrected(self) -> None:
-        """Refuse observers in which a correction or another state enters the inner states."""
-        plant, places = self.design.step.plant, self.design.compact.places
-        count, n = len(plant.output_matrix), len(plant.names)
-        for name in self.inner:
-            i = plant.names.index(name)
-            own = [places[f"next[{i}][{j}]"] for j in range(n) if j != i]
-            entering = [*own, *(places[f"correction[{i}][{j}]"] for j in range(count))]
-            if any(p.column is not None or p.factor != 0.0 for p in entering) or plant.measured:
-                raise ArrangementError(
-                    f"torque bound, '{name}'",
-                    "is corrected by a measurement, so current and friction enter the torque",
-                    next_step="take CascadeGain or CertifiedGain in the minimal form",
-                )
 
     def _refined(self, cells: Bounds) -> Bounds:
         """Return the cells, halved where the slope over the angle is known too badly."""
@@ -236,7 +228,7 @@ class _Bounding:
         view, assumed, cells = self.view, self.assumed, self.cells
         z = self._carried(cells, whole=True)
         table, roundoff = self._step_errors(z)
-        shift, lead = self._angle_rounding(), self.lead
+        shift, lead = _angle_rounding(self.design, assumed.real), self.lead
         causes = {
             "encoder": lead * assumed.angle_error,
             "motion": lead * assumed.speed * self.design.step.sample_time / 2.0,
@@ -256,10 +248,15 @@ class _Bounding:
             "motion": 0.0,
             "parameters": float(np.max(moved @ view.spread, initial=0.0)),
             "table": self._output_error(around),
-            "rounding": steep * shift + OPERATIONS * ROUNDING[assumed.real] * self._terms(around, size),
+            "rounding": steep * shift
+            + OPERATIONS * ROUNDING[assumed.real] * _terms(self.design, self.inner, around, size),
         }
         added = {name: float(per @ causes[name]) + direct[name] for name in causes}
-        forget = -np.log(self._kept()) / self.design.step.sample_time if self.inner else np.zeros(0)
+        forget = (
+            -np.log(_kept(self.design, self.inner)) / self.design.step.sample_time
+            if self.inner
+            else np.zeros(0)
+        )
         start = {n: (float(p), float(f)) for n, p, f in zip(self.inner, per, forget, strict=True)}
         if not all(math.isfinite(v) for v in added.values()):
             raise ArrangementError(
@@ -269,15 +266,6 @@ class _Bounding:
         return TorqueBound(**{name: value * SLACK for name, value in added.items()}, start=start)
 
     # --- inner states -----------------------------------------------------------------------------------
-
-    def _kept(self) -> Array:
-        places, names = self.design.compact.places, self.design.step.plant.names
-        found = [places[f"next[{names.index(n)}][{names.index(n)}]"] for n in self.inner]
-        if any(p.column is not None for p in found):
-            raise ArrangementError(
-                "torque bound", "an inner state forgets at a rate that depends on the angle"
-            )
-        return np.array([p.factor for p in found])
 
     def _parameter_errors(self, z: Array) -> Array:
         """Return how far parameters move each inner state: where it rests, and how fast it goes there."""
@@ -299,7 +287,7 @@ class _Bounding:
             return np.zeros(0), np.zeros(0)
         design, time = self.design, self.design.step.sample_time
         rest, rate = (self.view.ranges(self.view.rest, self.cells)[k] for k in (0, 2))
-        kept, n = self._kept(), len(design.step.plant.names)
+        kept, n = _kept(self.design, self.inner), len(design.step.plant.names)
         table, rounding = [], []
         for k, name in enumerate(self.inner):
             i = design.step.plant.names.index(name)
@@ -319,23 +307,12 @@ class _Bounding:
         """Return the largest distance of what is read from weight × rest value, by cells."""
         middle = (self.cells[0] + self.cells[1]) / 2.0
         half = (self.cells[1] - self.cells[0]) / 2.0
-        value, slope = self._read(key, middle)
+        value, slope = _read(self.design, key, middle)
         rest = self.view.ranges(self.view.rest, (middle, middle))[0]
         lead = self.view.ranges(self.view.rest, self.cells)[1]
         at = _distance(value, weight, rest, k)
         steep = _distance(slope, weight, lead, k)
         return float(np.max(at + steep * half))
-
-    def _read(self, key: str, at: Array) -> tuple[Array, Array]:
-        """Return what is read at angles within cells of the table, and its slope there."""
-        compact = self.design.compact
-        place, grid = compact.places[key], compact.angles
-        if place.column is None:
-            return np.full(len(at), place.factor), np.zeros(len(at))
-        column, step = place.factor * compact.values[:, place.column], grid[1] - grid[0]
-        left = np.clip(((at - grid[0]) / step).astype(int), 0, len(grid) - 2)
-        slope = (column[left + 1] - column[left]) / step
-        return column[left] + slope * (at - grid[left]), slope
 
     # --- torque -----------------------------------------------------------------------------------------
 
@@ -345,7 +322,7 @@ class _Bounding:
         half = (self.cells[1] - self.cells[0]) / 2.0
         n, names = len(self.design.step.plant.names), self.design.step.plant.names
         keys = [f"estimate[0][{names.index(name)}]" for name in self.inner] + [f"estimate[0][{n}]"]
-        read = [self._read(key, middle) for key in keys]
+        read = [_read(self.design, key, middle) for key in keys]
         parts = 1 if self.view.affine else 6
         worst = 0.0
         for box in _divided(z, parts, ends=self.view.affine):
@@ -356,19 +333,6 @@ class _Bounding:
             steep = _apart(slope, (slopes.lower[:, 0], slopes.upper[:, 0]))
             worst = max(worst, float(np.max(off + steep * half)))
         return worst
-
-    def _terms(self, z: Array, size: float) -> float:
-        """Return the sum of the sizes of what is added up to the torque."""
-        names = self.design.step.plant.names
-        keys = [f"estimate[0][{names.index(name)}]" for name in self.inner]
-        terms = [float(np.max(np.abs(self._read(key, self.design.compact.angles)[0]))) for key in keys]
-        inner = float(np.dot(terms, np.max(np.abs(z), axis=(0, 2)))) if keys else 0.0
-        return size + 2.0 * inner
-
-    def _angle_rounding(self) -> float:
-        """Return the angle in rad by which rounding moves a look-up."""
-        grid = self.design.compact.angles
-        return 4.0 * ROUNDING[self.assumed.real] * float(grid[-1] - grid[0] + np.max(np.abs(grid)))
 
 
 def _affine(read: list[Array], box: Array) -> Bounds:
@@ -413,3 +377,54 @@ def _lag_difference(ratio: float) -> float:
         return abs(ratio - 1.0)
     time = math.log(ratio) / (ratio - 1.0)
     return abs(math.exp(-time) - math.exp(-ratio * time)) * SLACK
+
+
+def _refuse_corrected(design: ObserverDesign, inner: tuple[str, ...]) -> None:
+    """Refuse observers in which a correction or another state enters the inner states."""
+    plant, places = design.step.plant, design.compact.places
+    count, n = len(plant.output_matrix), len(plant.names)
+    for name in inner:
+        i = plant.names.index(name)
+        own = [places[f"next[{i}][{j}]"] for j in range(n) if j != i]
+        entering = [*own, *(places[f"correction[{i}][{j}]"] for j in range(count))]
+        if any(p.column is not None or p.factor != 0.0 for p in entering) or plant.measured:
+            raise ArrangementError(
+                f"torque bound, '{name}'",
+                "is corrected by a measurement, so current and friction enter the torque",
+                next_step="take CascadeGain or CertifiedGain in the minimal form",
+            )
+
+
+def _kept(design: ObserverDesign, inner: tuple[str, ...]) -> Array:
+    places, names = design.compact.places, design.step.plant.names
+    read_from = [places[f"next[{names.index(n)}][{names.index(n)}]"] for n in inner]
+    if any(p.column is not None for p in read_from):
+        raise ArrangementError("torque bound", "an inner state forgets at a rate that depends on the angle")
+    return np.array([p.factor for p in read_from])
+
+
+def _read(design: ObserverDesign, key: str, at: Array) -> tuple[Array, Array]:
+    """Return what is read at angles within cells of the table, and its slope there."""
+    compact = design.compact
+    place, grid = compact.places[key], compact.angles
+    if place.column is None:
+        return np.full(len(at), place.factor), np.zeros(len(at))
+    column, step = place.factor * compact.values[:, place.column], grid[1] - grid[0]
+    left = np.clip(((at - grid[0]) / step).astype(int), 0, len(grid) - 2)
+    slope = (column[left + 1] - column[left]) / step
+    return column[left] + slope * (at - grid[left]), slope
+
+
+def _terms(design: ObserverDesign, inner: tuple[str, ...], z: Array, size: float) -> float:
+    """Return the sum of the sizes of what is added up to the torque."""
+    names = design.step.plant.names
+    keys = [f"estimate[0][{names.index(name)}]" for name in inner]
+    terms = [float(np.max(np.abs(_read(design, key, design.compact.angles)[0]))) for key in keys]
+    added = float(np.dot(terms, np.max(np.abs(z), axis=(0, 2)))) if keys else 0.0
+    return size + 2.0 * added
+
+
+def _angle_rounding(design: ObserverDesign, real: str) -> float:
+    """Return the angle in rad by which rounding moves a look-up."""
+    grid = design.compact.angles
+    return 4.0 * ROUNDING[real] * float(grid[-1] - grid[0] + np.max(np.abs(grid)))

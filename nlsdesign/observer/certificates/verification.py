@@ -31,7 +31,7 @@ class Check:
     holds
         ``None`` where it could not be looked at.
     detail
-        What was found.
+        What was again.
     """
 
     name: str
@@ -113,8 +113,8 @@ def _hash(text: str) -> str:
 
 
 def _against_code(certificate: Certificate, folder: Path) -> Check:
-    found = hashes_of_code(folder)
-    wrong = [name for name, digest in certificate.code.items() if found.get(name) != digest]
+    again = hashes_of_code(folder)
+    wrong = [name for name, digest in certificate.code.items() if again.get(name) != digest]
     if not certificate.code:
         return Check("C code", False, "the certificate names no C files")
     text = f"{', '.join(wrong)} differs or is missing" if wrong else ", ".join(certificate.code)
@@ -163,16 +163,16 @@ def _torque(certificate: Certificate, model: FlatModel, design: ObserverDesign) 
     if isinstance(claimed, str):
         return Check("torque bound", None, f"none is claimed: {claimed}")
     try:
-        found = torque_bound(model, design, certificate.assumptions)
+        again = torque_bound(model, design, certificate.assumptions)
     except NlsError as error:  # nothing can be bounded, so nothing may be claimed
         return Check("torque bound", False, str(error))
-    return Check("torque bound", _covers(claimed, found), f"{1e3 * found.total:.4g} mN*m found again")
+    return Check("torque bound", _covers(claimed, again), f"{1e3 * again.total:.4g} mN·m found again")
 
 
-def _covers(claimed: TorqueBound, found: TorqueBound) -> bool:
-    causes = all(value <= claimed.causes[name] * (1.0 + 1e-6) + 1e-12 for name, value in found.causes.items())
-    start = claimed.start.keys() == found.start.keys() and all(
+def _covers(claimed: TorqueBound, again: TorqueBound) -> bool:
+    causes = all(value <= claimed.causes[name] * (1.0 + 1e-6) + 1e-12 for name, value in again.causes.items())
+    start = claimed.start.keys() == again.start.keys() and all(
         claimed.start[n][0] * (1.0 + 1e-6) >= torque and claimed.start[n][1] <= rate * (1.0 + 1e-6)
-        for n, (torque, rate) in found.start.items()
+        for n, (torque, rate) in again.start.items()
     )
     return causes and start
