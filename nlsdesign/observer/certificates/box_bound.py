@@ -47,5 +47,6 @@ def clamped_estimate_bound(rows: ArrayLike, estimated: ArrayLike, true: ArrayLik
     if np.any(held[:, 0] > held[:, 1]) or np.any(real[:, 0] > real[:, 1]):
         raise ValueRangeError("bound of a clamped estimate", "a lower bound is above its upper bound")
     # Between two grid points t is a mean of theirs, so no angle is worse than the worse of both.
-    apart = np.maximum(held[:, 1] - real[:, 0], real[:, 1] - held[:, 0])
-    return float(np.max(np.abs(t) @ apart, initial=0.0) * (1.0 + 1e-12))
+    ends = np.stack([t * (held[:, 0] - real[:, 1]), t * (held[:, 1] - real[:, 0])])
+    above, below = np.sum(np.max(ends, axis=0), axis=1), np.sum(np.min(ends, axis=0), axis=1)
+    return float(np.max(np.maximum(above, -below), initial=0.0) * (1.0 + 1e-12))

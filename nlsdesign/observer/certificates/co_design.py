@@ -271,10 +271,10 @@ class CertifiedGain:
             If no gain is fast enough.
         """
         problem = gain_problem(plant, sample_time, angles, condition=self.condition)
-        gain = np.array(scaling(plant))[:, None] * self._found(problem).gain
+        gain = np.array(scaling(plant))[:, None] * self._fast_enough(problem).gain
         return ConstantGain(tuple(tuple(_rounded(v) for v in row) for row in gain))
 
-    def _found(self, problem: GainProblem) -> GainAndLyapunov:
+    def _fast_enough(self, problem: GainProblem) -> GainAndLyapunov:
         wanted = 2.0 * math.pi * self.bandwidth
         for rows in problem.structures:
             if self.decay is not None:
