@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from .controller import export_controller
 from .observer import observer_of, real_option, sample_time_option
 from .output import deck_option, measured_option, out_option, spring_option
 
@@ -13,6 +14,9 @@ from .output import deck_option, measured_option, out_option, spring_option
 @click.group()
 def export() -> None:
     """Write C code or FMUs."""
+
+
+export.add_command(export_controller)
 
 
 @export.command("c")

@@ -9,6 +9,8 @@ import click
 from ..errors import NlsError
 from ..locations import version
 from .analyse import analyse
+from .analyse_angle import analyse_angle
+from .calibrate import calibrate
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
@@ -28,12 +30,15 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-observer.add_command(verify_certificate)
+for part in (calibrate, verify_certificate):
+    observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
     *(cosimulation, simulate, fit, diagnose, study),
 ):
     program.add_command(command)
+for analysis in (analyse_angle,):  # the first is the default
+    analyse.add_command(analysis)
 
 
 def main() -> None:

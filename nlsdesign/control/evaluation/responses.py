@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ...errors import ValueRangeError
 from ...model.roles import moved_load
 from ...simulation import Trace
-from ..loop.closed_loop import PLANT, ClosedLoop
+from ...simulation.sampled_batch import PLANT
+from ..loop.closed_loop import ClosedLoop
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ observer is given the current that really acts in the coming sample.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,16 +16,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError, unknown_name
+from ...errors import ArrangementError, ConvergenceError, ValueRangeError, unknown_name
 from ...model import FlatModel
 from ...simulation import Trace, range_warnings
-from ...simulation.sampled import DiscreteStepper, PlantStepper
+from ...simulation.sampled_batch import PLANT, BatchTrace, SampledSystem, run_batch
 from ..laws.torque_loop import LoopNames, loop_names
 
 Array = NDArray[np.float64]
 Drive = Callable[[float], float] | float
 
-PLANT, OBSERVER, CONTROLLER = "plant", "observer", "controller"
+OBSERVER, CONTROLLER = "observer", "controller"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -133,7 +133,78 @@ class ClosedLoop:
         ConvergenceError
             If the plant runs away.
         """
-        return _Run(self, inputs, dict(start or {})).until(stop)
+        kept = _kept(self)
+        batch = run_batch(self.system(inputs), stop, inputs=inputs, start=start, keep=kept)
+        if not batch.finite[0]:
+            lost = np.flatnonzero(~np.all([np.isfinite(batch[name][0]) for name in kept], axis=0))
+            at = batch.time[lost[0]] if len(lost) else batch.time[-1]
+            raise ConvergenceError(
+                f"plant {self.plant.name} at t = {at:g} s", "a state is not finite",
+                next_step="use more substeps per sample, or check the gains of the loop",
+            )  # fmt: skip
+        return _record(self, batch)
+
+    def system(self, opened: Iterable[str]) -> SampledSystem:
+        """Return plant, observer and controller as one sampled system, for many runs at once.
+
+        Parameters
+        ----------
+        opened
+            Full names of the inputs that are driven from outside.
+
+        Raises
+        ------
+        UnknownNameError
+            If an input or the source of a wire does not exist.
+        ArrangementError
+            If an input is neither driven nor wired.
+        """
+        opened = set(opened)
+        sources = {
+            f"{owner}.{v.name}": self._source(owner, v.name, opened)
+            for owner, model in ((OBSERVER, self.observer), (CONTROLLER, self.controller))
+            for v in model.inputs
+        }
+        self._check_open(opened, sources)
+        self._check_sources(sources)
+        return SampledSystem(
+            plant=self.plant,
+            blocks={OBSERVER: self.observer, CONTROLLER: self.controller},
+            sources=sources,
+            driven=self.names.current,
+            delay=self.delay,
+            substeps=self.substeps,
+        )
+
+    def _source(self, owner: str, name: str, opened: set[str]) -> str:
+        full = f"{owner}.{name}"
+        if full in opened:
+            return full
+        if full in self.wires:
+            return self.wires[full]
+        outputs = {v.name for v in self.observer.outputs}
+        return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
+
+    def _check_open(self, opened: set[str], sources: Mapping[str, str]) -> None:
+        known = {f"{PLANT}.{v.name}" for v in self.plant.inputs} - {f"{PLANT}.{self.names.current}"}
+        known |= {name for name, source in sources.items() if source == name}
+        known |= {f"{CONTROLLER}.{v.name}" for v in self.controller.inputs}
+        for name in opened:
+            if name not in known:
+                raise unknown_name("input of the loop", name, known)
+
+    def _check_sources(self, sources: Mapping[str, str]) -> None:
+        known = {f"{PLANT}.{name}" for name in _names(self.plant)}
+        known |= {f"{OBSERVER}.{v.name}" for v in self.observer.outputs}
+        for name, source in sources.items():
+            if source in known or source == name:
+                continue
+            if name in self.wires:
+                raise unknown_name(f"wire to '{name}' from", source, known)
+            raise ArrangementError(
+                f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
+                next_step="give it in inputs or in wires",
+            )  # fmt: skip
 
 
 def _names(model: FlatModel) -> set[str]:
@@ -141,156 +212,35 @@ def _names(model: FlatModel) -> set[str]:
     return {v.name for group in groups for v in group}
 
 
-class _Run:
-    """One simulation: the steppers, the wiring, the record."""
+def _kept(loop: ClosedLoop) -> list[str]:
+    groups = (
+        (PLANT, loop.plant.states), (PLANT, loop.plant.inputs), (OBSERVER, loop.observer.inputs),
+        (OBSERVER, loop.observer.outputs), (CONTROLLER, loop.controller.inputs),
+        (CONTROLLER, loop.controller.outputs),
+    )  # fmt: skip
+    return [f"{owner}.{v.name}" for owner, group in groups for v in group]
 
-    def __init__(self, loop: ClosedLoop, inputs: Mapping[str, Drive], start: dict[str, float]) -> None:
-        self.loop = loop
-        self.observer, self.controller = DiscreteStepper(loop.observer), DiscreteStepper(loop.controller)
-        self.open = dict(inputs)
-        self.current_name = loop.names.current
-        self.current = [v.name for v in loop.plant.inputs].index(self.current_name)
-        self.sources = {
-            f"{owner}.{v.name}": self._source(owner, v.name)
-            for owner, model in ((OBSERVER, loop.observer), (CONTROLLER, loop.controller))
-            for v in model.inputs
-        }
-        self._check_open()
-        self._check_sources()
-        used = set(self.sources.values())
-        self.seen = sorted(
-            name for name in _names(loop.plant) if name != self.current_name and f"{PLANT}.{name}" in used
-        )
-        self.plant = PlantStepper(loop.plant, loop.sample_time, loop.substeps, self.seen)
-        self._begin(start)
 
-    def _source(self, owner: str, name: str) -> str:
-        full = f"{owner}.{name}"
-        if full in self.open:
-            return full
-        if full in self.loop.wires:
-            return self.loop.wires[full]
-        outputs = {v.name for v in self.loop.observer.outputs}
-        return f"{OBSERVER if owner == CONTROLLER and name in outputs else PLANT}.{name}"
-
-    def _check_open(self) -> None:
-        known = {f"{PLANT}.{v.name}" for v in self.loop.plant.inputs} - {f"{PLANT}.{self.current_name}"}
-        known |= {name for name, source in self.sources.items() if source == name}
-        known |= {f"{CONTROLLER}.{v.name}" for v in self.loop.controller.inputs}
-        for name in self.open:
-            if name not in known:
-                raise unknown_name("input of the loop", name, known)
-
-    def _check_sources(self) -> None:
-        known = {f"{PLANT}.{name}" for name in _names(self.loop.plant)}
-        known |= {f"{OBSERVER}.{v.name}" for v in self.loop.observer.outputs}
-        for name, source in self.sources.items():
-            if source in known or source == name:
-                continue
-            if name in self.loop.wires:
-                raise unknown_name(f"wire to '{name}' from", source, known)
-            raise ArrangementError(
-                f"input '{name}'", "is open: it is neither driven nor wired, and nothing has the same name",
-                next_step="give it in inputs or in wires",
-            )  # fmt: skip
-
-    def _begin(self, start: dict[str, float]) -> None:
-        owners = {
-            PLANT: (self.loop.plant, self.plant.state),
-            OBSERVER: (self.loop.observer, self.observer.state),
-        }
-        owners[CONTROLLER] = (self.loop.controller, self.controller.state)
-        known = {
-            f"{o}.{v.name}": (state, i) for o, (m, state) in owners.items() for i, v in enumerate(m.states)
-        }
-        for name, value in start.items():
-            if name not in known:
-                raise unknown_name("state of the loop", name, known)
-            state, place = known[name]
-            state[place] = value
-
-    def until(self, stop: float) -> Trace:
-        """Run, and return the record."""
-        step = self.loop.sample_time
-        time: Array = step * np.arange(round(stop / step) + 1.0)
-        loop = self.loop
-        groups = (
-            loop.plant.states, loop.plant.inputs, loop.observer.inputs, loop.observer.outputs,
-            loop.controller.inputs, loop.controller.outputs,
-        )  # fmt: skip
-        logs = [np.zeros((len(group), len(time))) for group in groups]
-        others = [
-            (i, self._drive(f"{PLANT}.{v.name}", v.start))
-            for i, v in enumerate(loop.plant.inputs)
-            if i != self.current
-        ]
-        waiting = [float(loop.plant.inputs[self.current].start)] * loop.delay
-        for k, now in enumerate(time):
-            for i, drive in others:
-                self.plant.begin[i], self.plant.end[i] = drive(now), drive(now + step)
-            current = self._sample(float(now), waiting)
-            parts = (
-                self.plant.state, self.plant.begin, self.observer.inputs, self.observer.outputs,
-                self.controller.inputs, self.controller.outputs,
-            )  # fmt: skip
-            for log, part in zip(logs, parts, strict=True):
-                log[:, k] = part[: len(log)]
-            if k + 1 < len(time):
-                self.plant.end[self.current] = current
-                self.plant.advance(float(now))
-        return self._trace(time, logs)
-
-    def _sample(self, now: float, waiting: list[float]) -> float:
-        """Step observer and controller at one sample; return the current that acts in the coming one."""
-        if waiting:
-            self.plant.begin[self.current] = waiting[0]
-        acting_now = f"{PLANT}.{self.current_name}"
-        known = {f"{PLANT}.{n}": v for n, v in zip(self.seen, self.plant.read(now), strict=False)}
-        known[acting_now] = self.plant.begin[self.current]
-        self._feed(OBSERVER, self.observer, known, now)
-        self.observer.evaluate()
-        known |= {
-            f"{OBSERVER}.{v.name}": self.observer.outputs[i] for i, v in enumerate(self.loop.observer.outputs)
-        }
-        self._feed(CONTROLLER, self.controller, known, now)
-        self.controller.evaluate()
-        self.controller.advance()
-        waiting.append(float(self.controller.outputs[0]))
-        acting = waiting.pop(0)
-        if self.loop.delay == 0:
-            # What was computed just now acts at once: the observer is given it before it moves on.
-            self.plant.begin[self.current] = known[acting_now] = acting
-            self._feed(OBSERVER, self.observer, known, now)
-            self.observer.evaluate()
-        self.observer.advance()
-        return acting
-
-    def _feed(self, owner: str, stepper: DiscreteStepper, known: Mapping[str, float], now: float) -> None:
-        for i, v in enumerate(stepper.model.inputs):
-            source = self.sources[f"{owner}.{v.name}"]
-            stepper.inputs[i] = known[source] if source in known else self._drive(source, v.start)(now)
-
-    def _drive(self, name: str, rest: float) -> Callable[[float], float]:
-        given = self.open.get(name, rest)
-        if callable(given):
-            return given
-        constant = float(given)
-        return lambda _: constant
-
-    def _trace(self, time: Array, logs: list[Array]) -> Trace:
-        loop = self.loop
-        plant = loop.plant
-        p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
-        _, y, s, _ = plant.equations.map(len(time))(
-            time[None, :], logs[0], logs[1], p, np.zeros((0, len(time)))
-        )
-        groups = [
-            (PLANT, plant.signals, np.array(ca.densify(s))), (PLANT, plant.outputs, np.array(ca.densify(y))),
-            (PLANT, plant.inputs, logs[1]), (PLANT, plant.states, logs[0]),
-            (OBSERVER, loop.observer.inputs, logs[2]), (OBSERVER, loop.observer.outputs, logs[3]),
-            (CONTROLLER, loop.controller.inputs, logs[4]), (CONTROLLER, loop.controller.outputs, logs[5]),
-        ]  # fmt: skip
-        signals = {f"{o}.{v.name}": rows[i] for o, group, rows in groups for i, v in enumerate(group)}
-        units = {f"{o}.{v.name}": v.unit for o, group, _ in groups for v in group}
-        warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
-        return Trace(time, signals, units, f"closed loop of {plant.name}", warnings=warnings)
+def _record(loop: ClosedLoop, batch: BatchTrace) -> Trace:
+    """Return the record, with the signals of the plant computed from its states and inputs."""
+    plant, time = loop.plant, batch.time
+    x, u = (
+        np.array([batch[f"{PLANT}.{v.name}"][0] for v in group]).reshape(len(group), len(time))
+        for group in (plant.states, plant.inputs)
+    )
+    p = np.repeat(plant.start(plant.parameters)[:, None], len(time), axis=1)
+    _, y, s, _ = plant.equations.map(len(time))(time[None, :], x, u, p, np.zeros((0, len(time))))
+    rows = {f"{PLANT}.{v.name}": row for v, row in zip(plant.signals, ca.densify(s).full(), strict=True)}
+    rows |= {f"{PLANT}.{v.name}": row for v, row in zip(plant.outputs, ca.densify(y).full(), strict=True)}
+    signals = rows | {name: values[0] for name, values in batch.signals.items()}
+    owners = {PLANT: plant, OBSERVER: loop.observer, CONTROLLER: loop.controller}
+    units = {
+        f"{owner}.{v.name}": v.unit
+        for owner, model in owners.items()
+        for v in (*model.signals, *model.states, *model.inputs, *model.outputs)
+    }
+    warnings = range_warnings(plant.signals + plant.states, time, signals, f"{PLANT}.")
+    return Trace(
+        time, signals, {name: units[name] for name in signals}, f"closed loop of {plant.name}",
+        warnings=warnings,
+    )  # fmt: skip

@@ -1,0 +1,107 @@
+"""Many runs of one sampled system: each is the run alone, compiled code gives the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nlsdesign.control import ClosedLoop, torque_controller
+from nlsdesign.errors import UnknownNameError, ValueRangeError
+from nlsdesign.export import natively
+from nlsdesign.model import FlatModel
+from nlsdesign.observer import FixedGrid, design_observer
+from nlsdesign.simulation.sampled_batch import SampledSystem, run_batch
+from tests import observed as ob
+
+DESIRED = "controller.spring.torque.desired"
+KEPT = ("plant.spring.torque", "observer.spring.torque", "plant.motor.current")
+WIRES = {
+    "observer.motor.angle": "plant.motor_encoder.reading",
+    "controller.motor.angle": "plant.motor_encoder.reading",
+}
+
+
+@pytest.fixture(scope="module")
+def plant() -> FlatModel:
+    return ob.bench(ob.SLOW, friction=0.02)
+
+
+@pytest.fixture(scope="module")
+def loop(plant: FlatModel) -> ClosedLoop:
+    observer = design_observer(plant, grid=FixedGrid(-1.2, 1.2, points=241))
+    return ClosedLoop(plant=plant, observer=observer, controller=torque_controller(plant), wires=WIRES)
+
+
+@pytest.fixture(scope="module")
+def system(loop: ClosedLoop) -> SampledSystem:
+    return loop.system([DESIRED])
+
+
+def wanted(time: float) -> float:
+    return 0.3 * np.sin(2.0 * np.pi * 4.0 * time)
+
+
+def test_each_run_of_a_batch_is_the_run_alone(loop: ClosedLoop, system: SampledSystem) -> None:
+    """Longer than a chunk; inertia, a gain and the desired torque differ from run to run."""
+    inertias, gains, sizes = (
+        np.array([4e-4, 6e-4, 9e-4]),
+        np.array([20.0, 30.0, 40.0]),
+        np.array([1.0, 0.5, 2.0]),
+    )
+    time = 1e-3 * np.arange(301)
+    batch = run_batch(
+        system, 0.3, inputs={DESIRED: sizes[:, None] * np.array([wanted(t) for t in time])},
+        parameters={"plant.motor.inertia": inertias, "controller.controller.proportional": gains}, keep=KEPT,
+    )  # fmt: skip
+    assert np.all(batch.finite)
+    for i in range(3):
+        alone = ClosedLoop(
+            plant=loop.plant.with_values({"motor.inertia": inertias[i]}),
+            observer=loop.observer,
+            controller=loop.controller.with_values({"controller.proportional": gains[i]}),
+            wires=WIRES,
+        ).run(0.3, inputs={DESIRED: lambda t, size=sizes[i]: size * wanted(t)})
+        for name in KEPT:
+            size = np.max(np.abs(alone[name]))
+            assert size > 0.05
+            assert np.max(np.abs(batch[name][i] - alone[name])) < 1e-9 * size, name
+
+
+def test_compiled_code_gives_the_same(system: SampledSystem) -> None:
+    runs = [
+        run_batch(
+            system, 0.3, inputs={DESIRED: wanted}, parameters={"plant.motor.inertia": np.array([4e-4, 9e-4])},
+            keep=KEPT, **translated,
+        )
+        for translated in ({}, {"translate": natively})
+    ]  # fmt: skip
+    for name in KEPT:
+        assert np.max(np.abs(runs[0][name] - runs[1][name])) < 1e-9, name
+
+
+def test_a_run_that_diverges_is_marked_and_leaves_the_others_alone(loop: ClosedLoop) -> None:
+    """One Runge-Kutta step per sample is unstable for a damping of 50 N·m·s/rad on the printed inertia."""
+    coarse = ClosedLoop(
+        plant=loop.plant, observer=loop.observer, controller=loop.controller, wires=WIRES, substeps=1
+    )
+    batch = run_batch(
+        coarse.system([DESIRED]), 2.0, inputs={DESIRED: 0.0}, start={"plant.motor.speed": 1.0},
+        parameters={"plant.bearing.damping": np.array([0.5, 50.0])}, keep=("plant.motor.angle",),
+    )  # fmt: skip
+    assert batch.finite.tolist() == [True, False]
+    assert np.all(np.isfinite(batch["plant.motor.angle"][0]))
+    assert np.isnan(batch["plant.motor.angle"][1, -1])
+
+
+def test_names_and_lengths_are_checked(system: SampledSystem) -> None:
+    with pytest.raises(UnknownNameError, match=r"did you mean 'plant\.motor\.inertia'"):
+        run_batch(system, 0.1, inputs={DESIRED: 0.0}, parameters={"plant.motor.inertai": 1.0}, keep=KEPT)
+    with pytest.raises(UnknownNameError, match=r"did you mean 'spring\.torque'"):
+        run_batch(system, 0.1, inputs={DESIRED: 0.0}, keep=("plant.spring.torqe",))
+    with pytest.raises(ValueRangeError, match="the run has 101 samples"):
+        run_batch(system, 0.1, inputs={DESIRED: np.zeros(50)}, keep=KEPT)
+    with pytest.raises(ValueRangeError, match=r"arrays of \[2, 3\] values"):
+        run_batch(
+            system, 0.1, inputs={DESIRED: 0.0}, keep=KEPT,
+            parameters={"plant.motor.inertia": np.ones(2), "plant.bearing.damping": np.ones(3)},
+        )  # fmt: skip
