@@ -9,7 +9,7 @@ from .certificate import Certificate, certify, declared_assumptions
 from .certificate_file import certificate_text, read_certificate, write_certificate
 from .co_design import CertifiedGain
 from .polytope import ErrorPolytope, error_polytope
-from .torque_bound import Assumptions, TorqueBound, torque_bound
+from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
 from .verification import Check, Verification, verify
 
 __all__ = [
@@ -18,7 +18,7 @@ __all__ = [
     "CertifiedGain",
     "Check",
     "ErrorPolytope",
-    "TorqueBound",
+    "TorqueErrorBound",
     "Verification",
     "certificate_text",
     "certify",

@@ -28,7 +28,7 @@ from .exact import (
     transposed,
 )
 from .polytope import ErrorPolytope, error_polytope
-from .torque_bound import Assumptions, TorqueBound, torque_bound
+from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class Certificate:
     decay: float
     condition: float
     assumptions: Assumptions
-    torque: TorqueBound | str
+    torque: TorqueErrorBound | str
     code: Mapping[str, str]
 
     @property
@@ -161,7 +161,7 @@ def certify(
     decay, lyapunov = _proved(polytope, errors, decay, condition)
     assumed = assumptions or declared_assumptions(model, design)
     try:
-        torque: TorqueBound | str = torque_bound(model, design, assumed)
+        torque: TorqueErrorBound | str = torque_bound(model, design, assumed)
     except ArrangementError as error:
         torque = f"{error.thing} {error.rule}"  # the contraction holds without it; the file says why
     plant = design.step.plant

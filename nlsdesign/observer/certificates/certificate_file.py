@@ -15,7 +15,7 @@ from ...writing import write_text
 from ..scheduling.gains import ConstantGain
 from .certificate import Certificate
 from .polytope import EntryReading, ErrorPolytope
-from .torque_bound import Assumptions, TorqueBound
+from .torque_bound import Assumptions, TorqueErrorBound
 
 FORMAT = "nlsdesign observer certificate 1"
 
@@ -135,11 +135,11 @@ def _certificate(content: dict[str, Any]) -> Certificate:
     lyapunov = np.array(content["lyapunov"], dtype=float)
     if lyapunov.shape != (n, n) or len(matrix) != n or len(polytope.sizes) != n or min(polytope.sizes) <= 0.0:
         raise ValueError("matrices do not have one row per state")
-    bound: TorqueBound | str = torque
+    bound: TorqueErrorBound | str = torque
     if not isinstance(torque, str):
         start = {k: (v[0], v[1]) for k, v in torque["start"].items()}
         causes = {k: float(v) for k, v in torque.items() if k not in ("total", "start")}
-        bound = TorqueBound(**causes, start=start)
+        bound = TorqueErrorBound(**causes, start=start)
     assumed = Assumptions(
         (a["angles"][0], a["angles"][1]), a["speed"], a["angle_error"], a["spreads"], a["real"]
     )

@@ -79,7 +79,7 @@ class Assumptions:
 
 
 @dataclass(frozen=True)
-class TorqueBound:
+class TorqueErrorBound:
     """Bounds on the torque error in N·m, by cause; they add up.
 
     Parameters
@@ -117,7 +117,7 @@ class TorqueBound:
         return {name: float(getattr(self, name)) for name in names}
 
 
-def torque_bound(model: FlatModel, design: ObserverDesign, assumptions: Assumptions) -> TorqueBound:
+def torque_bound(model: FlatModel, design: ObserverDesign, assumptions: Assumptions) -> TorqueErrorBound:
     """Return a bound on the torque error that holds for every motion and every current.
 
     Parameters
@@ -223,7 +223,7 @@ class _Bounding:
         moved: Array = np.einsum("cpi,p->ci", by, self.view.spread)
         return moved
 
-    def bound(self) -> TorqueBound:
+    def bound(self) -> TorqueErrorBound:
         """Return the bound; see :func:`torque_bound`."""
         view, assumed, cells = self.view, self.assumed, self.cells
         z = self._carried(cells, whole=True)
@@ -263,7 +263,7 @@ class _Bounding:
                 "torque bound", "is infinite: a law has no bounded slope over these ranges",
                 next_step="narrow the angles or the spreads",
             )  # fmt: skip
-        return TorqueBound(**{name: value * SLACK for name, value in added.items()}, start=start)
+        return TorqueErrorBound(**{name: value * SLACK for name, value in added.items()}, start=start)
 
     # --- inner states -----------------------------------------------------------------------------------
 

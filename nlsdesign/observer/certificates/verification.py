@@ -14,7 +14,7 @@ from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
 from ..scheduling.table import Grid
 from .certificate import Certificate, contracts, hashes_of_code, within_condition
 from .polytope import ErrorPolytope, error_polytope
-from .torque_bound import TorqueBound, torque_bound
+from .torque_bound import TorqueErrorBound, torque_bound
 
 SAME = 1e-9
 """Relative difference of numbers that another machine may compute for the same table."""
@@ -169,7 +169,7 @@ def _torque(certificate: Certificate, model: FlatModel, design: ObserverDesign) 
     return Check("torque bound", _covers(claimed, again), f"{1e3 * again.total:.4g} mN·m found again")
 
 
-def _covers(claimed: TorqueBound, again: TorqueBound) -> bool:
+def _covers(claimed: TorqueErrorBound, again: TorqueErrorBound) -> bool:
     causes = all(value <= claimed.causes[name] * (1.0 + 1e-6) + 1e-12 for name, value in again.causes.items())
     start = claimed.start.keys() == again.start.keys() and all(
         claimed.start[n][0] * (1.0 + 1e-6) >= torque and claimed.start[n][1] <= rate * (1.0 + 1e-6)
