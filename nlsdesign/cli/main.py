@@ -10,13 +10,16 @@ from ..errors import NlsError
 from ..locations import version
 from .analyse import analyse
 from .analyse_angle import analyse_angle
+from .calibrate import calibrate
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose, simulate
-from .export import export, observer
+from .export import export
 from .fit import fit
 from .materials import materials
+from .observer import observer
+from .observer_certificate import verify_certificate
 from .parts import parts
 from .studies import study
 
@@ -27,6 +30,8 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
+for part in (calibrate, verify_certificate):
+    observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
     *(cosimulation, simulate, fit, diagnose, study),

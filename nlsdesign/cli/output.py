@@ -95,5 +95,5 @@ measured_option = click.option(
     help="What is measured; by default the motion of the driven body.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
-deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK",
-                           help="Deck file, or the name of one that comes with the project.")  # fmt: skip
+DECK_HELP = "Deck file, or the name of one that comes with the project."
+deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK", help=DECK_HELP)

@@ -1,26 +1,53 @@
 """From a flat model to a discrete observer, which is a flat model again."""
 
 from .adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from .adaptive.estimator_bound import SensedTorque, EstimatorBound, estimator_bound
+from .adaptive.adaptive_settings import AdaptiveSettings, Trust
 from .adaptive.directions import UncertainDirections
 from .adaptive.duty import Duty
-from .adaptive.adaptive_settings import AdaptiveSettings, Trust
+from .adaptive.estimator_bound import EstimatorBound, SensedTorque, estimator_bound
+from .certificates import (
+    Assumptions,
+    Certificate,
+    CertifiedGain,
+    TorqueErrorBound,
+    Verification,
+    certify,
+    clamped_estimate_bound,
+    declared_assumptions,
+    read_certificate,
+    torque_bound,
+    verify,
+    write_certificate,
+)
 from .scheduling.check import ErrorStability, check_stability
 from .scheduling.forms import Minimal, PaperForm, StateForm
-from .scheduling.gains import CascadeGain, GainRule, PolePlacement, SteadyStateKalman
+from .scheduling.gains import (
+    CascadeGain,
+    ConstantGain,
+    FittedGain,
+    GainRule,
+    PolePlacement,
+    SteadyStateKalman,
+)
 from .scheduling.run import observe
 from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
+from .spread.bench_trial import Trial, bench_trial
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer
 from .spread.spread_errors import SpreadErrors, observer_errors
-from .spread.bench_trial import Trial, bench_trial
 
 __all__ = [
     "AdaptiveDesign",
     "AdaptiveSettings",
+    "Assumptions",
     "CascadeGain",
+    "Certificate",
+    "CertifiedGain",
+    "ConstantGain",
     "Duty",
     "ErrorStability",
+    "EstimatorBound",
+    "FittedGain",
     "FixedGrid",
     "GainRule",
     "Grid",
@@ -34,17 +61,25 @@ __all__ = [
     "SpreadErrors",
     "StateForm",
     "SteadyStateKalman",
-    "EstimatorBound",
+    "TorqueErrorBound",
     "Trial",
     "Trust",
     "UncertainDirections",
+    "Verification",
     "bench_trial",
+    "certify",
     "check_stability",
     "choose_observer",
+    "clamped_estimate_bound",
+    "declared_assumptions",
     "design_adaptive_observer",
     "design_observer",
     "design_observer_with_details",
+    "estimator_bound",
     "observe",
     "observer_errors",
-    "estimator_bound",
+    "read_certificate",
+    "torque_bound",
+    "verify",
+    "write_certificate",
 ]

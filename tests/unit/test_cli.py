@@ -234,6 +234,21 @@ def test_a_folder_that_cannot_be_made_after_all_is_one_message(
     assert "new: cannot be made (Read-only file system) -> name another folder" in err
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "Missing option '--deck'"),
+        (("unheard-of",), "No such command 'unheard-of'"),
+    ],
+)
+def test_the_observer_asks_for_a_deck_or_a_command_that_exists(
+    words: tuple[str, ...], said: str, run: Run
+) -> None:
+    status, out, err = run("observer", *words)
+    assert (status, out) == (2, "")
+    assert said in err
+
+
 def test_analyse_without_a_command_goes_over_the_angle(run: Run, tmp_path: Path) -> None:
     words = ("--deck", DECK, "--from", "-10 deg", "--to", "45 deg", "--count", "5", "--out", "o")
     short, named = (run("analyse", *more, *words) for more in ((), ("angle",)))

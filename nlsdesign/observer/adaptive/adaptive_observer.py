@@ -34,12 +34,12 @@ from ..scheduling.gains import CascadeGain
 from ..scheduling.scheduled import MEMORY, whole_contour
 from ..scheduling.step import ObserverStep
 from ..scheduling.table import Compact, Grid
+from .adaptive_settings import AdaptiveSettings, Trust
 from .adaptive_step import AdaptiveStep, adaptive_step
 from .adaptive_variables import filter_model
 from .directions import UncertainDirections, uncertain_directions
 from .duty import Duty, operating_points
 from .filter_equations import FilterEquations, FilterNoise
-from .adaptive_settings import AdaptiveSettings, Trust
 
 Array = NDArray[np.float64]
 

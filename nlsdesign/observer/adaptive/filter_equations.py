@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ...symbolic import Expression
 from ..scheduling.table import Compact
-from .adaptive_step import AdaptiveStep
 from .adaptive_settings import Trust
+from .adaptive_step import AdaptiveStep
 
 Array = NDArray[np.float64]
 

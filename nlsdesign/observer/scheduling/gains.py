@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from scipy.signal import place_poles
 
 from ...analysis.kalman import discrete_noise, steady_state_kalman
 from ...errors import ConvergenceError, ValueRangeError, unknown_name
+
+if TYPE_CHECKING:
+    from .plant import AngleScheduledPlant
 
 Array = NDArray[np.float64]
 Spectrum: TypeAlias = NDArray[np.complex128]
@@ -70,6 +73,69 @@ class GainRule(Protocol):
             The plant at one angle.
         """
         ...
+
+
+@runtime_checkable
+class FittedGain(Protocol):
+    """What chooses the correction for all angles together, from the whole plant."""
+
+    def fitted(self, plant: AngleScheduledPlant, sample_time: float, angles: Array) -> GainRule:
+        """Return the rule for each angle.
+
+        Parameters
+        ----------
+        plant
+            In the form that an observer is designed on.
+        sample_time
+            T in s.
+        angles
+            Angles that stand for the range, shape (N,).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ConstantGain:
+    """One correction for every angle.
+
+    Raises
+    ------
+    ValueRangeError
+        If the rows are not of one length, or a number is not finite.
+
+    Parameters
+    ----------
+    rows
+        M, one row per state, one number per measured output.
+    """
+
+    rows: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        widths = {len(row) for row in self.rows}
+        if len(widths) != 1 or not all(math.isfinite(v) for row in self.rows for v in row):
+            raise ValueRangeError("constant gain", "needs rows of one length with finite numbers")
+
+    def correction(self, plant: SampledPlant) -> Array:
+        """Return M; see :class:`GainRule`.
+
+        Raises
+        ------
+        ValueRangeError
+            If it is not made for so many states and outputs.
+        """
+        m = np.array(self.rows)
+        if m.shape != plant.output_matrix.T.shape:
+            states, outputs = plant.output_matrix.T.shape
+            raise ValueRangeError(
+                f"constant gain with {m.shape[0]} rows and {m.shape[1]} columns",
+                f"the observer has {states} states and {outputs} measured outputs",
+            )
+        return m
+
+    def __str__(self) -> str:
+        rows = "; ".join(" ".join(f"{v:.6g}" for v in row) for row in self.rows)
+        return f"constant gain [{rows}]"
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ from ...model import FlatModel, Table, Variable
 from ...model.roles import measured_motion, spring_torque
 from ...quantity import typeset_unit
 from ...symbolic import Expression
+from .braking import braked_speed
 from .forms import Minimal, StateForm
-from .gains import CascadeGain, GainRule
+from .gains import CascadeGain, FittedGain, GainRule
 from .step import ObserverStep
 from .table import Compact, Grid, GridByTolerance
 
@@ -88,7 +89,7 @@ def design_observer_with_details(
     estimate: str | None = None,
     measured: str | None = None,
     sample_time: float = 1e-3,
-    gain: GainRule | None = None,
+    gain: GainRule | FittedGain | None = None,
     form: StateForm | None = None,
     grid: Grid | None = None,
 ) -> ObserverDesign:
@@ -129,7 +130,8 @@ def design_observer_with_details(
     rule, over = gain or CascadeGain(), grid or whole_contour(model)
     reference = np.linspace(over.lower, over.upper, 65)
     plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
-    step = ObserverStep(plant, rule, sample_time, reference)
+    fitted = rule.fitted(plant, sample_time, reference) if isinstance(rule, FittedGain) else rule
+    step = ObserverStep(plant, fitted, sample_time, reference)
     compact = over.compact(step.entries)
     observed = tuple(body for body in model.bodies if body.motion == measured)
     design = ObserverDesign(replace(_Writer(step, compact).model(), bodies=observed), step, compact)
@@ -228,22 +230,11 @@ class _Writer:
         )
 
     def _braked(self, state: list[Expression]) -> list[Expression]:
-        """Return the state after friction has acted for one sample on the speed that all else left.
-
-        Friction is stiff near zero speed: held at its value it would throw the speed from side to side. So it
-        comes last (Lie splitting), its step is the exponential Rosenbrock–Euler one, Δω = T·f·(e^x − 1)/x
-        with x = T·∂f/∂ω, which is exact where f is linear, and it may stop the speed but not turn it around.
-        The angle moves by half of that.
-        """
+        """Return the state after friction has acted for one sample; the angle moves by half of that."""
         if self.plant.friction is None:
             return state
-        time, speed = self.step.sample_time, ca.SX.sym("speed")
-        rate = ca.SX(self.plant.friction(speed))
-        x = time * ca.jacobian(rate, speed)
-        # Away from zero, where the quotient is undefined; its limit there is one.
-        x = x - 1e-9 * (ca.fabs(x) < 1e-9)
-        left = speed + time * rate * ca.expm1(x) / x
-        change = ca.substitute(left * (left * speed > 0) - speed, speed, state[self.speed_place])
+        time, before = self.step.sample_time, state[self.speed_place]
+        change = ca.SX(braked_speed(self.plant.friction, time)(before)) - before
         after = list(state)
         after[self.angle_place] += time / 2.0 * change
         after[self.speed_place] += change

@@ -12,10 +12,10 @@ from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
 from ...simulation.sampled_batch import run_batch
 from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
-from ..adaptive.adaptive_variables import SPREAD
 from ..adaptive.adaptive_settings import AdaptiveSettings
+from ..adaptive.adaptive_variables import SPREAD
 from ..scheduling.forms import StateForm
-from ..scheduling.gains import GainRule
+from ..scheduling.gains import FittedGain, GainRule
 from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
 from ..scheduling.table import Grid
 from .bench_trial import bench_trial
@@ -131,7 +131,7 @@ def design_observer(
     estimate: str | None = None,
     measured: str | None = None,
     sample_time: float = 1e-3,
-    gain: GainRule | None = None,
+    gain: GainRule | FittedGain | None = None,
     form: StateForm | None = None,
     grid: Grid | None = None,
 ) -> FlatModel:
@@ -160,7 +160,7 @@ def design_observer(
     sample_time
         In s.
     gain
-        Rule for the correction of a scheduled observer.
+        Rule for the correction of a scheduled observer, at each angle or for all angles together.
     form
         Which states a scheduled observer carries; :class:`~nlsdesign.observer.scheduling.forms.Minimal` where
         only a gain is named.

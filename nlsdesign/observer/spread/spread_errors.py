@@ -17,7 +17,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior, declared_prior
 from ...simulation.sampled_batch import PLANT, BatchTrace, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
-from ..adaptive.estimator_bound import SensedTorque, rms_over, estimator_bound
+from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from .bench_trial import Trial
 
 Array = NDArray[np.float64]

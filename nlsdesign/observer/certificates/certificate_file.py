@@ -1,0 +1,152 @@
+"""Certificates as JSON files that a stranger can read and re-check."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import MeasurementError, NlsError
+from ...writing import write_text
+from ..scheduling.gains import ConstantGain
+from .certificate import Certificate
+from .polytope import EntryReading, ErrorPolytope
+from .torque_bound import Assumptions, TorqueErrorBound
+
+FORMAT = "nlsdesign observer certificate 1"
+
+
+def certificate_text(certificate: Certificate) -> str:
+    """Return the JSON text of a certificate.
+
+    Parameters
+    ----------
+    certificate
+        What is proved.
+    """
+    content = _content(certificate)
+    content["checksum"] = _checksum(content)
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def write_certificate(certificate: Certificate, path: str | Path) -> Path:
+    """Write a certificate as JSON.
+
+    Parameters
+    ----------
+    certificate
+        What is proved.
+    path
+        File.
+
+    Raises
+    ------
+    ExportError
+        If the file cannot be written.
+    """
+    write_text(Path(path), certificate_text(certificate))
+    return Path(path)
+
+
+def read_certificate(path: str | Path) -> tuple[Certificate, bool]:
+    """Read a certificate, and whether its checksum and its sentences are those of its numbers.
+
+    Parameters
+    ----------
+    path
+        File.
+
+    Raises
+    ------
+    MeasurementError
+        If it cannot be read, or is no certificate of this format.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        content = json.loads(text, parse_constant=_refuse)
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise MeasurementError(str(path), f"is no readable certificate ({error})") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise MeasurementError(
+            str(path), f"is no certificate of format '{FORMAT}'",
+            next_step="write one with nlsdesign observer --deck DECK --certificate",
+        )  # fmt: skip
+    try:
+        certificate = _certificate(content)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, NlsError) as error:
+        raise MeasurementError(str(path), f"is no readable certificate ({error!r})") from None
+    # The whole text is compared, so that no digit can be touched that the proof does not use.
+    return certificate, certificate_text(certificate) == text
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is no number")
+
+
+def _checksum(content: dict[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, ensure_ascii=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _content(c: Certificate) -> dict[str, Any]:
+    name, text = c.deck
+    p = c.polytope
+    torque: dict[str, Any] | str = (
+        c.torque if isinstance(c.torque, str) else {"total": c.torque.total, **asdict(c.torque)}
+    )
+    return {
+        "format": FORMAT,
+        "statement": list(c.statement),
+        "deck": {"name": name, "sha256": hashlib.sha256(text.encode()).hexdigest(), "text": text},
+        "parameters": dict(c.parameters),
+        "observer": {"estimate": c.estimate, "measured": c.measured, "gain": [list(r) for r in c.gain.rows]},
+        "polytope": {
+            **{k: getattr(p, k) for k in ("states", "sizes", "moving", "seen", "sample_time", "columns")},
+            "friction": p.friction,
+            "transition": [[list(e) for e in row] for row in p.transition],
+        },
+        "lyapunov": c.lyapunov.tolist(),
+        "decay": c.decay,
+        "condition": c.condition,
+        "assumptions": {**asdict(c.assumptions), "spreads": dict(c.assumptions.spreads)},
+        "torque": torque,
+        "code": dict(c.code),
+    }
+
+
+def _certificate(content: dict[str, Any]) -> Certificate:
+    p, a, o, torque = (content[k] for k in ("polytope", "assumptions", "observer", "torque"))
+    gain = ConstantGain(tuple(tuple(float(v) for v in row) for row in o["gain"]))
+    matrix = tuple(
+        tuple(EntryReading(float(f), None if c is None else int(c)) for f, c in r) for r in p["transition"]
+    )
+    polytope = ErrorPolytope(
+        states=tuple(p["states"]), sizes=tuple(p["sizes"]), moving=(p["moving"][0], p["moving"][1]),
+        seen=tuple(p["seen"]), sample_time=p["sample_time"],
+        columns=tuple((low, high) for low, high in p["columns"]), transition=matrix,
+        correction=tuple(tuple(EntryReading(v, None) for v in row) for row in gain.rows),
+        friction=(p["friction"][0], p["friction"][1]),
+    )  # fmt: skip
+    n = len(polytope.states)
+    lyapunov = np.array(content["lyapunov"], dtype=float)
+    if lyapunov.shape != (n, n) or len(matrix) != n or len(polytope.sizes) != n or min(polytope.sizes) <= 0.0:
+        raise ValueError("matrices do not have one row per state")
+    bound: TorqueErrorBound | str = torque
+    if not isinstance(torque, str):
+        start = {k: (v[0], v[1]) for k, v in torque["start"].items()}
+        causes = {k: float(v) for k, v in torque.items() if k not in ("total", "start")}
+        bound = TorqueErrorBound(**causes, start=start)
+    assumed = Assumptions(
+        (a["angles"][0], a["angles"][1]), a["speed"], a["angle_error"], a["spreads"], a["real"]
+    )
+    deck = content["deck"]
+    return Certificate(
+        deck=(str(deck["name"]), str(deck["text"])), parameters=content["parameters"],
+        estimate=o["estimate"], measured=o["measured"], gain=gain, polytope=polytope, lyapunov=lyapunov,
+        decay=float(content["decay"]), condition=float(content["condition"]), assumptions=assumed,
+        torque=bound, code=content["code"],
+    )  # fmt: skip
