@@ -12,9 +12,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import schur
 
 from ...errors import ValueRangeError, unknown_name
 from ...model.roles import series_spring
@@ -80,9 +82,9 @@ class LinearLoop:
 
         A deadbeat mode (z = 0) is at minus infinity.
         """
-        z = np.linalg.eigvals(self.a)
-        with np.errstate(divide="ignore"):
-            s = np.log(z.astype(complex)) / self.sample_time
+        z = np.linalg.eigvals(self.a).astype(complex)
+        zero = np.abs(z) < 1e-12
+        s = np.where(zero, -math.inf, np.log(np.where(zero, 1.0, z)) / self.sample_time)
         order = np.argsort(-s.real, axis=1)
         found: Complex = np.take_along_axis(s, order, axis=1)
         found[~self.reached] = complex(math.nan, math.nan)
@@ -136,11 +138,9 @@ class LinearLoop:
         found[~self.reached] = complex(math.nan, math.nan)
         return found
 
-    @property
+    @cached_property
     def _triangular(self) -> tuple[Complex, Complex]:
         """Schur form of A: a response at many frequencies then takes back substitution only."""
-        from scipy.linalg import schur
-
         pairs = [schur(matrix, output="complex") for matrix in self.a]
         return np.array([t for t, _ in pairs]), np.array([q for _, q in pairs])
 
@@ -162,8 +162,8 @@ def linear_loop(
     angles
         Of the driven body with the load at zero, shape (n,), in rad.
     opened
-        Inputs by full name at which the loop is cut open: ``loop.cut`` for the current, or an input of
-        observer or controller. What would drive them is an output. The desired torque and the prescribed
+        Inputs by full name at which the loop is cut open: the current of the plant, or an input of observer
+        or controller. What would drive them is an output. The desired torque and the prescribed
         motions of the plant are inputs always.
     mode
         Of the plant's dry friction; sliding by default.
@@ -188,12 +188,23 @@ def linear_loop(
     for name in opened:
         if name not in (*system.sources, f"{PLANT}.{system.driven}"):
             raise unknown_name("input of the loop", name, [*system.sources, f"{PLANT}.{system.driven}"])
-    plant = _plant_of(system, at, mode or SlidingPlant())
+    plant = plant_of(system, at, mode or SlidingPlant())
     return assembled(system, plant, at, cut=tuple(opened), tables=tables or SlopedTables(),
                      mode=mode or SlidingPlant())  # fmt: skip
 
 
-def _plant_of(system: SampledSystem, angles: Array, mode: PlantMode) -> LinearPlant:
+def plant_of(system: SampledSystem, angles: Array, mode: PlantMode) -> LinearPlant:
+    """Return the plant of a system, linearised with all signals that are wired.
+
+    Parameters
+    ----------
+    system
+        Gives plant and wiring.
+    angles
+        Of the driven body, shape (n,), in rad.
+    mode
+        Of dry friction.
+    """
     start = f"{PLANT}."
     wired = [s.removeprefix(start) for s in system.sources.values() if s.startswith(start)]
     spring = series_spring(system.plant)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ValueRangeError
-from ...model.roles import moved_load
+from ...model.roles import motor_of, moved_load
 from ...simulation import Trace
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import PLANT
@@ -23,6 +23,9 @@ from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 from .verdict import LoopJudge, LoopVerdict
 
 Array = NDArray[np.float64]
+
+_APPROACH = 0.3
+"""Time in s in which a held torque is approached."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,25 @@ class ZeroTorque:
     verdicts: tuple[LoopVerdict, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class HeldTorque:
+    """How a loop holds torques.
+
+    Parameters
+    ----------
+    torque
+        In N·m, shape (n,).
+    rms_error
+        Root mean square of the torque error in N·m, shape (n,); not a number where a verdict does not hold.
+    verdicts
+        On each run.
+    """
+
+    torque: Array
+    rms_error: Array
+    verdicts: tuple[LoopVerdict, ...]
+
+
 def tracking(loop: ClosedLoop, trace: Trace, *, settled: float = 0.0) -> Tracking:
     """Return how well the torque followed in a run of a closed loop.
 
@@ -194,9 +216,11 @@ def sine_response(
     Raises
     ------
     ValueRangeError
-        If a frequency is not between zero and half the sampling frequency, or the amplitude not positive.
+        If a frequency is not between zero and half the sampling frequency, or the amplitude not positive or
+        beyond what the current limit can hold.
     """
     _check_amplitude(amplitude, "N·m")
+    check_reach(loop, abs(offset) + amplitude)
     wanted = np.asarray(frequencies, dtype=float)
     drive = sine_drive(loop, amplitude=amplitude, frequencies=wanted, offset=offset, cycles=cycles)
     runs = run_periodic(loop, drive, translate=translate)
@@ -248,6 +272,52 @@ def sine_drive(
     return PeriodicDrive(
         frequencies=frequencies, drives=drives, parameters=parameters or {}, cycles=cycles
     )
+
+
+def held_drive(
+    loop: ClosedLoop, *, torques: Array, parameters: Mapping[str, Array | float] | None = None
+) -> PeriodicDrive:
+    """Return torques that are approached smoothly and then held, as drives of many runs.
+
+    The last twentieth comes as a step: a loop that only dry friction keeps quiet is woken by it.
+
+    Parameters
+    ----------
+    loop
+        Closed loop.
+    torques
+        In N·m, shape (runs,).
+    parameters
+        Of the loop by full name, numbers or shape (runs,).
+    """
+
+    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+        share = 0.475 - 0.475 * np.cos(math.pi * np.minimum(time / _APPROACH, 1.0))
+        return {loop.desired: torques[runs, None] * np.where(time >= _APPROACH, 1.0, share)}
+
+    return PeriodicDrive(frequencies=np.zeros(len(torques)), drives=drives, parameters=parameters or {})
+
+
+def held_torque(
+    loop: ClosedLoop, torques: Sequence[float] | Array, *, translate: Translate = as_it_is
+) -> HeldTorque:
+    """Return how a loop holds torques: the error at rest, and whether it limit-cycles there.
+
+    Parameters
+    ----------
+    loop
+        Load fixed, or held by its inputs at zero.
+    torques
+        In N·m, shape (n,).
+    translate
+        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
+    """
+    wanted = np.asarray(torques, dtype=float)
+    check_reach(loop, float(np.max(np.abs(wanted))))
+    runs = run_periodic(loop, held_drive(loop, torques=wanted), translate=translate)
+    good = np.array([run.verdict.holds for run in runs])
+    error = np.array([_rms(run[loop.torque] - t) for run, t in zip(runs, wanted, strict=True)])
+    return HeldTorque(wanted, np.where(good, error, np.nan), tuple(run.verdict for run in runs))
 
 
 def zero_torque(
@@ -330,6 +400,44 @@ def _distortion(run: PeriodicRun, torque: str) -> float:
     turn = np.exp(2j * math.pi * run.frequency * run.time)
     rest = values - np.mean(values) - np.real(fundamental * turn)
     return _rms(rest) / (abs(fundamental) / math.sqrt(2.0))
+
+
+def largest_torque(loop: ClosedLoop) -> float:
+    """Return the largest torque that the current limit of a controller can hold, in N·m.
+
+    Parameters
+    ----------
+    loop
+        Closed loop.
+    """
+    plant, motor = loop.plant, motor_of(loop.plant)[1]
+    values = plant.values
+    ratio = values[motor.gear_ratio] if motor.gear_ratio is not None else 1.0
+    limit = min(values[motor.current_limit], loop.controller.outputs[0].maximum)
+    return float(ratio * values[motor.torque_constant] * limit)
+
+
+def check_reach(loop: ClosedLoop, torque: float) -> None:
+    """Refuse a torque that the current limit cannot hold.
+
+    Parameters
+    ----------
+    loop
+        Closed loop.
+    torque
+        Largest desired torque in N·m.
+
+    Raises
+    ------
+    ValueRangeError
+        Naming the largest torque that can be held.
+    """
+    largest = largest_torque(loop)
+    if torque > largest:
+        raise ValueRangeError(
+            f"desired torque {torque:g} N·m", f"is beyond the {largest:.4g} N·m that the current limit can hold",
+            next_step=f"take an amplitude of at most {largest:.3g} N·m",
+        )  # fmt: skip
 
 
 def _check_amplitude(amplitude: float, unit: str) -> None:
