@@ -1,22 +1,69 @@
 """Torque control on an estimated torque, and what a closed loop does."""
 
-from .evaluation.responses import SineResponse, Tracking, ZeroTorque, sine_response, tracking, zero_torque
+from .evaluation.fine_counts import with_fine_counts
+from .evaluation.impedance import CoupledStability, OutputImpedance, coupled_stability, output_impedance
+from .evaluation.linear_loop import LinearLoop, linear_loop
+from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant
+from .evaluation.margins import LoopMargins, loop_margins
+from .evaluation.onset import LimitCycleOnset, linear_onset, onset_of_limit_cycling
+from .evaluation.responses import (
+    HeldTorque,
+    SineResponse,
+    Tracking,
+    ZeroTorque,
+    held_torque,
+    largest_torque,
+    sine_response,
+    tracking,
+    zero_torque,
+)
+from .evaluation.saturation import SaturationLine, saturation_line
+from .evaluation.spread import LoopSpread, loop_over_spread
+from .evaluation.steps import StepResponse, step_response, torque_resolution
 from .evaluation.verdict import LoopJudge, LoopVerdict
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
 from .loop.closed_loop import ClosedLoop
+from .loop.wiring import encoder_loop
 
 __all__ = [
     "ClosedLoop",
+    "CoupledStability",
+    "FrozenTables",
+    "HeldTorque",
+    "LimitCycleOnset",
+    "LinearLoop",
     "LoopJudge",
+    "LoopMargins",
     "LoopNames",
+    "LoopSpread",
     "LoopVerdict",
+    "OutputImpedance",
+    "SaturationLine",
     "SineResponse",
+    "SlidingPlant",
+    "SlopedTables",
+    "StepResponse",
+    "StuckPlant",
     "TorqueGains",
     "Tracking",
     "ZeroTorque",
+    "coupled_stability",
+    "encoder_loop",
+    "held_torque",
+    "largest_torque",
+    "linear_loop",
+    "linear_onset",
+    "loop_margins",
     "loop_names",
+    "loop_over_spread",
+    "onset_of_limit_cycling",
+    "output_impedance",
+    "saturation_line",
     "sine_response",
+    "step_response",
     "torque_controller",
+    "torque_resolution",
     "tracking",
+    "with_fine_counts",
     "zero_torque",
 ]
