@@ -79,8 +79,8 @@ class _Evaluation:
 @click.option("--integral", type=Number("rad/s^2/N/m"), default=None, help="Gain Ki of the torque loop.")
 @click.option("--derivative", type=Number("rad/N/m"), default=None, help="Gain Kd of the torque loop.")
 @click.option("--amplitude", "amplitudes", type=Number("N*m"), multiple=True,
-              help="Of the desired torque; several times for several. By default a fifth and three fifths of what "
-              "the current limit can hold.")  # fmt: skip
+              help="Of the desired torque; several times for several. By default a fifth and three fifths of "
+              "what the current limit can hold.")  # fmt: skip
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
 @click.option("--load-inertia", "inertias", type=Number("kg*m^2"), multiple=True,
               help="Of a free load; several times for several. By default from a tenth of the motor's to a "
@@ -94,6 +94,7 @@ class _Evaluation:
 @click.pass_context
 def loop(
     ctx: click.Context,
+    /,
     deck_name: str,
     amplitudes: tuple[float, ...],
     last: float,
@@ -164,13 +165,14 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
     frequencies = np.geomspace(*_FREQUENCIES)
     angles = np.linspace(0.0, asked.last, 41)
     responses = tuple(
-        ctl.sine_response(fixed, amplitude=a, frequencies=frequencies, translate=translate) for a in amplitudes
+        ctl.sine_response(fixed, amplitude=a, frequencies=frequencies, translate=translate)
+        for a in amplitudes
     )
     held = ctl.held_torque(fixed, amplitudes, translate=translate)
     gain = fixed.controller.values[GAIN]
     onsets = tuple(
         ctl.onset_of_limit_cycling(
-            fixed, GAIN, between=(0.2 * gain, 5.0 * gain), amplitude=a, translate=translate
+            fixed, GAIN, between=(0.02 * gain, 5.0 * gain), amplitude=a, translate=translate
         )
         for a in (amplitudes if gain > 0.0 else ())
     )
@@ -191,7 +193,7 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
 
 
 def _translate() -> Any:
-    """Return what compiles the loop; without a compiler it is interpreted, which takes about eight times longer."""
+    """Return what compiles the loop; without a compiler it is interpreted, about eight times slower."""
     import casadi as ca
 
     from ..export import natively
@@ -295,11 +297,14 @@ def _shown(found: _Evaluation) -> None:
         table.append([f"{np.degrees(linear.angles[k]):.1f}", f"{torque[k]:.3g}", stable, *numbers,
                       f"{1e3 * found.resolution[k]:.2g}"])  # fmt: skip
     units = ("dB", "degrees", "ms")
-    heads = ("degrees", "N·m", "linear loop", *(f"{u}, current" for u in units), *(f"{u}, torque" for u in units),
-             "mN·m per count")  # fmt: skip
-    show_table(f"Margins over the angle, {linear.mode}", heads, table)
-    zero = [[f"{f:g}", _text(1e3 * t), _text(1e3 * e), str(v)] for f, t, e, v in zip(
-        found.zero.frequency, found.zero.rms, found.zero.energy, found.zero.verdicts, strict=True)]  # fmt: skip
+    cut = [f"{u}, {place}" for place in ("current", "torque") for u in units]
+    columns = ("degrees", "N·m", "linear loop", *cut, "mN·m per count")
+    show_table(f"Margins over the angle, {linear.mode}", columns, table)
+    moved = found.zero
+    zero = [
+        [f"{f:g}", _text(1e3 * t), _text(1e3 * e), str(v)]
+        for f, t, e, v in zip(moved.frequency, moved.rms, moved.energy, moved.verdicts, strict=True)
+    ]
     show_table("No torque wanted, load moved", ("Hz", "mN·m rms", "mJ lost per cycle", "verdict"), zero)
     from ..figures.loop_evaluation import passivity_words
 

@@ -47,7 +47,9 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
     axes[0].set_ylabel("magnitude in dB")
     axes[1].set_ylabel("phase in degrees")
     if line is not None:
-        axes[2].plot(line.frequency, line.torque, color=INK.light, label="largest torque of a sine of the angle")
+        axes[2].plot(
+            line.frequency, line.torque, color=INK.light, label="largest torque of a sine of the angle"
+        )
         axes[2].set_ylabel("torque in N·m")
         axes[2].set_ylim(bottom=0.0)
         legend(axes[2])
@@ -111,7 +113,7 @@ def margins_over_angle(found: Sequence[LoopMargins]) -> Figure:
             panel.plot(degrees, values, color=tone, linestyle=dash, label=f"at {margins.opening}")
         good = np.isfinite(margins.gain)
         words.append(
-            f"Cut at {margins.opening}: least gain margin {significant(float(np.min(margins.gain[good])))} dB, "
+            f"Cut at {margins.opening}: least gain margin {significant(float(margins.gain[good].min()))} dB, "
             f"unstable at {int(np.sum(~margins.linear.stable()))} of {len(degrees)} angles."
             if np.any(good) else f"Cut at {margins.opening}: unstable at all angles."
         )  # fmt: skip
@@ -184,6 +186,6 @@ def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -
     good = np.isfinite(response.decibel)
     if not np.any(good):
         return f"{label}: settles at no frequency."
-    within = f"{significant(float(np.min(response.decibel[good])))} to {significant(float(np.max(response.decibel[good])))} dB"
+    low, high = (significant(float(end(response.decibel[good]))) for end in (np.min, np.max))
     tail = f"; does not settle at {len(lost)} frequencies" if lost else ""
-    return f"{label}: {within}{tail}."
+    return f"{label}: {low} to {high} dB{tail}."

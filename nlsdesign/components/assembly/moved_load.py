@@ -39,11 +39,11 @@ def with_moved_load(actuator: Assembly, load: str | None = None) -> Assembly:
             next_step="declare the load as Fixed() and tie the spring to it",
         )  # fmt: skip
     (name,) = fixed
-    held = parts[name]
-    moved = {**parts, name: Driven(domain=held.domain)} if isinstance(held, Fixed) else parts
+    driven = Driven(domain=next(p.domain for n, p in parts.items() if n == name and isinstance(p, Fixed)))
+    moved = {**parts, name: driven}
     encoders = [p for p in parts.values() if isinstance(p, Encoder)]
     if encoders:
         own = next(f"{name}_encoder{i or ''}" for i in range(99) if f"{name}_encoder{i or ''}" not in parts)
-        moved[own] = Encoder(of=f"{name}.{Driven(domain=held.domain).motion_names[0]}",
+        moved[own] = Encoder(of=f"{name}.{driven.motion_names[0]}",
                              quantum=encoders[0].quantum)  # fmt: skip
     return Assembly(actuator.name, tuple(moved.items()))

@@ -14,9 +14,8 @@ import casadi as ca
 
 from ...model import FlatModel
 
-
 _PARAMETER = 3
-_FOLLOWS = {
+_FOLLOWS: dict[tuple[object, ...], str] = {
     (ca.OP_DIV, "", "count"): "ratio",
     (ca.OP_ADD, "ratio", ""): "shifted",
     (ca.OP_ADD, "", "ratio"): "shifted",

@@ -1,7 +1,7 @@
 """What a load feels of the linearised closed loop: output impedance, passivity, coupled stability.
 
-Passivity is that of the samples: the torque between two samples is not looked at, so the statement holds well
-below half the sampling frequency; frequencies up to 0.4 of the sampling frequency are shown.
+Passivity is that of the samples: the torque between two samples is not looked at, so the statement holds
+well below half the sampling frequency; frequencies up to 0.4 of the sampling frequency are shown.
 
 Source: Colgate and Hogan 1988 (passive impedance and coupled stability).
 """

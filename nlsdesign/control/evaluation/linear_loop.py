@@ -1,10 +1,10 @@
 """The sampled loop linearised over the angle: exact between the samples, with delay, observer and controller.
 
 Plant: linearised at rest at each angle, in a stated mode of its dry friction, without the rounding of its
-encoders, and taken exactly over one sample (the current held, prescribed motions linear). Blocks: linearised at
-the state in which the loop rests at that angle, inside all limits. This is the loop for small deviations
-around a held torque, between the counts. What it cannot show is in the simulated runs: limits, counts, a gain that
-changes within a cycle.
+encoders, and taken exactly over one sample (the current held, prescribed motions linear). Blocks:
+linearised at the state in which the loop rests at that angle, inside all limits. This is the loop for small
+deviations around a held torque, between the counts. What it cannot show is in the simulated runs: limits,
+counts, a gain that changes within a cycle.
 """
 
 from __future__ import annotations
@@ -210,9 +210,7 @@ def plant_of(system: SampledSystem, angles: Array, mode: PlantMode) -> LinearPla
     spring = series_spring(system.plant)
     signals = [*wired, spring.effort, spring.motion]
     signals = [name for name in dict.fromkeys(signals) if name != system.driven]
-    return linear_plant(
-        system.plant, angles, driven=str(system.driven), signals=tuple(signals), mode=mode
-    )
+    return linear_plant(system.plant, angles, driven=str(system.driven), signals=tuple(signals), mode=mode)
 
 
 def assembled(

@@ -178,7 +178,9 @@ def linear_onset(
         linear = linear_loop(changed, angles, mode=mode)
         z = np.linalg.eigvals(linear.a[linear.reached]).ravel()
         worst = z[np.argmax(np.abs(z))]
-        return bool(np.abs(worst) > 1.0 + 1e-9), float(abs(np.angle(worst))) / (2.0 * math.pi * loop.sample_time)
+        return bool(np.abs(worst) > 1.0 + 1e-9), float(abs(np.angle(worst))) / (
+            2.0 * math.pi * loop.sample_time
+        )
 
     gains = [float(g) for g in np.geomspace(*between, _BATCH)]
     found = next((i for i, value in enumerate(gains) if lost(value)[0]), None)

@@ -1,8 +1,8 @@
 """Many runs of a closed loop on periodic drives at once, each until its answer repeats itself.
 
 Runs whose windows are of similar length share a batch. Every batch first runs through its transient, then
-window after window until the fundamental of the torque is the same in two that follow each other, or until the
-longest time that is allowed. The last two windows are what is evaluated.
+window after window until the fundamental of the torque is the same in two that follow each other, or until
+the longest time that is allowed. The last two windows are what is evaluated.
 """
 
 from __future__ import annotations

@@ -190,7 +190,7 @@ def sine_response(
     loop: ClosedLoop,
     *,
     amplitude: float,
-    frequencies: Sequence[float],
+    frequencies: Sequence[float] | Array,
     offset: float = 0.0,
     cycles: int | None = None,
     translate: Translate = as_it_is,
@@ -269,9 +269,7 @@ def sine_drive(
     def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
         return {loop.desired: offset + size[runs, None] * np.sin(omega[runs, None] * time)}
 
-    return PeriodicDrive(
-        frequencies=frequencies, drives=drives, parameters=parameters or {}, cycles=cycles
-    )
+    return PeriodicDrive(frequencies=frequencies, drives=drives, parameters=parameters or {}, cycles=cycles)
 
 
 def held_drive(
@@ -324,7 +322,7 @@ def zero_torque(
     loop: ClosedLoop,
     *,
     amplitude: float,
-    frequencies: Sequence[float],
+    frequencies: Sequence[float] | Array,
     load: str | None = None,
     cycles: int | None = None,
     translate: Translate = as_it_is,
@@ -435,7 +433,8 @@ def check_reach(loop: ClosedLoop, torque: float) -> None:
     largest = largest_torque(loop)
     if torque > largest:
         raise ValueRangeError(
-            f"desired torque {torque:g} N·m", f"is beyond the {largest:.4g} N·m that the current limit can hold",
+            f"desired torque {torque:g} N·m",
+            f"is beyond the {largest:.4g} N·m that the current limit can hold",
             next_step=f"take an amplitude of at most {largest:.3g} N·m",
         )  # fmt: skip
 

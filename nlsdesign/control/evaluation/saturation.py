@@ -1,10 +1,10 @@
 """How much torque the drive can move how fast: inverse dynamics on a sine of the angle.
 
-The angle is prescribed, not the torque: a cam without stiffness at zero angle would have to jump through zero
-for a torque that is a sine, at any amplitude. With the angle a sine the motion is smooth, and the largest
-torque of the cycle is what is shown. The inner states of the spring follow by the implicit midpoint rule over
-two cycles, of which the second counts; the current follows from the balance of the driven body, which is linear
-in it.
+The angle is prescribed, not the torque: a cam without stiffness at zero angle would have to jump through
+zero for a torque that is a sine, at any amplitude. With the angle a sine the motion is smooth, and the
+largest torque of the cycle is what is shown. The inner states of the spring follow by the implicit midpoint
+rule over two cycles, of which the second counts; the current follows from the balance of the driven body,
+which is linear in it.
 """
 
 from __future__ import annotations
@@ -97,8 +97,8 @@ def saturation_line(
     lines = [_first(use[i], peak[i], angles) for i in range(len(at))]
     words = []
     for i, (_, _, end) in enumerate(lines):
-        words.append("angle" if end == _ANGLES else
-                     "current" if needed[i, end] / limit >= speed[i, end] / speed_limit else "speed")  # fmt: skip
+        by_current = end < _ANGLES and needed[i, end] / limit >= speed[i, end] / speed_limit
+        words.append("angle" if end == _ANGLES else "current" if by_current else "speed")
     return SaturationLine(
         at, np.array([t for t, _, _ in lines]), np.array([a for _, a, _ in lines]), tuple(words)
     )

@@ -65,8 +65,8 @@ class LoopSpread:
         states = Counter(verdict.state for verdict in self.verdicts)
         counts = ", ".join(f"{number} {state}" for state, number in states.most_common())
         return (
-            f"{len(self.verdicts)} draws at {self.amplitude:g} N·m, {self.frequency:g} Hz: {counts}; error over "
-            f"desired torque {self.quantile(0.5):.3g} in the median, {self.quantile(0.9):.3g} at 90 %"
+            f"{len(self.verdicts)} draws at {self.amplitude:g} N·m, {self.frequency:g} Hz: {counts}; "
+            f"error over desired torque {self.quantile(0.5):.3g} in the median, {self.quantile(0.9):.3g} at 90 %"
         )
 
 

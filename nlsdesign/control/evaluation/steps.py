@@ -88,7 +88,8 @@ def step_response(
     )  # fmt: skip
     late = {name: batch[name][0, (first + count) // 2 :] for name in judge.keep}
     verdict = judge.judged(late, cycles=0)
-    time, torque = step * np.arange(count - first), batch[loop.torque][0, first:]
+    time: Array = step * np.arange(float(count - first))
+    torque = batch[loop.torque][0, first:]
     if not verdict.holds:
         return StepResponse(begin, end, time, torque, math.nan, math.nan, math.nan, verdict)
     share = (torque - begin) / (end - begin)
