@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..control.evaluation.saturation import SaturationLine
 
 GAIN = "controller.proportional"
+_GAINS = ("proportional", "integral", "derivative")
 _FREQUENCIES = (0.1, 11.0, 20)
 
 
@@ -53,24 +54,24 @@ class _Evaluation:
         """Sentences on what does not hold; empty for a loop that is stable wherever it was looked at."""
         import numpy as np
 
-        found = []
+        result = []
         for response in self.responses:
             for f, verdict in zip(response.frequency, response.verdicts, strict=True):
                 if not verdict.holds:
-                    found.append(f"sine of ±{response.amplitude:g} N·m at {f:.3g} Hz: {verdict}")
+                    result.append(f"sine of ±{response.amplitude:g} N·m at {f:.3g} Hz: {verdict}")
         for torque, verdict in zip(self.held.torque, self.held.verdicts, strict=True):
             if not verdict.holds:
-                found.append(f"{torque:g} N·m held: {verdict}")
+                result.append(f"{torque:g} N·m held: {verdict}")
         for f, verdict in zip(self.zero.frequency, self.zero.verdicts, strict=True):
             if not verdict.holds:
-                found.append(f"no torque wanted, load moved at {f:.3g} Hz: {verdict}")
+                result.append(f"no torque wanted, load moved at {f:.3g} Hz: {verdict}")
         linear = self.margins[0].linear
         lost = np.degrees(linear.angles[linear.reached & ~linear.stable()])
         if len(lost):
-            found.append(f"the linear loop is unstable from {lost[0]:.3g}° on, {linear.mode}")
-        if found:
-            found += [str(onset) for onset in self.onsets]
-        return found
+            result.append(f"the linear loop is unstable from {lost[0]:.3g}° on, {linear.mode}")
+        if result:
+            result += [str(onset) for onset in self.onsets]
+        return result
 
 
 @click.command()
@@ -96,31 +97,27 @@ def loop(
     ctx: click.Context,
     /,
     deck_name: str,
-    amplitudes: tuple[float, ...],
-    last: float,
-    inertias: tuple[float, ...],
-    load_amplitude: float,
-    delay: int,
-    sample_time: float,
     out: Path,
     as_json: bool,
-    **gains: float | None,
+    **options: Any,
 ) -> None:
     """Evaluate the closed torque loop: responses, margins, impedance, coupled stability, limit cycles.
 
     The load is fixed for responses, moved for the impedance. Exit status 1 if the loop limit-cycles or is
     unstable anywhere in the range that is looked at; the gain where that begins is printed.
     """
-    fixed, moved = _loops(deck_name, {k: v for k, v in gains.items() if v is not None}, delay, sample_time)
-    found = _evaluated(fixed, moved, _Asked(amplitudes, last, inertias, load_amplitude))
-    files = _written(found, out)
+    gains = {name: options[name] for name in _GAINS if options[name] is not None}
+    fixed, moved = _loops(deck_name, gains, options["delay"], options["sample_time"])
+    asked = _Asked(*(options[name] for name in ("amplitudes", "last", "inertias", "load_amplitude")))
+    result = _evaluated(fixed, moved, asked)
+    files = _written(result, out)
     if as_json:
-        show_json(_content(found, files))
+        show_json(_content(result, files))
     else:
-        _shown(found)
+        _shown(result)
         for path in files:
             click.echo(f"written: {path}")
-    ctx.exit(1 if found.findings else 0)
+    ctx.exit(1 if result.findings else 0)
 
 
 def _loops(
@@ -207,63 +204,64 @@ def _translate() -> Any:
     return natively
 
 
-def _written(found: _Evaluation, out: Path) -> list[Path]:
+def _written(result: _Evaluation, out: Path) -> list[Path]:
     from .. import figures
     from ..writing import make_folder, write_table
 
     make_folder(out)
     drawn = {
-        "responses": figures.torque_responses(found.responses, found.line),
-        "impedance": figures.impedance_over_frequency(found.impedance),
-        "margins": figures.margins_over_angle(found.margins),
-        "coupled_stability": figures.coupled_stability_map(found.coupled),
+        "responses": figures.torque_responses(result.responses, result.line),
+        "impedance": figures.impedance_over_frequency(result.impedance),
+        "margins": figures.margins_over_angle(result.margins),
+        "coupled_stability": figures.coupled_stability_map(result.coupled),
     }
     rows = [
         [*(f"{x:.9g}" for x in (r.amplitude, f, db, phase, d, v.saturated)), str(v)]
-        for r in found.responses
+        for r in result.responses
         for f, db, phase, d, v in zip(
             r.frequency, r.decibel, r.phase_degrees, r.distortion, r.verdicts, strict=True
         )
     ]
-    heads = ("amplitude [N*m]", "frequency [Hz]", "magnitude [dB]", "phase [deg]", "distortion [1]",
-             "saturated [1]", "verdict")  # fmt: skip
+    units = {"amplitude": "N*m", "frequency": "Hz", "magnitude": "dB", "phase": "deg", "distortion": "1",
+             "saturated": "1"}  # fmt: skip
+    heads = [*(f"{name} [{unit}]" for name, unit in units.items()), "verdict"]
     write_table(out / "responses.csv", [heads, *rows])
     return [*figures.write_figures(out, drawn), out / "responses.csv"]
 
 
-def _content(found: _Evaluation, files: list[Path]) -> dict[str, Any]:
-    linear = found.margins[0].linear
+def _content(result: _Evaluation, files: list[Path]) -> dict[str, Any]:
+    linear = result.margins[0].linear
     return {
-        "stable": not found.findings,
-        "findings": found.findings,
+        "stable": not result.findings,
+        "findings": result.findings,
         "responses": [
             {
                 "amplitude_Nm": r.amplitude, "frequency_Hz": _plain(r.frequency),
                 "magnitude_dB": _plain(r.decibel), "phase_deg": _plain(r.phase_degrees),
                 "saturated": _plain(r.saturated), "verdicts": [str(v) for v in r.verdicts],
             }
-            for r in found.responses
+            for r in result.responses
         ],
         "onset": [
             {"gain": o.gain, "amplitude_Nm": o.amplitude, "value": _number(o.value),
              "linear": _number(o.linear), "words": str(o)}
-            for o in found.onsets
+            for o in result.onsets
         ],
-        "saturation_Nm": _plain(found.line.torque),
+        "saturation_Nm": _plain(result.line.torque),
         "margins": [
             {"opening": m.opening, "gain_dB": _plain(m.gain), "phase_deg": _plain(m.phase),
              "delay_s": _plain(m.delay)}
-            for m in found.margins
+            for m in result.margins
         ],
         "angle_rad": _plain(linear.angles), "mode": str(linear.mode),
-        "resolution_Nm": _plain(found.resolution),
-        "impedance": {"angle_rad": _plain(found.impedance.linear.angles),
-                      "active_from_Hz": _plain(found.impedance.first_active())},
-        "coupled": {"inertia_kgm2": _plain(found.coupled.inertias),
-                    "stiffness_Nm_rad": _plain(found.coupled.stiffnesses),
-                    "stable": found.coupled.stable.tolist()},
-        "zero_torque": {"frequency_Hz": _plain(found.zero.frequency), "rms_Nm": _plain(found.zero.rms),
-                        "energy_J": _plain(found.zero.energy)},
+        "resolution_Nm": _plain(result.resolution),
+        "impedance": {"angle_rad": _plain(result.impedance.linear.angles),
+                      "active_from_Hz": _plain(result.impedance.first_active())},
+        "coupled": {"inertia_kgm2": _plain(result.coupled.inertias),
+                    "stiffness_Nm_rad": _plain(result.coupled.stiffnesses),
+                    "stable": result.coupled.stable.tolist()},
+        "zero_torque": {"frequency_Hz": _plain(result.zero.frequency), "rms_Nm": _plain(result.zero.rms),
+                        "energy_J": _plain(result.zero.energy)},
         "files": files,
     }  # fmt: skip
 
@@ -279,28 +277,28 @@ def _plain(values: Any) -> list[float | str | None]:
     return [_number(float(v)) for v in values]
 
 
-def _shown(found: _Evaluation) -> None:
+def _shown(result: _Evaluation) -> None:
     import numpy as np
 
     rows = [
         [f"{r.amplitude:g}", f"{f:.3g}", _text(db), _text(phase), f"{100 * v.saturated:.0f}", str(v)]
-        for r in found.responses
+        for r in result.responses
         for f, db, phase, v in zip(r.frequency, r.decibel, r.phase_degrees, r.verdicts, strict=True)
     ]
     heads = ("N·m", "Hz", "dB", "degrees", "% at limit", "verdict")
     show_table("Desired to actual torque, simulated with counts", heads, rows)
-    linear, torque = found.margins[0].linear, found.margins[0].linear.torque
+    linear, torque = result.margins[0].linear, result.margins[0].linear.torque
     table = []
     for k in range(0, len(linear.angles), 5):
         stable = "stable" if linear.stable()[k] else "unstable" if linear.reached[k] else "beyond the current"
-        numbers = [_text(v) for m in found.margins for v in (m.gain[k], m.phase[k], 1e3 * m.delay[k])]
+        numbers = [_text(v) for m in result.margins for v in (m.gain[k], m.phase[k], 1e3 * m.delay[k])]
         table.append([f"{np.degrees(linear.angles[k]):.1f}", f"{torque[k]:.3g}", stable, *numbers,
-                      f"{1e3 * found.resolution[k]:.2g}"])  # fmt: skip
+                      f"{1e3 * result.resolution[k]:.2g}"])  # fmt: skip
     units = ("dB", "degrees", "ms")
     cut = [f"{u}, {place}" for place in ("current", "torque") for u in units]
     columns = ("degrees", "N·m", "linear loop", *cut, "mN·m per count")
     show_table(f"Margins over the angle, {linear.mode}", columns, table)
-    moved = found.zero
+    moved = result.zero
     zero = [
         [f"{f:g}", _text(1e3 * t), _text(1e3 * e), str(v)]
         for f, t, e, v in zip(moved.frequency, moved.rms, moved.energy, moved.verdicts, strict=True)
@@ -308,17 +306,17 @@ def _shown(found: _Evaluation) -> None:
     show_table("No torque wanted, load moved", ("Hz", "mN·m rms", "mJ lost per cycle", "verdict"), zero)
     from ..figures.loop_evaluation import passivity_words
 
-    for angle, first in zip(found.impedance.linear.angles, found.impedance.first_active(), strict=True):
+    for angle, first in zip(result.impedance.linear.angles, result.impedance.first_active(), strict=True):
         click.echo(f"impedance at {math.degrees(angle):.3g}°: {passivity_words(float(first))}")
-    stable_loads = found.coupled.stable
+    stable_loads = result.coupled.stable
     click.echo(
-        f"coupled at {math.degrees(found.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
+        f"coupled at {math.degrees(result.coupled.angle):.3g}°: stable on {int(np.sum(stable_loads))} of "
         f"{stable_loads.size} loads"
     )
-    for sentence in found.findings:
+    for sentence in result.findings:
         click.echo(f"finding: {sentence}")
-    if not found.findings:
-        for onset in found.onsets:
+    if not result.findings:
+        for onset in result.onsets:
             click.echo(str(onset))
 
 

@@ -18,12 +18,12 @@ from .evaluation.responses import (
     zero_torque,
 )
 from .evaluation.saturation import SaturationLine, saturation_line
-from .evaluation.spread import LoopSpread, loop_over_spread
+from .evaluation.loop_spread import LoopSpread, loop_over_spread
 from .evaluation.steps import StepResponse, step_response, torque_resolution
-from .evaluation.verdict import LoopJudge, LoopVerdict
+from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
 from .loop.closed_loop import ClosedLoop
-from .loop.wiring import encoder_loop
+from .loop.encoder_wiring import encoder_loop
 
 __all__ = [
     "ClosedLoop",

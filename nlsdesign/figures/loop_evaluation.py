@@ -60,26 +60,26 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
 
 
 @styled
-def impedance_over_frequency(found: OutputImpedance) -> Figure:
+def impedance_over_frequency(result: OutputImpedance) -> Figure:
     """Draw size of the dynamic stiffness and real part of the output impedance at each angle.
 
     Parameters
     ----------
-    found
+    result
         Up to nine of its angles are drawn.
     """
     figure, (upper, lower) = panels(2, height=4.8, sharex=True)
-    chosen = np.unique(np.linspace(0, len(found.linear.angles) - 1, 6).round().astype(int))
-    stiffness, first = found.dynamic_stiffness, found.first_active()
+    chosen = np.unique(np.linspace(0, len(result.linear.angles) - 1, 6).round().astype(int))
+    stiffness, first = result.dynamic_stiffness, result.first_active()
     words = []
     for number, k in enumerate(chosen):
         tone, dash, _ = look(number)
-        label = f"{np.degrees(found.linear.angles[k]):.0f}°"
-        if not np.any(np.isfinite(found.impedance[k])):
+        label = f"{np.degrees(result.linear.angles[k]):.0f}°"
+        if not np.any(np.isfinite(result.impedance[k])):
             words.append(f"{label}: the loop is unstable.")
             continue
-        upper.plot(found.frequency, np.abs(stiffness[k]), color=tone, linestyle=dash, label=label)
-        lower.plot(found.frequency, found.impedance[k].real, color=tone, linestyle=dash)
+        upper.plot(result.frequency, np.abs(stiffness[k]), color=tone, linestyle=dash, label=label)
+        lower.plot(result.frequency, result.impedance[k].real, color=tone, linestyle=dash)
         words.append(f"{label}: {passivity_words(float(first[k]))}.")
     upper.set_title("Torque that a moved load feels per angle")
     if upper.lines:
@@ -92,21 +92,21 @@ def impedance_over_frequency(found: OutputImpedance) -> Figure:
     lower.set_xscale("log")
     lower.set_xlabel("frequency in Hz")
     legend(upper, columns=6)
-    return described(figure, f"Output impedance, loop {found.linear.mode}. {' '.join(words)}")
+    return described(figure, f"Output impedance, loop {result.linear.mode}. {' '.join(words)}")
 
 
 @styled
-def margins_over_angle(found: Sequence[LoopMargins]) -> Figure:
+def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
     """Draw gain, phase and delay margin over the angle; nothing where the loop is unstable.
 
     Parameters
     ----------
-    found
+    result
         One per opening of the loop.
     """
     figure, axes = panels(1, 3, height=3.4)
     words = []
-    for number, margins in enumerate(found):
+    for number, margins in enumerate(result):
         tone, dash, _ = look(number)
         degrees = np.degrees(margins.linear.angles)
         for panel, values in zip(axes, (margins.gain, margins.phase, 1e3 * margins.delay), strict=True):
@@ -126,35 +126,35 @@ def margins_over_angle(found: Sequence[LoopMargins]) -> Figure:
     axes[2].set_yscale("symlog", linthresh=1.0)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2)
-    return described(figure, f"Margins over the angle, plant {found[0].linear.mode}. {' '.join(words)}")
+    return described(figure, f"Margins over the angle, plant {result[0].linear.mode}. {' '.join(words)}")
 
 
 @styled
-def coupled_stability_map(found: CoupledStability) -> Figure:
+def coupled_stability_map(result: CoupledStability) -> Figure:
     """Draw on which loads the loop is stable.
 
     Parameters
     ----------
-    found
+    result
         Over inertias and stiffnesses, both ascending.
     """
     figure, (axes,) = panels(1, height=3.6)
-    stable = found.stable
-    masses, springs = np.meshgrid(found.inertias, found.stiffnesses, indexing="ij")
+    stable = result.stable
+    masses, springs = np.meshgrid(result.inertias, result.stiffnesses, indexing="ij")
     for mask, tone, marker, label in (
         (stable, GREEN.light, "o", "stable"),
-        (~stable & np.isfinite(found.radius), VERMILLION.light, "x", "unstable"),
-        (~np.isfinite(found.radius), MUTED.light, "_", "angle cannot be held"),
+        (~stable & np.isfinite(result.radius), VERMILLION.light, "x", "unstable"),
+        (~np.isfinite(result.radius), MUTED.light, "_", "angle cannot be held"),
     ):
         if np.any(mask):
             axes.plot(masses[mask], springs[mask], color=tone, marker=marker, linestyle="none", label=label)
     axes.set_xscale("log")
-    positive = found.stiffnesses[found.stiffnesses > 0.0]
+    positive = result.stiffnesses[result.stiffnesses > 0.0]
     axes.set_yscale("symlog", linthresh=float(positive[0]) if len(positive) else 1.0)
     axes.margins(0.05)
     axes.set_xlabel("inertia of the load in kg·m²")
     axes.set_ylabel("stiffness to the frame in N·m/rad")
-    axes.set_title(f"Coupled stability at {np.degrees(found.angle):.0f}°")
+    axes.set_title(f"Coupled stability at {np.degrees(result.angle):.0f}°")
     legend(axes)
     share = f"{int(np.sum(stable))} of {stable.size}"
     return described(figure, f"Coupled stability of the torque loop: stable on {share} loads.")

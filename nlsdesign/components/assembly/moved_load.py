@@ -33,9 +33,9 @@ def with_moved_load(actuator: Assembly, load: str | None = None) -> Assembly:
     ends = [end for part in parts.values() if isinstance(part, Tie) for end in part.between]
     fixed = [n for n, p in parts.items() if isinstance(p, Fixed) and n in ends and load in (None, n)]
     if len(fixed) != 1:
-        found = ", ".join(f"'{name}'" for name in fixed) or "none"
+        result = ", ".join(f"'{name}'" for name in fixed) or "none"
         raise ArrangementError(
-            f"assembly '{actuator.name}'", f"needs one fixed load to be moved, but there is {found}",
+            f"assembly '{actuator.name}'", f"needs one fixed load to be moved, but there is {result}",
             next_step="declare the load as Fixed() and tie the spring to it",
         )  # fmt: skip
     (name,) = fixed

@@ -55,15 +55,15 @@ class OutputImpedance:
         Infinite where the loop is passive at all frequencies that were looked at, not a number where it is
         unstable already with the load held.
         """
-        found = np.full(len(self.impedance), math.inf)
+        result = np.full(len(self.impedance), math.inf)
         for k, row in enumerate(self.impedance):
             if not np.all(np.isfinite(row)):
-                found[k] = math.nan
+                result[k] = math.nan
                 continue
             active = np.flatnonzero(row.real < -1e-9 * np.abs(row))
             if len(active):
-                found[k] = self.frequency[active[0]]
-        return found
+                result[k] = self.frequency[active[0]]
+        return result
 
 
 def output_impedance(
@@ -158,7 +158,6 @@ def coupled_stability(
     damping: float = 0.0,
     load: str | None = None,
     mode: PlantMode | None = None,
-    tables: TableSlope | None = None,
 ) -> CoupledStability:
     """Return whether the loop is stable on each load of a range, at rest at one angle of the spring.
 
@@ -178,8 +177,6 @@ def coupled_stability(
         Name of the load; decided from the structure of the plant if it is left out.
     mode
         Of the plant's dry friction; sliding by default.
-    tables
-        How looked-up tables take part; with their slopes by default.
 
     Raises
     ------
@@ -201,9 +198,7 @@ def coupled_stability(
     masses, springs = (grid.ravel() for grid in np.meshgrid(j, k, indexing="ij"))
     names = (moved.motion, moved.rate, series_spring(loop.plant).effort)
     free = _on_load(plant, names, masses, springs, damping)
-    whole = assembled(
-        system, free, np.full(len(masses), angle), cut=(), tables=tables or SlopedTables(), mode=mode
-    )
+    whole = assembled(system, free, np.full(len(masses), angle), cut=(), tables=SlopedTables(), mode=mode)
     z = np.linalg.eigvals(whole.a)
     largest = np.take_along_axis(z, np.argmax(np.abs(z), axis=1)[:, None], axis=1)[:, 0]
     shape = (len(j), len(k))

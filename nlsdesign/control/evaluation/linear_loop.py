@@ -86,14 +86,14 @@ class LinearLoop:
         zero = np.abs(z) < 1e-12
         s = np.where(zero, -math.inf, np.log(np.where(zero, 1.0, z)) / self.sample_time)
         order = np.argsort(-s.real, axis=1)
-        found: Complex = np.take_along_axis(s, order, axis=1)
-        found[~self.reached] = complex(math.nan, math.nan)
-        return found
+        result: Complex = np.take_along_axis(s, order, axis=1)
+        result[~self.reached] = complex(math.nan, math.nan)
+        return result
 
     def radius(self) -> Array:
         """Return the largest size of an eigenvalue per sample, shape (n,); the loop is stable below one."""
-        found: Array = np.max(np.abs(np.linalg.eigvals(self.a)), axis=1)
-        return np.where(self.reached, found, np.nan)
+        result: Array = np.max(np.abs(np.linalg.eigvals(self.a)), axis=1)
+        return np.where(self.reached, result, np.nan)
 
     def stable(self) -> NDArray[np.bool_]:
         """Return where the loop is stable, shape (n,)."""
@@ -127,16 +127,16 @@ class LinearLoop:
             [self.b[:, :, column], self.b_next[:, :, column]], axis=2
         )
         left = (self.c[:, row][:, None] @ turned)[:, 0]
-        found = np.empty((len(self.angles), len(z)), dtype=complex)
-        found[:] = self.d[:, row, column][:, None]
+        result = np.empty((len(self.angles), len(z)), dtype=complex)
+        result[:] = self.d[:, row, column][:, None]
         x = np.zeros((len(self.angles), len(z), reduced.shape[1]), dtype=complex)
         driven = right[:, None, :, 0] + z[None, :, None] * right[:, None, :, 1]
         for i in reversed(range(reduced.shape[1])):
             inner = np.einsum("nk,nfk->nf", reduced[:, i, i + 1 :], x[:, :, i + 1 :])
             x[:, :, i] = (driven[:, :, i] + inner) / (z[None, :] - reduced[:, i, i][:, None])
-        found += np.einsum("nk,nfk->nf", left, x)
-        found[~self.reached] = complex(math.nan, math.nan)
-        return found
+        result += np.einsum("nk,nfk->nf", left, x)
+        result[~self.reached] = complex(math.nan, math.nan)
+        return result
 
     @cached_property
     def _triangular(self) -> tuple[Complex, Complex]:

@@ -235,8 +235,8 @@ def _holding(function: ca.Function, rest: Array, fixed: tuple[Array, Array], pla
         inputs[:, place] = value
         accelerations.append(evaluate_rows(function, rest, inputs, p)[5][:, 0])
     slope = (accelerations[1] - accelerations[0]) / 1e-3
-    found: Array = -accelerations[0] / slope
-    return found
+    result: Array = -accelerations[0] / slope
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,10 +301,10 @@ class LinearBlock:
             into.append(slope)
         w, dw = np.concatenate(columns, axis=1), np.concatenate(into, axis=1)
         p = np.tile(model.start(model.parameters)[:, None], (1, n))
-        found = self._function.map(n).call([state.T, inputs.T, p, w.T])
+        result = self._function.map(n).call([state.T, inputs.T, p, w.T])
         arrays = [
             np.array(r).reshape(self._function.size1_out(i), n, self._function.size2_out(i)).swapaxes(0, 1)
-            for i, r in enumerate(found)
+            for i, r in enumerate(result)
         ]
         following, output, fx, fu, fw, yx, yu, yw = arrays
         count = len(names)

@@ -15,7 +15,7 @@ from .linear_loop import linear_loop
 from .linear_parts import PlantMode
 from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 from .responses import held_drive, sine_drive
-from .verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
+from .loop_verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
 
 Array = NDArray[np.float64]
 
@@ -56,8 +56,8 @@ class LimitCycleOnset:
     @property
     def value(self) -> float:
         """Gain of the onset, the middle of its bracket; not a number where none was found."""
-        found = self.verdict is not None and self.below > 0.0
-        return math.sqrt(self.below * self.above) if found else math.nan
+        result = self.verdict is not None and self.below > 0.0
+        return math.sqrt(self.below * self.above) if result else math.nan
 
     def __str__(self) -> str:
         where = f"at ±{self.amplitude:g} N·m, {self.frequency:g} Hz" if self.frequency else (
@@ -183,12 +183,12 @@ def linear_onset(
         )
 
     gains = [float(g) for g in np.geomspace(*between, _BATCH)]
-    found = next((i for i, value in enumerate(gains) if lost(value)[0]), None)
-    if found is None:
+    result = next((i for i, value in enumerate(gains) if lost(value)[0]), None)
+    if result is None:
         return math.inf, math.nan
-    if found == 0:
+    if result == 0:
         return 0.0, lost(gains[0])[1]
-    low, high = gains[found - 1], gains[found]
+    low, high = gains[result - 1], gains[result]
     while high > 1.005 * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if lost(middle)[0] else (middle, high)

@@ -18,7 +18,7 @@ from ...errors import ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import run_batch
 from ..loop.closed_loop import ClosedLoop
-from .verdict import UNSETTLED, LoopJudge, LoopVerdict, without_harmonics
+from .loop_verdict import UNSETTLED, LoopJudge, LoopVerdict, without_harmonics
 
 Array = NDArray[np.float64]
 Drives = Callable[[Array, NDArray[np.intp]], Mapping[str, Array | float]]
@@ -201,7 +201,7 @@ class _Group:
         length = int(np.max(samples[group]))
         begin, state = 0, None
         shown = {name: np.zeros((len(group), 0)) for name in self.keep}
-        found: list[PeriodicRun] = []
+        result: list[PeriodicRun] = []
         for window in range(1, WINDOWS):
             # The transient comes with the first two windows, which are the least that is needed.
             more = 2 * length + round(TRANSIENT / step) if window == 1 else length
@@ -213,14 +213,14 @@ class _Group:
             state = {name: batch.final[:, i] for i, name in enumerate(self.system.states)}
             begin += more
             shown = {n: np.concatenate([v, batch[n]], axis=1)[:, -2 * length :] for n, v in shown.items()}
-            found = [
+            result = [
                 self._evaluated({n: v[k, -2 * int(samples[i]) :] for n, v in shown.items()},
                                 int(cycles[i]), float(used[i]), step * begin)
                 for k, i in enumerate(group)
             ]  # fmt: skip
-            if all(run.verdict.state != UNSETTLED for run in found):
+            if all(run.verdict.state != UNSETTLED for run in result):
                 break
-        return {int(i): run for i, run in zip(group, found, strict=True)}
+        return {int(i): run for i, run in zip(group, result, strict=True)}
 
     def _evaluated(
         self, signals: Mapping[str, Array], cycles: int, frequency: float, end: float

@@ -20,7 +20,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
 from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
-from .verdict import LoopJudge, LoopVerdict
+from .loop_verdict import LoopJudge, LoopVerdict
 
 Array = NDArray[np.float64]
 

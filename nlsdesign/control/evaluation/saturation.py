@@ -113,8 +113,8 @@ def _first(use: Array, torque: Array, angles: Array) -> tuple[float, float, int]
     if end == 0:
         return math.nan, math.nan, 0
     share = (1.0 - use[end - 1]) / (use[end] - use[end - 1])
-    found = [float((1.0 - share) * v[end - 1] + share * v[end]) for v in (torque, angles)]
-    return found[0], found[1], end
+    result = [float((1.0 - share) * v[end - 1] + share * v[end]) for v in (torque, angles)]
+    return result[0], result[1], end
 
 
 def _inverse(loop: ClosedLoop, frequency: Array, size: Array) -> tuple[Array, Array]:
@@ -157,11 +157,11 @@ def _functions(
     residual = z - begin - step * ca.substitute(rates, begin, (begin + z) / 2)
     newton = ca.Function("newton", [z, s.state, step, s.input, s.parameter, s.time],
                          [z - ca.solve(ca.jacobian(residual, z), residual)] if inner else [z])  # fmt: skip
-    found = begin
+    result = begin
     for _ in range(_NEWTON):
-        found = newton(found, s.state, step, s.input, s.parameter, s.time)
+        result = newton(result, s.state, step, s.input, s.parameter, s.time)
     follow = ca.Function(
-        "follow", [s.time, ca.vertcat(s.state, step), s.input, s.parameter], [ca.densify(found)]
+        "follow", [s.time, ca.vertcat(s.state, step), s.input, s.parameter], [ca.densify(result)]
     )
     place = [v.name for v in plant.inputs].index(loop.names.current)
     acceleration = s.derivative[names.index(motion[1])]

@@ -14,7 +14,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import run_batch
 from ..loop.closed_loop import ClosedLoop
 from .responses import check_reach
-from .verdict import LoopJudge, LoopVerdict, tangent_stiffness
+from .loop_verdict import LoopJudge, LoopVerdict, tangent_stiffness
 
 Array = NDArray[np.float64]
 
@@ -116,5 +116,5 @@ def torque_resolution(loop: ClosedLoop, angles: Sequence[float] | Array) -> Arra
         Of the driven body with the load at zero, shape (n,), in rad.
     """
     at = np.atleast_1d(np.asarray(angles, dtype=float))
-    found: Array = np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count
-    return found
+    result: Array = np.abs(tangent_stiffness(loop.plant, at)) * LoopJudge(loop).count
+    return result

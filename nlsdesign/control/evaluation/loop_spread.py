@@ -17,7 +17,7 @@ from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
 from .periodic_runs import run_periodic
 from .responses import check_reach, held_drive, sine_drive
-from .verdict import LoopVerdict
+from .loop_verdict import LoopVerdict
 
 Array = NDArray[np.float64]
 
@@ -65,8 +65,9 @@ class LoopSpread:
         states = Counter(verdict.state for verdict in self.verdicts)
         counts = ", ".join(f"{number} {state}" for state, number in states.most_common())
         return (
-            f"{len(self.verdicts)} draws at {self.amplitude:g} N·m, {self.frequency:g} Hz: {counts}; "
-            f"error over desired torque {self.quantile(0.5):.3g} in the median, {self.quantile(0.9):.3g} at 90 %"
+            f"{len(self.verdicts)} draws at {self.amplitude:g} N·m, {self.frequency:g} Hz: "
+            f"{counts}; error over desired torque {self.quantile(0.5):.3g} in the median, "
+            f"{self.quantile(0.9):.3g} at 90 %"
         )
 
 

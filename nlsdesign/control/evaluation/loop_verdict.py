@@ -338,7 +338,7 @@ def tangent_stiffness(plant: FlatModel, angles: Array) -> Array:
         jump += row[i] * ca.jacobian(s.derivative[i], s.state[of])
     slope = ca.Function("slope", [s.time, s.state, s.input, s.parameter], [ca.densify(jump)])
     rest = rest_states(plant, angles)
-    found: Array = evaluate_rows(slope, rest, plant.start(plant.inputs), plant.start(plant.parameters))[0][
+    result: Array = evaluate_rows(slope, rest, plant.start(plant.inputs), plant.start(plant.parameters))[0][
         :, 0
     ]
-    return found
+    return result
