@@ -4,6 +4,8 @@ from .evaluation.fine_counts import with_fine_counts
 from .evaluation.impedance import CoupledStability, OutputImpedance, coupled_stability, output_impedance
 from .evaluation.linear_loop import LinearLoop, linear_loop
 from .evaluation.linear_parts import FrozenTables, SlidingPlant, SlopedTables, StuckPlant
+from .evaluation.loop_spread import LoopSpread, loop_over_spread
+from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .evaluation.margins import LoopMargins, loop_margins
 from .evaluation.onset import LimitCycleOnset, linear_onset, onset_of_limit_cycling
 from .evaluation.responses import (
@@ -18,9 +20,7 @@ from .evaluation.responses import (
     zero_torque,
 )
 from .evaluation.saturation import SaturationLine, saturation_line
-from .evaluation.loop_spread import LoopSpread, loop_over_spread
 from .evaluation.steps import StepResponse, step_response, torque_resolution
-from .evaluation.loop_verdict import LoopJudge, LoopVerdict
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
 from .loop.closed_loop import ClosedLoop
 from .loop.encoder_wiring import encoder_loop

@@ -15,9 +15,9 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import declared_prior
 from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
+from .loop_verdict import LoopVerdict
 from .periodic_runs import run_periodic
 from .responses import check_reach, held_drive, sine_drive
-from .loop_verdict import LoopVerdict
 
 Array = NDArray[np.float64]
 

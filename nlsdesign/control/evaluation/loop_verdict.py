@@ -160,6 +160,18 @@ class LoopJudge:
             self._tables[size] = (grid[40:], np.maximum.accumulate(both))
         return float(np.interp(largest, *self._tables[size]))
 
+    def torque_of_count(self, spring_angle: Array) -> float:
+        """Return the largest torque of one count in a run, in N·m; zero without counts.
+
+        Parameters
+        ----------
+        spring_angle
+            Of a run, shape (n,), in rad.
+        """
+        if not self.count:
+            return 0.0
+        return self.count * self.stiffness(float(np.max(np.abs(spring_angle))))
+
     def threshold(self, spring_angle: Array, torque: Array) -> float:
         """Return the amplitude beyond which an oscillation is a limit cycle, in N·m.
 
@@ -168,9 +180,7 @@ class LoopJudge:
         spring_angle, torque
             Of a run, shape (n,), in rad and N·m.
         """
-        largest = float(np.max(np.abs(spring_angle)))
-        counts = COUNTS * self.count * self.stiffness(largest) if self.count else 0.0
-        return counts + _SHARE * float(np.max(np.abs(torque))) + 1e-9
+        return COUNTS * self.torque_of_count(spring_angle) + _SHARE * float(np.max(np.abs(torque))) + 1e-9
 
     def judged(self, signals: Mapping[str, Array], *, cycles: int, steady: bool = True) -> LoopVerdict:
         """Return the verdict on a stretch of a run.
@@ -312,7 +322,7 @@ def _carries(stretch: Array, frequency: float) -> bool:
     """Tell whether most of the power of a stretch lies near its pace, and not in single kicks."""
     power = np.abs(np.fft.rfft(np.hanning(len(stretch)) * stretch, 4 * len(stretch))) ** 2
     at = np.fft.rfftfreq(4 * len(stretch))
-    near = (at > 0.6 * frequency) & (at < 1.6 * frequency)
+    near = (at > 0.7 * frequency) & (at < 1.4 * frequency)
     return bool(np.sum(power[near]) > 0.5 * np.sum(power))
 
 

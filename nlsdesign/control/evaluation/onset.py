@@ -13,9 +13,9 @@ from ...simulation.buffered import Translate, as_it_is
 from ..loop.closed_loop import CONTROLLER, ClosedLoop
 from .linear_loop import linear_loop
 from .linear_parts import PlantMode
+from .loop_verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
 from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 from .responses import held_drive, sine_drive
-from .loop_verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
 
 Array = NDArray[np.float64]
 

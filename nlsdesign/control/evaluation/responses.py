@@ -19,8 +19,8 @@ from ...simulation import Trace
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
-from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 from .loop_verdict import LoopJudge, LoopVerdict
+from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from ...errors import ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import run_batch
 from ..loop.closed_loop import ClosedLoop
-from .responses import check_reach
 from .loop_verdict import LoopJudge, LoopVerdict, tangent_stiffness
+from .responses import check_reach
 
 Array = NDArray[np.float64]
 

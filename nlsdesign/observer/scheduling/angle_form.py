@@ -146,7 +146,10 @@ class AngleForm:
         x0 = self.rest_in_model_order(np.zeros(1))[0]
         free = self.free_inputs
         given = ca.vertcat(*[u[free.index(i)] if i in free else float(v) for i, v in enumerate(self.u)])
-        added = self.rates_and_estimate(0.0, x0, given, self.p)[0] - self.rates_and_estimate(0.0, x0, self.u, self.p)[0]
+        added = (
+            self.rates_and_estimate(0.0, x0, given, self.p)[0]
+            - self.rates_and_estimate(0.0, x0, self.u, self.p)[0]
+        )
         values = _sampled(ca.Function("driven", [u], [added]), 1.0)
         scale = max(float(np.max(np.abs(values), initial=0.0)), 1e-300)
         rows = tuple(int(i) for i in np.flatnonzero(np.max(np.abs(values), axis=0) > 1e-12 * scale))
@@ -214,7 +217,11 @@ class AngleForm:
         angles, k = self.layout.angles, self.inner
         if not k:
             return 0.0
-        c, x, before = self.at(angles), self.rest_in_model_order(angles), np.array([0.0, angles[0], angles[-1]])
+        c, x, before = (
+            self.at(angles),
+            self.rest_in_model_order(angles),
+            np.array([0.0, angles[0], angles[-1]]),
+        )
         off, largest = 0.0, 1e-300
         for carried in self.rest(before)[:, :k] - self._shift(before):
             x[:, self.order[:k]] = carried + c.shift[:, :k]
