@@ -24,6 +24,8 @@ from .evaluation.steps import StepResponse, step_response, torque_resolution
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
 from .loop.closed_loop import ClosedLoop
 from .loop.encoder_wiring import encoder_loop
+from .tuning.largest_gain import LoopLimits, TunedLoop, largest_gain
+from .tuning.spring_trade_off import LoopChoice, bandwidth_against_impedance, best_choices
 
 __all__ = [
     "ClosedLoop",
@@ -32,7 +34,9 @@ __all__ = [
     "HeldTorque",
     "LimitCycleOnset",
     "LinearLoop",
+    "LoopChoice",
     "LoopJudge",
+    "LoopLimits",
     "LoopMargins",
     "LoopNames",
     "LoopSpread",
@@ -46,10 +50,14 @@ __all__ = [
     "StuckPlant",
     "TorqueGains",
     "Tracking",
+    "TunedLoop",
     "ZeroTorque",
+    "bandwidth_against_impedance",
+    "best_choices",
     "coupled_stability",
     "encoder_loop",
     "held_torque",
+    "largest_gain",
     "largest_torque",
     "linear_loop",
     "linear_onset",

@@ -36,8 +36,8 @@ GAINS = {
     "austin2015_stiff_spring": LINEAR,
     "austin2015_figure_consistent": NONLINEAR,
 }
-"""One set for both linear springs and one for the nonlinear spring, each for all of its points. Assumed: chosen
-so that Fig. 9 is met, since the paper prints none."""
+"""One set for both linear springs and one for the nonlinear spring, each for all of its points. Assumed:
+chosen so that Fig. 9 is met, since the paper prints none."""
 
 
 def moved(deck: str, gains: TorqueGains, changes: dict[str, float] | None = None) -> ClosedLoop:

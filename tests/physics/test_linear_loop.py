@@ -1,4 +1,4 @@
-"""The linearised sampled loop against a hand-written z-transform, small simulated motions and closed forms."""
+"""The linearised sampled loop against a z-transform by hand, small simulated motions and closed forms."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def test_an_active_loop_gives_energy_to_its_load() -> None:
 
 
 def test_a_passive_stiffness_by_hand() -> None:
-    """With no gain the motor stands still only where friction holds it: the spring alone at high frequency."""
+    """Far above all loops the motor does not follow: the load feels the spring alone."""
     loop = loops(SOFT)[1]
     found = output_impedance(loop, [0.0], frequencies=[400.0])
     assert np.abs(found.dynamic_stiffness[0]) == pytest.approx(1.7, rel=0.02)

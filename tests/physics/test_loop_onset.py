@@ -36,7 +36,7 @@ def loop() -> ClosedLoop:
 
 
 def swings(loop: ClosedLoop, gains: np.ndarray, amplitude: float) -> np.ndarray:
-    """Largest torque between 60 and 100 Hz in the second half of 3 s of a 1 Hz sine, by its spectrum alone."""
+    """Largest torque between 60 and 100 Hz in the last 2 s of a 1 Hz sine, by its spectrum alone."""
     time = loop.sample_time * np.arange(3000)
     batch = run_batch(
         loop.system([loop.desired]), 2.999, inputs={loop.desired: amplitude * np.sin(2 * np.pi * time)},

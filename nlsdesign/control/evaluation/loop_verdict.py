@@ -322,7 +322,7 @@ def _carries(stretch: Array, frequency: float) -> bool:
     """Tell whether most of the power of a stretch lies near its pace, and not in single kicks."""
     power = np.abs(np.fft.rfft(np.hanning(len(stretch)) * stretch, 4 * len(stretch))) ** 2
     at = np.fft.rfftfreq(4 * len(stretch))
-    near = (at > 0.7 * frequency) & (at < 1.4 * frequency)
+    near = (at > 0.8 * frequency) & (at < 1.25 * frequency)
     return bool(np.sum(power[near]) > 0.5 * np.sum(power))
 
 
