@@ -1,11 +1,12 @@
 """Torque loop: 20 frequencies with counts, against python-control on the same loop; 1,000 draws.
 
-The peer gets the same plant (the same equations through CasADi, one evaluation per call), the same observer and
-controller stepped at the same sample time, the same counts of the encoder and the same sample of delay:
+The peer gets the same plant (the same equations through CasADi, one evaluation per call), the same observer
+and controller stepped at the same sample time, the same counts of the encoder and the same sample of delay:
 python-control has no sampled controller beside a continuous plant, so the whole sample (plant by ten
 Runge–Kutta steps, observer, controller, delay) is stated as one discrete ``NonlinearIOSystem`` and run by
-``input_output_response``. What it does not do is decide how long to run: it gets the frequencies and durations that
-ours took. The peer is run on a part of them and scaled by the number of samples, which it takes at an even pace.
+``input_output_response``. What it does not do is decide how long to run: it gets the frequencies and
+durations that ours took. The peer is run on a part of them and scaled by the number of samples, which it
+takes at an even pace.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -83,7 +84,7 @@ def test_what_cannot_be_had(loops: dict[str, ClosedLoop]) -> None:
 
 
 def test_the_three_springs(loops: dict[str, ClosedLoop]) -> None:
-    """Below crossover the impedance is 1/Kp for every spring; the stiffer one is quicker at the same gain, and
+    """Below crossover the impedance is 1/Kp for every spring, and the stiffer one is quicker at the same gain;
     the nonlinear one, which is soft where it rests, allows the largest gain there."""
     gains = np.geomspace(16.0, 256.0, 9)
     angles = {name: np.zeros(1) if name != "nonlinear" else np.radians([5.0]) for name in loops}
@@ -97,7 +98,7 @@ def test_the_three_springs(loops: dict[str, ClosedLoop]) -> None:
     assert largest["nonlinear"] > largest["stiff"]
     front = best_choices(choices)
     assert all(one.admissible for one in front)
-    assert all(a.impedance <= b.impedance for a, b in zip(front, front[1:], strict=False))
+    assert all(a.impedance <= b.impedance for a, b in pairwise(front))
 
 
 def test_a_choice_that_another_beats_in_both_is_left_out() -> None:

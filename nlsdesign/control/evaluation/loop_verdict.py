@@ -8,7 +8,7 @@ gain lies between 0.90 and 1.06, so an oscillation of two counts or more is carr
 then within a tenth of its critical gain with or without counts. Below it is chatter: the counts themselves
 can keep it up in a loop that is stable otherwise. The threshold is therefore two counts times the largest
 tangent stiffness that the run visits; half a per cent of the size of the torque is added for what harmonics
-beyond the fifteenth leave.
+beyond the tenth leave.
 
 Source: Gelb and Vander Velde 1968 (describing function of the quantiser).
 """
@@ -35,8 +35,8 @@ from ..loop.closed_loop import ClosedLoop
 Array = NDArray[np.float64]
 
 SETTLED, LIMIT_CYCLE, UNSETTLED, DIVERGED = "settled", "limit cycle", "not settled", "diverged"
-HARMONICS = 15
-"""Multiples of the drive's frequency that count as answer to the drive."""
+HARMONICS = 10
+"""Multiples of the drive's frequency that count as answer to the drive; up to twice as many count in part."""
 COUNTS = 2.0
 """Amplitude in counts above which an oscillation is no chatter."""
 _SHARE = 0.005
@@ -246,7 +246,10 @@ def without_harmonics(values: Array, cycles: int) -> Array:
         return drift
     spectrum = np.fft.rfft(values)
     spectrum[0] = 0.0
-    spectrum[cycles : HARMONICS * cycles + 1 : cycles] = 0.0
+    multiples = spectrum[cycles::cycles]
+    # A sharp end would ring before and after every kick, so the removal fades out.
+    share = np.clip((np.arange(1.0, len(multiples) + 1.0) - HARMONICS) / HARMONICS, 0.0, 1.0)
+    multiples *= 0.5 - 0.5 * np.cos(math.pi * share)
     rest: Array = np.fft.irfft(spectrum, len(values))
     return rest
 

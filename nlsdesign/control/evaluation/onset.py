@@ -85,8 +85,8 @@ def onset_of_limit_cycling(
 ) -> LimitCycleOnset:
     """Return the gain from which on a loop limit-cycles, by batches of simulated runs.
 
-    Between the last gain without and the first with limit cycle the search goes on until they are near each
-    other; it takes for granted that below the first no other gain limit-cycles.
+    What is looked for is the first gain that limit-cycles above the first that does not; between the two the
+    search goes on until they are near each other.
 
     Parameters
     ----------
@@ -124,7 +124,9 @@ def onset_of_limit_cycling(
         gains = np.geomspace(low, high, _BATCH)
         runs = run_periodic(loop, _drive(loop, gain, gains, amplitude, frequency), translate=translate)
         lost = [run.verdict.state in (LIMIT_CYCLE, DIVERGED) for run in runs]
-        at = lost.index(True) if any(lost) else len(lost)
+        # Very small gains may oscillate too, slowly, beside an integrator that is then too strong.
+        settles = lost.index(False) if not all(lost) else 0
+        at = lost.index(True, settles) if any(lost[settles:]) else len(lost)
         if at > 0:
             first = float(gains[at - 1])
         if at > 0 or visited is None:

@@ -31,7 +31,7 @@ WINDOWS = 6
 _SAME = 0.005
 """Change of the fundamental from window to window below which the answer counts as periodic."""
 _SHARE_OF_COUNT = 0.2
-"""Change of the fundamental that counts alone make, in counts."""
+"""Change of the fundamental that counts alone make, in counts; a held torque may wander by a whole one."""
 _SIMILAR = 1.5
 _SHORTEST = 0.25
 """Shortest window in s: three swings of whatever oscillates faster than 12 Hz."""
@@ -245,5 +245,5 @@ class _Group:
         rest = without_harmonics(torque, cycles)
         earlier, later = (float(np.sqrt(np.mean(part**2))) for part in (rest[:n], rest[n:]))
         grows = later > 1.2 * earlier and later > 0.1 * threshold
-        noise = _SHARE_OF_COUNT * self.judge.torque_of_count(angle)
+        noise = (_SHARE_OF_COUNT if cycles else 1.0) * self.judge.torque_of_count(angle)
         return bool(change <= _SAME * size + noise and not grows)
