@@ -169,7 +169,7 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
     gain = fixed.controller.values[GAIN]
     onsets = tuple(
         ctl.onset_of_limit_cycling(
-            fixed, GAIN, between=(0.02 * gain, 5.0 * gain), amplitude=a, translate=translate
+            fixed, GAIN, between=(0.1 * gain, 5.0 * gain), amplitude=a, translate=translate
         )
         for a in (amplitudes if gain > 0.0 else ())
     )

@@ -84,8 +84,8 @@ def test_what_cannot_be_had(loops: dict[str, ClosedLoop]) -> None:
 
 
 def test_the_three_springs(loops: dict[str, ClosedLoop]) -> None:
-    """Below crossover the impedance is 1/Kp for every spring, and the stiffer one is quicker at the same gain;
-    the nonlinear one, which is soft where it rests, allows the largest gain there."""
+    """Below crossover the impedance is 1/Kp for every spring; the stiffer one is quicker at the same gain,
+    and the nonlinear one, soft where it rests, allows the largest gain there."""
     gains = np.geomspace(16.0, 256.0, 9)
     angles = {name: np.zeros(1) if name != "nonlinear" else np.radians([5.0]) for name in loops}
     choices = bandwidth_against_impedance(loops, GAIN, gains, angles=angles, frequency=0.5)

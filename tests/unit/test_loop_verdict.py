@@ -180,7 +180,7 @@ def test_unstable_draws_are_counted() -> None:
     )
     loop = encoder_loop(
         plant, observer=design_observer(plant),
-        controller=torque_controller(plant, gains=TorqueGains(proportional=32.0)),
+        controller=torque_controller(plant, gains=TorqueGains(proportional=40.0)),
     )  # fmt: skip
     spread = loop_over_spread(loop, amplitude=2.8, frequency=2.0, draws=40, seed=3, translate=natively)
     again = loop_over_spread(loop, amplitude=2.8, frequency=2.0, draws=40, seed=3, translate=natively)

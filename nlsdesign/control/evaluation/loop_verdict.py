@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -40,8 +40,14 @@ HARMONICS = 10
 COUNTS = 2.0
 """Amplitude in counts above which an oscillation is no chatter."""
 _SHARE = 0.005
+_PIECE = 12
+"""Half swings of the pieces whose pace and size are looked at."""
 _KEEPS = 0.9
 """Last over first of three whole swings that do not die away; a damping ratio of 0.01 gives 0.88."""
+_FAST = 3.0
+"""Frequency of a drive in Hz below which what oscillates at 30 Hz and more is beyond its tenth harmonic."""
+_RISES = 1.1
+"""Odd harmonic over the one before from which on it stands out."""
 _STEP = math.log(1.3)
 _SWINGS = 6
 """Half swings beyond the threshold, one after the other, that make an oscillation: three whole ones."""
@@ -194,10 +200,18 @@ class LoopJudge:
         steady
             Whether the answer had stopped changing.
         """
-        rest = signals[self.loop.torque]
-        if np.all(np.isfinite(rest)):
-            rest = without_harmonics(rest, cycles)
-        return self._verdict(signals, rest, steady)
+        torque = signals[self.loop.torque]
+        if not np.all(np.isfinite(torque)):
+            return self._verdict(signals, torque, steady)
+        verdict = self._verdict(signals, without_harmonics(torque, cycles), steady)
+        driven = cycles / (len(torque) * self.loop.sample_time)
+        if verdict.state == LIMIT_CYCLE or driven < _FAST:
+            return verdict
+        amplitude, order = locked(torque, cycles)
+        if not amplitude > verdict.threshold:
+            return verdict
+        frequency = order * driven
+        return replace(verdict, state=LIMIT_CYCLE, amplitude=amplitude, frequency=frequency)
 
     def judged_error(self, signals: Mapping[str, Array]) -> LoopVerdict:
         """Return the verdict on a stretch of any course, from what oscillates faster than it.
@@ -254,6 +268,28 @@ def without_harmonics(values: Array, cycles: int) -> Array:
     return rest
 
 
+def locked(values: Array, cycles: int) -> tuple[float, int]:
+    """Return amplitude and order of an oscillation that is locked to a multiple of its drive; zero for none.
+
+    What limits and laws make of a sine falls from odd harmonic to odd harmonic. An oscillation of the loop
+    that has fallen into step with a fast drive stands out of that fall.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    cycles
+        Whole cycles of the drive in it.
+    """
+    size = 2.0 * np.abs(np.fft.rfft(values)[cycles::cycles]) / len(values)
+    odd = size[0 : 2 * HARMONICS : 2]
+    rises = 2 + np.flatnonzero(odd[2:] > _RISES * odd[1:-1])
+    if not len(rises):
+        return 0.0, 0
+    best = int(rises[np.argmax(odd[rises])])
+    return float(odd[best]), 2 * best + 1
+
+
 def _faster(error: Array, desired: Array) -> Array:
     """Return the part of an error that is faster than what was desired."""
     window = np.hanning(len(error))
@@ -290,16 +326,20 @@ def sustained(rest: Array, threshold: float, sample_time: float) -> tuple[float,
     if len(starts) < _SWINGS:
         return math.nan, math.nan
     first, last = _longest_even(np.diff(starts))
-    edges = starts[first : last + 1]
-    if last - first < _SWINGS:
-        return math.nan, math.nan
-    frequency = (last - first) / (2.0 * sample_time * float(edges[-1] - edges[0]))
-    if not _carries(rest[edges[0] : edges[-1] + 1], frequency * sample_time):
-        return math.nan, math.nan
-    swings = np.array([np.max(np.abs(rest[a:b])) for a, b in pairwise(edges)])
-    if not _keeps_on(swings):
-        return math.nan, math.nan
-    return float(np.median(swings)), frequency
+    best = (math.nan, math.nan)
+    # The frequency may drift along a burst, so pieces of it are looked at one by one.
+    for k in range(first, max(last - _PIECE, first) + 1):
+        edges = starts[k : min(k + _PIECE, last) + 1]
+        if len(edges) <= _SWINGS:
+            continue
+        frequency = (len(edges) - 1) / (2.0 * sample_time * float(edges[-1] - edges[0]))
+        swings = np.array([np.max(np.abs(rest[a:b])) for a, b in pairwise(edges)])
+        amplitude = float(np.median(swings))
+        if amplitude <= best[0] or not _keeps_on(swings):
+            continue
+        if _carries(rest[edges[0] : edges[-1] + 1], frequency * sample_time):
+            best = (amplitude, frequency)
+    return best
 
 
 def _keeps_on(swings: Array) -> bool:

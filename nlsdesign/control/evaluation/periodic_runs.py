@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,8 @@ Drives = Callable[[Array, NDArray[np.intp]], Mapping[str, Array | float]]
 
 TRANSIENT = 0.5
 """Shortest time in s before the first window."""
-WINDOWS = 6
-"""Most windows of a run."""
+WINDOWS, LONGEST = 6, 4.0
+"""Windows and time in s after both of which a run that still changes is given up."""
 _SAME = 0.005
 """Change of the fundamental from window to window below which the answer counts as periodic."""
 _SHARE_OF_COUNT = 0.2
@@ -204,7 +205,7 @@ class _Group:
         begin, state = 0, None
         shown = {name: np.zeros((len(group), 0)) for name in self.keep}
         result: list[PeriodicRun] = []
-        for window in range(1, WINDOWS):
+        for window in count(1):
             # The transient comes with the first two windows, which are the least that is needed.
             more = 2 * length + round(TRANSIENT / step) if window == 1 else length
             time = step * (begin + np.arange(more + 1.0))
@@ -220,17 +221,19 @@ class _Group:
                                 int(cycles[i]), float(used[i]), step * begin)
                 for k, i in enumerate(group)
             ]  # fmt: skip
-            if all(run.verdict.state != UNSETTLED for run in result):
+            if (window >= WINDOWS - 1 and step * begin >= LONGEST) or all(
+                run.verdict.state != UNSETTLED for run in result
+            ):
                 break
         return {int(i): run for i, run in zip(group, result, strict=True)}
 
     def _evaluated(
         self, signals: Mapping[str, Array], cycles: int, frequency: float, end: float
     ) -> PeriodicRun:
-        count = len(signals[self.loop.torque])
+        length = len(signals[self.loop.torque])
         steady = self._steady(signals[self.loop.torque], signals[self.judge.angle], 2 * cycles)
         verdict = self.judge.judged(signals, cycles=2 * cycles, steady=steady)
-        time = end + self.loop.sample_time * np.arange(-float(count), 0.0)
+        time = end + self.loop.sample_time * np.arange(-float(length), 0.0)
         return PeriodicRun(frequency, 2 * cycles, time, signals, verdict)
 
     def _steady(self, torque: Array, angle: Array, cycles: int) -> bool:
