@@ -155,7 +155,7 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
     from ..model.roles import motor_of
 
     translate = _translate()
-    reach = ctl.largest_torque(fixed)
+    reach = ctl.largest_torque(fixed.plant)
     amplitudes = asked.amplitudes or tuple(float(f"{share * reach:.2g}") for share in (0.2, 0.6))
     inertia = fixed.plant.values[motor_of(fixed.plant)[1].inertia]
     inertias = np.array(asked.inertias) if asked.inertias else inertia * np.geomspace(0.1, 1e3, 13)

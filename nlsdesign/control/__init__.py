@@ -14,23 +14,36 @@ from .evaluation.responses import (
     Tracking,
     ZeroTorque,
     held_torque,
-    largest_torque,
     sine_response,
     tracking,
     zero_torque,
 )
 from .evaluation.saturation import SaturationLine, saturation_line
 from .evaluation.steps import StepResponse, step_response, torque_resolution
+from .laws.disturbance import DisturbanceObserver
+from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, torque_limit
+from .laws.outer_laws import PidTorque, TorqueLaw
+from .laws.scheduled_torque import DesiredRate, FilteredDifference, GivenRate, ScheduledTorque
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
+from .laws.velocity_loop import FrictionCompensation, VelocityLoop
+from .laws.windup import AntiWindup, BackCalculation, ConditionalIntegration
 from .loop.closed_loop import ClosedLoop
 from .loop.encoder_wiring import encoder_loop
 from .tuning.largest_gain import LoopLimits, TunedLoop, largest_gain
 from .tuning.spring_trade_off import LoopChoice, bandwidth_against_impedance, best_choices
 
 __all__ = [
+    "AntiWindup",
+    "BackCalculation",
     "ClosedLoop",
+    "ConditionalIntegration",
     "CoupledStability",
+    "DesiredRate",
+    "DisturbanceObserver",
+    "FilteredDifference",
+    "FrictionCompensation",
     "FrozenTables",
+    "GivenRate",
     "HeldTorque",
     "LimitCycleOnset",
     "LinearLoop",
@@ -42,18 +55,24 @@ __all__ = [
     "LoopSpread",
     "LoopVerdict",
     "OutputImpedance",
+    "PidTorque",
     "SaturationLine",
+    "ScheduledTorque",
     "SineResponse",
     "SlidingPlant",
     "SlopedTables",
     "StepResponse",
     "StuckPlant",
     "TorqueGains",
+    "TorqueLaw",
+    "TorqueLimit",
     "Tracking",
     "TunedLoop",
+    "VelocityLoop",
     "ZeroTorque",
     "bandwidth_against_impedance",
     "best_choices",
+    "check_torque",
     "coupled_stability",
     "encoder_loop",
     "held_torque",
@@ -70,6 +89,7 @@ __all__ = [
     "sine_response",
     "step_response",
     "torque_controller",
+    "torque_limit",
     "torque_resolution",
     "tracking",
     "with_fine_counts",

@@ -145,7 +145,8 @@ class CoupledStability:
     @property
     def stable(self) -> NDArray[np.bool_]:
         """Where the coupled loop is stable or at its limit, shape (i, s)."""
-        result: NDArray[np.bool_] = self.radius < 1.0 + 1e-9
+        # A free load has a double eigenvalue at one, which rounding parts by 1e-8.
+        result: NDArray[np.bool_] = self.radius < 1.0 + 1e-6
         return result
 
 
@@ -170,7 +171,8 @@ def coupled_stability(
     inertias
         Of the load in kg·m², shape (i,).
     stiffnesses
-        Of a spring between load and frame in N·m/rad, shape (s,); zero is a free load.
+        Of a spring between load and frame in N·m/rad, shape (s,); zero is a free load. A constant torque
+        balances that of the actuator, so that the load rests.
     damping
         Between load and frame in N·m·s/rad.
     load

@@ -14,10 +14,11 @@ from ...errors import ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import declared_prior
 from ...simulation.sampled_batch import PLANT
+from ..laws.largest_torque import check_torque
 from ..loop.closed_loop import ClosedLoop
 from .loop_verdict import LoopVerdict
 from .periodic_runs import run_periodic
-from .responses import check_reach, held_drive, sine_drive
+from .responses import held_drive, sine_drive
 
 Array = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def loop_over_spread(
     ValueRangeError
         If no number of the plant has a spread, or the amplitude is beyond the current limit.
     """
-    check_reach(loop, amplitude)
+    check_torque(loop.plant, amplitude)
     drawn = declared_prior(loop.plant).draws(draws, seed)
     if not drawn:
         raise ValueRangeError(

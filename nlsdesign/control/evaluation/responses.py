@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ValueRangeError
-from ...model.roles import motor_of, moved_load
+from ...model.roles import moved_load
 from ...simulation import Trace
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import PLANT
+from ..laws.largest_torque import check_torque
 from ..loop.closed_loop import ClosedLoop
 from .loop_verdict import LoopJudge, LoopVerdict
 from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
@@ -220,7 +221,7 @@ def sine_response(
         beyond what the current limit can hold.
     """
     _check_amplitude(amplitude, "N·m")
-    check_reach(loop, abs(offset) + amplitude)
+    check_torque(loop.plant, abs(offset) + amplitude)
     wanted = np.asarray(frequencies, dtype=float)
     drive = sine_drive(loop, amplitude=amplitude, frequencies=wanted, offset=offset, cycles=cycles)
     runs = run_periodic(loop, drive, translate=translate)
@@ -311,7 +312,7 @@ def held_torque(
         For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
     """
     wanted = np.asarray(torques, dtype=float)
-    check_reach(loop, float(np.max(np.abs(wanted))))
+    check_torque(loop.plant, float(np.max(np.abs(wanted))))
     runs = run_periodic(loop, held_drive(loop, torques=wanted), translate=translate)
     good = np.array([run.verdict.holds for run in runs])
     error = np.array([_rms(run[loop.torque] - t) for run, t in zip(runs, wanted, strict=True)])
@@ -398,45 +399,6 @@ def _distortion(run: PeriodicRun, torque: str) -> float:
     turn = np.exp(2j * math.pi * run.frequency * run.time)
     rest = values - np.mean(values) - np.real(fundamental * turn)
     return _rms(rest) / (abs(fundamental) / math.sqrt(2.0))
-
-
-def largest_torque(loop: ClosedLoop) -> float:
-    """Return the largest torque that the current limit of a controller can hold, in N·m.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    """
-    plant, motor = loop.plant, motor_of(loop.plant)[1]
-    values = plant.values
-    ratio = values[motor.gear_ratio] if motor.gear_ratio is not None else 1.0
-    limit = min(values[motor.current_limit], loop.controller.outputs[0].maximum)
-    return float(ratio * values[motor.torque_constant] * limit)
-
-
-def check_reach(loop: ClosedLoop, torque: float) -> None:
-    """Refuse a torque that the current limit cannot hold.
-
-    Parameters
-    ----------
-    loop
-        Closed loop.
-    torque
-        Largest desired torque in N·m.
-
-    Raises
-    ------
-    ValueRangeError
-        Naming the largest torque that can be held.
-    """
-    largest = largest_torque(loop)
-    if torque > largest:
-        raise ValueRangeError(
-            f"desired torque {torque:g} N·m",
-            f"is beyond the {largest:.4g} N·m that the current limit can hold",
-            next_step=f"take an amplitude of at most {largest:.3g} N·m",
-        )  # fmt: skip
 
 
 def _check_amplitude(amplitude: float, unit: str) -> None:

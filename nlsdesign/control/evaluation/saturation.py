@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.rest import evaluate_rows, rate_state, rest_states
+from ...analysis.rest import rate_state, rest_states
 from ...errors import ArrangementError
 from ...model.roles import measured_motion, series_spring
 from ...model.transform import named
@@ -128,6 +128,9 @@ def _inverse(loop: ClosedLoop, frequency: Array, size: Array) -> tuple[Array, Ar
     state = np.tile(rest_states(plant, np.zeros(1)), (len(size), 1))
     u, p = plant.start(plant.inputs), plant.start(plant.parameters)
     omega = 2.0 * math.pi * frequency
+    fixed = [np.tile(column[:, None], (1, len(size))) for column in (u, p)]
+    steps, balances = (f.map(len(size)) for f in (follow, balance))
+    zero = np.zeros((1, len(size)))
     largest = np.zeros((2, len(size)))
     place, of = names.index(motion), names.index(rate)
     for k in range(2 * _STEPS):
@@ -135,10 +138,10 @@ def _inverse(loop: ClosedLoop, frequency: Array, size: Array) -> tuple[Array, Ar
         state[:, place], state[:, of] = size * np.sin(middle), size * omega * np.cos(middle)
         if inner:
             step = 2.0 * math.pi / (omega * _STEPS)
-            state[:, inner] = evaluate_rows(follow, np.column_stack([state, step]), u, p)[0]
+            state[:, inner] = steps(zero, np.column_stack([state, step]).T, *fixed).full().T
         state[:, place], state[:, of] = size * np.sin(end), size * omega * np.cos(end)
         if k >= _STEPS:
-            torque, free, slope = (r[:, 0] for r in evaluate_rows(balance, state, u, p))
+            torque, free, slope = (r.full()[0] for r in balances(zero, state.T, *fixed))
             current = (-size * omega**2 * np.sin(end) - free) / slope
             largest = np.maximum(largest, np.abs([torque, current]))
     return largest[0], largest[1]
@@ -168,5 +171,6 @@ def _functions(
     free = ca.substitute(acceleration, s.input[place], 0.0)
     slope = (ca.substitute(acceleration, s.input[place], 1e-3) - free) / 1e-3
     torque = named(plant, s)[series_spring(plant).effort]
-    balance = ca.Function("balance", [s.time, s.state, s.input, s.parameter], [torque, free, slope])
+    arguments = [s.time, s.state, s.input, s.parameter]
+    balance = ca.Function("balance", arguments, [ca.densify(e) for e in (torque, free, slope)])
     return follow, balance

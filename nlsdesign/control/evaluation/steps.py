@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...errors import ValueRangeError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import run_batch
+from ..laws.largest_torque import check_torque
 from ..loop.closed_loop import ClosedLoop
 from .loop_verdict import LoopJudge, LoopVerdict, tangent_stiffness
-from .responses import check_reach
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def step_response(
     """
     if begin == end or not stop >= 0.1:
         raise ValueRangeError(f"step from {begin:g} to {end:g} N·m in {stop:g} s", "needs a step and 0.1 s")
-    check_reach(loop, max(abs(begin), abs(end)))
+    check_torque(loop.plant, max(abs(begin), abs(end)))
     judge, step = LoopJudge(loop), loop.sample_time
     first, count = round(_BEFORE / step), round((_BEFORE + stop) / step)
     wanted = np.where(np.arange(count + 1) >= first, end, begin)

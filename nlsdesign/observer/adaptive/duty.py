@@ -110,7 +110,7 @@ def operating_points(form: AngleForm, duty: Duty) -> OperatingPoints:
     x[:, form.speed_state] = speeds
     u = np.tile(form.u, (len(angles), 1))
     rate, _ = evaluate_rows(form.rates_and_estimate, x, u, form.p)
-    slope, place = _push(form)
+    slope, place = push(form)
     if place is not None:
         u[:, place] += (wanted - rate[:, form.speed]) / slope
     before = form.rest(np.zeros(1)) - form.at(np.zeros(1)).shift
@@ -160,8 +160,19 @@ def _amplitude(form: AngleForm, duty: Duty) -> tuple[float, float]:
     return float(np.interp(wanted, size[: beyond[0] + 1], grid[: beyond[0] + 1])), wanted
 
 
-def _push(form: AngleForm) -> tuple[float, int | None]:
-    """Return what the first input that moves the body adds to its acceleration per unit, and its place."""
+def push(form: AngleForm) -> tuple[float, int | None]:
+    """Return what the first input that moves the body adds to its acceleration per unit, and its place.
+
+    Parameters
+    ----------
+    form
+        Of a model.
+
+    Returns
+    -------
+    tuple
+        Slope, and place among the inputs of the model; ``None`` where no input moves the body.
+    """
     driven, rows = form.driven()
     if form.speed not in rows:
         return 0.0, None
