@@ -139,7 +139,9 @@ def _loops(
         whole = flatten(each)
         plants.append(with_outputs(whole, [measured_motion(whole), series_spring(whole).effort]))
     observer = design_observer(plants[0], sample_time=sample_time)
-    controller = torque_controller(plants[0], gains=TorqueGains(**gains), sample_time=sample_time)
+    # Without gains the controller picks a velocity loop that the sample time carries.
+    chosen = TorqueGains(**gains) if gains else None
+    controller = torque_controller(plants[0], gains=chosen, sample_time=sample_time)
     substeps = max(1, round(10 * sample_time / 1e-3))
     fixed, moved = (
         encoder_loop(plant, observer=observer, controller=controller, delay=delay, substeps=substeps)
