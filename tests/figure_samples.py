@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 from nlsdesign import figures
 from nlsdesign.analysis import Chart
+from nlsdesign.control import (
+    CoupledStability,
+    LinearLoop,
+    LoopMargins,
+    LoopVerdict,
+    OutputImpedance,
+    SaturationLine,
+    SineResponse,
+    SlidingPlant,
+)
 from nlsdesign.design import (
     ExponentialTorque,
     FrontPoint,
@@ -147,6 +158,50 @@ def task_curve() -> TaskCurve:
     return curve_for_task(task, drive)
 
 
+def loop_responses() -> list[SineResponse]:
+    at, good = np.geomspace(0.1, 11.0, 12), LoopVerdict("settled", 0.01, math.nan, 0.0, 4.0, 0.02)
+    lost = LoopVerdict("limit cycle", 0.5, 40.0, 0.4, 20.0, 0.02)
+    answer = 1.0 / (1.0 + 1j * at / 8.0)
+    broken = np.where(at > 5.0, np.nan, answer)
+    return [
+        SineResponse(0.8, at, answer, 0.01 * at, (good,) * 12),
+        SineResponse(2.8, at, broken, 0.01 * at, tuple(lost if np.isnan(v) else good for v in broken)),
+    ]
+
+
+def saturation() -> SaturationLine:
+    at = np.geomspace(0.1, 11.0, 12)
+    return SaturationLine(at, 4.0 - 0.2 * at, 0.5 + 0.0 * at, ("angle",) * 12)
+
+
+def linear_loop() -> LinearLoop:
+    angles, count = np.linspace(0.0, 0.8, 9), 9
+    shape = np.zeros((count, 1, 1))
+    reached = np.ones(count, dtype=bool)
+    return LinearLoop(
+        angles, 4.0 * angles, angles, reached, 1e-3, ("x",), ("u",), ("y",), 0.9 + shape, shape, shape, shape,
+        shape, SlidingPlant(),
+    )  # fmt: skip
+
+
+def loop_margins() -> LoopMargins:
+    linear = linear_loop()
+    falls = 20.0 - 15.0 * linear.angles
+    return LoopMargins("plant.motor.current", linear, falls, -falls, 3.0 * falls, 1e-4 * falls, falls)
+
+
+def impedance() -> OutputImpedance:
+    at, linear = np.geomspace(0.1, 400.0, 50), linear_loop()
+    spring = 1.0 / (2j * np.pi * at) + 0.01 - 1e-4 * at
+    return OutputImpedance(linear, at, np.outer(1.0 + linear.angles, spring))
+
+
+def coupled() -> CoupledStability:
+    inertias, stiffnesses = np.geomspace(1e-5, 1e-1, 5), np.array([0.0, 1.0, 10.0])
+    radius = 1.01 - 0.005 * np.log10(1e5 * np.outer(inertias, np.ones(3)))
+    return CoupledStability(0.4, inertias, stiffnesses, radius, 40.0 * radius)
+
+
 def made_springs() -> ToleranceResult:
     """Springs with contact errors and a trim, from few draws."""
     return tolerance_analysis(cam_cases.actuator(cam_cases.CONCAVE, pretension=2e-3), target=TARGET, draws=40)
@@ -181,5 +236,9 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "pareto_front": lambda: figures.pareto_front(front()),
     "motor_over_task": lambda: figures.motor_over_task(task_curve()),
     "curve_of_task": lambda: figures.curve_of_task(task_curve()),
+    "torque_responses": lambda: figures.torque_responses(loop_responses(), saturation()),
+    "impedance": lambda: figures.impedance_over_frequency(impedance()),
+    "margins": lambda: figures.margins_over_angle([loop_margins()]),
+    "coupled_stability": lambda: figures.coupled_stability_map(coupled()),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
 }

@@ -15,6 +15,12 @@ from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
 from .design_figures import design_picture, limit_margins
+from .loop_evaluation import (
+    coupled_stability_map,
+    impedance_over_frequency,
+    margins_over_angle,
+    torque_responses,
+)
 from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
@@ -46,15 +52,18 @@ __all__ = [
     "closed_loop",
     "closed_loop_of",
     "compact",
+    "coupled_stability_map",
     "curve_of_task",
     "curves",
     "described",
     "design_picture",
     "gap_bars",
     "held_out_series",
+    "impedance_over_frequency",
     "inline_svg",
     "limit_margins",
     "loop_area",
+    "margins_over_angle",
     "metric_note",
     "motor_over_task",
     "observability_over_angle",
@@ -72,6 +81,7 @@ __all__ = [
     "torque_band",
     "torque_curve",
     "torque_loops",
+    "torque_responses",
     "workshop_drawing",
     "write_figures",
 ]

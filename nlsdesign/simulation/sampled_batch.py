@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -268,6 +268,7 @@ def _number_of_runs(sizes: Sequence[int]) -> int:
     return several[0] if several else 1
 
 
+@lru_cache(maxsize=16)
 def _chunk(system: SampledSystem, keep: Sequence[str]) -> ca.Function:
     """Return (state, inputs of all samples, parameters) -> (states after each sample, what is kept)."""
     one = _SampleWriter(system).function(keep)

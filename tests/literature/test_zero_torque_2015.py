@@ -1,6 +1,13 @@
 """Fig. 9 of Austin et al. 2015: torque that a load feels which is moved while no torque is wanted.
 
-The amplitude of the load is not printed; ±10° is assumed. Points read off the vector figure, N·m rms.
+The paper prints neither the amplitude of the load nor the gains. Of linear springs Fig. 9 shows the ratio
+of amplitude and gain only, so their points do not say how large the motion was. The nonlinear spring has a
+dead zone of several degrees, and its points do: with ±10° no gains meet all three of them, because half of
+the motion is taken up by the dead zone at 0.5 Hz already and the torque grows more slowly than the
+frequency; with ±20° and twice the gains the linear springs feel the same, and the nonlinear one meets all
+three points as well. Friction, viscosity and damping of the gear, changed one at a time, do not (see the
+docstrings below). So ±20° is consistent with all nine points; it is an inference from the figure, not
+something the paper states. Points read off the vector figure, N·m rms.
 """
 
 from __future__ import annotations
@@ -8,14 +15,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nlsdesign.components import Driven, Encoder
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.control import ClosedLoop, TorqueGains, torque_controller, zero_torque
+from nlsdesign.components.assembly.moved_load import with_moved_load
+from nlsdesign.control import ClosedLoop, TorqueGains, encoder_loop, torque_controller, zero_torque
 from nlsdesign.deck import load_deck
-from nlsdesign.model import FlatModel, Variable, flatten
-from nlsdesign.model.transform import with_signal
-from nlsdesign.observer import design_observer_with_details
+from nlsdesign.export import natively
+from nlsdesign.model import flatten
+from nlsdesign.observer import design_observer
 
 FREQUENCIES = [0.5, 1.0, 2.0]
 PUBLISHED = {
@@ -23,46 +29,58 @@ PUBLISHED = {
     "austin2015_stiff_spring": [0.01160, 0.02396, 0.04971],
     "austin2015_figure_consistent": [0.00522, 0.01112, 0.02252],
 }
+LINEAR = TorqueGains(proportional=64.0, integral=110.0)
+NONLINEAR = TorqueGains(proportional=135.0, integral=100.0)
+GAINS = {
+    "austin2015_soft_spring": LINEAR,
+    "austin2015_stiff_spring": LINEAR,
+    "austin2015_figure_consistent": NONLINEAR,
+}
+"""One set for both linear springs and one for the nonlinear spring, each for all of its points. Assumed:
+chosen so that Fig. 9 is met, since the paper prints none."""
 
 
-def moved(deck: str) -> tuple[FlatModel, FlatModel]:
-    """The bench, on which observer and controller are designed, and the same with a driven load."""
+def moved(deck: str, gains: TorqueGains, changes: dict[str, float] | None = None) -> ClosedLoop:
+    """The bench with a moved load; observer and controller are designed on the fixed one as declared."""
     actuator = declare(load_deck(deck))
-    bench = flatten(actuator, outputs=["motor.angle", "spring.torque"])
-    encoder = Encoder(of="load.angle", quantum=bench.values["motor_encoder.quantum"])
-    parts = dict(actuator.parts) | {"load": Driven(), "load_encoder": encoder}
-    plant = flatten(assembly("moved", **parts), outputs=["motor.angle", "spring.torque"])
-    deflection = Variable("spring.angle.measured", "rad", "deflection as both encoders read it")
-    return bench, with_signal(
-        plant, deflection, lambda n: n["motor_encoder.reading"] - n["load_encoder.reading"]
-    )
+    outputs = ["motor.angle", "spring.torque"]
+    bench = flatten(actuator, outputs=outputs)
+    plant = flatten(with_moved_load(actuator), outputs=outputs).with_values(changes or {})
+    controller = torque_controller(bench, gains=gains)
+    return encoder_loop(plant, observer=design_observer(bench), controller=controller)
 
 
-def found(deck: str, gains: TorqueGains) -> np.ndarray:
-    bench, plant = moved(deck)
-    loop = ClosedLoop(
-        plant=plant,
-        observer=design_observer_with_details(bench).model,
-        controller=torque_controller(bench, gains=gains),
-        wires={
-            "observer.motor.angle": "plant.spring.angle.measured",
-            "controller.motor.angle": "plant.motor_encoder.reading",
-        },
-    )
-    return zero_torque(loop, amplitude=np.radians(10.0), frequencies=FREQUENCIES, cycles=2)
+def felt(loop: ClosedLoop, degrees: float) -> np.ndarray:
+    found = zero_torque(loop, amplitude=np.radians(degrees), frequencies=FREQUENCIES, translate=natively)
+    assert all(verdict.holds for verdict in found.verdicts)
+    return found.rms
+
+
+@pytest.mark.parametrize("deck", PUBLISHED)
+def test_all_points_to_two_hertz_within_a_tenth(deck: str) -> None:
+    assert felt(moved(deck, GAINS[deck]), 20.0) == pytest.approx(PUBLISHED[deck], rel=0.10)
 
 
 @pytest.mark.parametrize("deck", ["austin2015_soft_spring", "austin2015_stiff_spring"])
-def test_linear_springs_with_a_gain_of_32(deck: str) -> None:
-    torque = found(deck, TorqueGains(proportional=32.0, integral=0.0))
-    assert torque[1:] == pytest.approx(PUBLISHED[deck][1:], rel=0.06)
-    # At 0.5 Hz the integrator of the paper, whose gain is not printed, takes something off.
-    assert 0.75 * torque[0] < PUBLISHED[deck][0] < torque[0]
+def test_linear_springs_do_not_say_how_far_the_load_moved(deck: str) -> None:
+    """Half the amplitude with half the gains: the same torque."""
+    halved = TorqueGains(proportional=32.0, integral=55.0)
+    assert felt(moved(deck, halved), 10.0) == pytest.approx(PUBLISHED[deck], rel=0.10)
 
 
-def test_the_nonlinear_spring_with_a_gain_of_70_up_to_one_hertz() -> None:
-    deck = "austin2015_figure_consistent"
-    torque = found(deck, TorqueGains(proportional=70.0, integral=100.0))
-    assert torque[:2] == pytest.approx(PUBLISHED[deck][:2], rel=0.15)
-    # From 2 Hz on the model stays below the figure: the load moves within the dead zone of the cam.
-    assert 0.6 * PUBLISHED[deck][2] < torque[2] < PUBLISHED[deck][2]
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"dry_friction.sliding_effort": 0.1},
+        {"bearing.damping": 0.04},
+        {"spring.rubber.relaxing.dashpot.viscosity": 411e3},
+    ],
+)
+def test_with_ten_degrees_the_nonlinear_spring_grows_too_slowly(changes: dict[str, float]) -> None:
+    """From 0.5 to 2 Hz by 4.3 in the figure, by at most 3.5 with five times the friction, forty times the
+    damping of the gear or twenty times the viscosity: a factor that no gain Kp changes much."""
+    loop = moved("austin2015_figure_consistent", TorqueGains(proportional=70.0, integral=0.0), changes)
+    published = PUBLISHED["austin2015_figure_consistent"]
+    torque = felt(loop, 10.0)
+    assert torque[2] / torque[0] < 3.5 < 0.85 * published[2] / published[0]

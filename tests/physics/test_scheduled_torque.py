@@ -293,7 +293,7 @@ def test_a_moved_load_feels_what_the_bandwidth_lets_through() -> None:
             "controller.spring.angle": "plant.spring.angle",
         },
     )  # fmt: skip
-    torque = zero_torque(found, amplitude=amplitude, frequencies=[frequency], cycles=2)[0]
+    torque = zero_torque(found, amplitude=amplitude, frequencies=[frequency], cycles=2).rms[0]
     omega = 2.0 * math.pi * frequency
     assert torque == pytest.approx(
         amplitude * omega * stiffness / (2.0 * math.pi * 12.0) / math.sqrt(2.0), rel=0.05

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import Driven
-from nlsdesign.control import ClosedLoop, TorqueGains, sine_response, torque_controller, tracking, zero_torque
+from nlsdesign.control import (
+    ClosedLoop,
+    TorqueGains,
+    linear_loop,
+    loop_margins,
+    sine_response,
+    torque_controller,
+    tracking,
+    zero_torque,
+)
 from nlsdesign.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import FixedGrid, design_observer_with_details, observe
@@ -81,12 +90,17 @@ def test_the_current_acts_after_its_delay(loop: ClosedLoop, delay: int) -> None:
     assert np.array_equal(trace["observer.motor.current"], acting)
 
 
-def test_delay_costs_phase(loop: ClosedLoop) -> None:
-    phase = [
-        sine_response(changed(loop, delay=d), amplitude=0.8, frequencies=[6.0], cycles=3).phase_degrees[0]
-        for d in (0, 3)
-    ]
-    assert phase[1] < phase[0] - 1.0
+def test_delay_costs_margin_sample_by_sample(loop: ClosedLoop) -> None:
+    """What is lost is the delay margin; with three samples the loop of these gains limit-cycles."""
+    margin = [loop_margins(changed(loop, delay=d), [0.5]).delay[0] for d in (0, 1, 2)]
+    assert np.diff(margin) == pytest.approx([-1e-3, -1e-3], rel=1e-3)
+    assert 2e-3 < margin[0] < 3e-3
+    late = changed(loop, delay=3)
+    assert not linear_loop(late, [0.5]).stable()[0]
+    lost = sine_response(late, amplitude=0.8, frequencies=[6.0])
+    assert lost.verdicts[0].state == "limit cycle"
+    assert np.isnan(lost.phase_degrees[0])
+    assert np.isnan(lost.distortion[0])
 
 
 def test_start_values_are_taken(loop: ClosedLoop) -> None:

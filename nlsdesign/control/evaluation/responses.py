@@ -1,9 +1,13 @@
-"""Figures of merit of a closed torque loop, measured on simulated runs."""
+"""Figures of merit of a closed torque loop, measured on simulated runs.
+
+Every figure comes with the verdict on its run. Where the loop did not settle (a limit cycle, a run that
+diverged or never repeated itself) the figure is not a number, and the verdict says why.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +16,17 @@ from numpy.typing import NDArray
 from ...errors import ValueRangeError
 from ...model.roles import moved_load
 from ...simulation import Trace
+from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import PLANT
+from ..laws.largest_torque import check_torque
 from ..loop.closed_loop import ClosedLoop
+from .loop_verdict import LoopJudge, LoopVerdict
+from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 
 Array = NDArray[np.float64]
+
+_APPROACH = 0.3
+"""Time in s in which a held torque is approached."""
 
 
 @dataclass(frozen=True)
@@ -30,17 +41,22 @@ class Tracking:
         Root mean square error over the root mean square of the desired torque, 1.
     estimate_error
         Root mean square of estimated minus actual torque in N·m.
+    verdict
+        On the run; where it does not hold the numbers are not numbers.
     """
 
     rms_error: float
     largest_error: float
     relative_error: float
     estimate_error: float
+    verdict: LoopVerdict
 
 
 @dataclass(frozen=True, eq=False)
 class SineResponse:
     """Desired to actual torque at several frequencies and one amplitude: a describing function.
+
+    Where a verdict does not hold, response and distortion are not numbers.
 
     Parameters
     ----------
@@ -52,12 +68,15 @@ class SineResponse:
         Complex ratio of the fundamentals, shape (n,).
     distortion
         What is not fundamental, root mean square over that of the fundamental, shape (n,).
+    verdicts
+        On each run.
     """
 
     amplitude: float
     frequency: Array
     response: NDArray[np.complex128]
     distortion: Array
+    verdicts: tuple[LoopVerdict, ...]
 
     @property
     def decibel(self) -> Array:
@@ -67,13 +86,73 @@ class SineResponse:
 
     @property
     def phase_degrees(self) -> Array:
-        """Phase in degrees, unwrapped over the frequencies."""
-        phase: Array = np.degrees(np.unwrap(np.angle(self.response)))
-        return phase
+        """Phase in degrees, unwrapped over the frequencies that settled."""
+        phase = np.angle(self.response)
+        good = np.isfinite(phase)
+        phase[good] = np.unwrap(phase[good])
+        degrees: Array = np.degrees(phase)
+        return degrees
+
+    @property
+    def saturated(self) -> Array:
+        """Share of the time at the current limit, shape (n,)."""
+        return np.array([verdict.saturated for verdict in self.verdicts])
+
+
+@dataclass(frozen=True, eq=False)
+class ZeroTorque:
+    """What a load feels that is moved as a sine while no torque is wanted.
+
+    Where a verdict does not hold, the numbers are not numbers.
+
+    Parameters
+    ----------
+    amplitude
+        Of the load's angle in rad.
+    frequency
+        In Hz, shape (n,).
+    rms
+        Root mean square torque in N·m, shape (n,).
+    energy
+        That the load loses to the actuator per cycle, in J, shape (n,).
+    impedance
+        Torque that resists the load over its speed, complex ratio of the fundamentals, in N·m·s/rad.
+    verdicts
+        On each run.
+    """
+
+    amplitude: float
+    frequency: Array
+    rms: Array
+    energy: Array
+    impedance: NDArray[np.complex128]
+    verdicts: tuple[LoopVerdict, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldTorque:
+    """How a loop holds torques.
+
+    Parameters
+    ----------
+    torque
+        In N·m, shape (n,).
+    rms_error
+        Root mean square of the torque error in N·m, shape (n,); not a number where a verdict does not hold.
+    verdicts
+        On each run.
+    """
+
+    torque: Array
+    rms_error: Array
+    verdicts: tuple[LoopVerdict, ...]
 
 
 def tracking(loop: ClosedLoop, trace: Trace, *, settled: float = 0.0) -> Tracking:
     """Return how well the torque followed in a run of a closed loop.
+
+    Whether the loop limit-cycles is looked for in the torque error, above three times the frequency below
+    which 99.9 % of the power of the desired torque lie.
 
     Parameters
     ----------
@@ -92,6 +171,10 @@ def tracking(loop: ClosedLoop, trace: Trace, *, settled: float = 0.0) -> Trackin
     counted = trace.time >= settled
     if not np.any(counted):
         raise ValueRangeError(f"settled {settled:g} s", f"the run ends at {trace.time[-1]:g} s")
+    judge = LoopJudge(loop)
+    verdict = judge.judged_error({n: trace[n][counted] for n in (*judge.keep, loop.desired)})
+    if not verdict.holds:
+        return Tracking(math.nan, math.nan, math.nan, math.nan, verdict)
     error = (trace[loop.torque] - trace[loop.desired])[counted]
     estimate = (trace[loop.estimate] - trace[loop.torque])[counted]
     size = _rms(trace[loop.desired][counted])
@@ -100,15 +183,20 @@ def tracking(loop: ClosedLoop, trace: Trace, *, settled: float = 0.0) -> Trackin
         float(np.max(np.abs(error))),
         _rms(error) / size if size > 0.0 else math.inf,
         _rms(estimate),
+        verdict,
     )
 
 
 def sine_response(
-    loop: ClosedLoop, *, amplitude: float, frequencies: Sequence[float], offset: float = 0.0, cycles: int = 4
+    loop: ClosedLoop,
+    *,
+    amplitude: float,
+    frequencies: Sequence[float] | Array,
+    offset: float = 0.0,
+    cycles: int | None = None,
+    translate: Translate = as_it_is,
 ) -> SineResponse:
-    """Run the loop on sines of the desired torque, one run per frequency.
-
-    The first half of the cycles, and at least 0.5 s, count as transient.
+    """Run the loop on sines of the desired torque, one run per frequency, until the answer repeats itself.
 
     Parameters
     ----------
@@ -121,43 +209,126 @@ def sine_response(
     offset
         Of the desired torque in N·m.
     cycles
-        Number of cycles that are evaluated.
+        Number of cycles in a window, two of which are evaluated; by default a quarter of a second, and at
+        least one cycle.
+    translate
+        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
 
     Raises
     ------
     ValueRangeError
-        If a frequency is not between zero and half the sampling frequency.
-    ConvergenceError
-        If the plant runs away.
+        If a frequency is not between zero and half the sampling frequency, or the amplitude not positive or
+        beyond what the current limit can hold.
     """
-    used, response, distortion = [], [], []
-    for wanted in frequencies:
-        frequency, samples, skip = _whole(wanted, loop.sample_time, cycles)
-        omega = 2.0 * math.pi * frequency
-        trace = loop.run(
-            (samples + skip) * loop.sample_time,
-            inputs={loop.desired: _Sine(amplitude, omega, offset=offset)},
-        )
-        counted = slice(skip, skip + samples)
-        torque, turn = trace[loop.torque][counted], np.exp(-1j * omega * trace.time[counted])
-        fundamental = 2.0 * np.mean(torque * turn)
-        # sin(ωt) = Im e^(iωt): its fundamental is −i times the amplitude.
-        response.append(fundamental / (-1j * amplitude))
-        rest = torque - np.mean(torque) - np.real(fundamental / turn)
-        distortion.append(_rms(rest) / (abs(fundamental) / math.sqrt(2.0)))
-        used.append(frequency)
-    return SineResponse(amplitude, np.array(used), np.array(response), np.array(distortion))
+    _check_amplitude(amplitude, "N·m")
+    check_torque(loop.plant, abs(offset) + amplitude)
+    wanted = np.asarray(frequencies, dtype=float)
+    drive = sine_drive(loop, amplitude=amplitude, frequencies=wanted, offset=offset, cycles=cycles)
+    runs = run_periodic(loop, drive, translate=translate)
+    response = [_answer(run, loop.torque, amplitude) for run in runs]
+    return SineResponse(
+        amplitude,
+        np.array([run.frequency for run in runs]),
+        np.array(response),
+        np.array([_distortion(run, loop.torque) for run in runs]),
+        tuple(run.verdict for run in runs),
+    )
+
+
+def sine_drive(
+    loop: ClosedLoop,
+    *,
+    amplitude: float | Array,
+    frequencies: Array,
+    offset: float = 0.0,
+    cycles: int | None = None,
+    parameters: Mapping[str, Array | float] | None = None,
+) -> PeriodicDrive:
+    """Return sines of the desired torque as drives of many runs.
+
+    Parameters
+    ----------
+    loop
+        Closed loop.
+    amplitude
+        In N·m, one number or shape (runs,).
+    frequencies
+        In Hz, shape (runs,).
+    offset
+        In N·m.
+    cycles
+        In a window.
+    parameters
+        Of the loop by full name, numbers or shape (runs,).
+    """
+    plain = PeriodicDrive(
+        frequencies=frequencies, drives=lambda _, __: {}, parameters=parameters or {}, cycles=cycles
+    )
+    omega = 2.0 * math.pi * plain.windows(loop.sample_time)[2]
+    size = amplitude * np.ones(len(omega))
+
+    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+        return {loop.desired: offset + size[runs, None] * np.sin(omega[runs, None] * time)}
+
+    return PeriodicDrive(frequencies=frequencies, drives=drives, parameters=parameters or {}, cycles=cycles)
+
+
+def held_drive(
+    loop: ClosedLoop, *, torques: Array, parameters: Mapping[str, Array | float] | None = None
+) -> PeriodicDrive:
+    """Return torques that are approached smoothly and then held, as drives of many runs.
+
+    The last twentieth comes as a step: a loop that only dry friction keeps quiet is woken by it.
+
+    Parameters
+    ----------
+    loop
+        Closed loop.
+    torques
+        In N·m, shape (runs,).
+    parameters
+        Of the loop by full name, numbers or shape (runs,).
+    """
+
+    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+        share = 0.475 - 0.475 * np.cos(math.pi * np.minimum(time / _APPROACH, 1.0))
+        return {loop.desired: torques[runs, None] * np.where(time >= _APPROACH, 1.0, share)}
+
+    return PeriodicDrive(frequencies=np.zeros(len(torques)), drives=drives, parameters=parameters or {})
+
+
+def held_torque(
+    loop: ClosedLoop, torques: Sequence[float] | Array, *, translate: Translate = as_it_is
+) -> HeldTorque:
+    """Return how a loop holds torques: the error at rest, and whether it limit-cycles there.
+
+    Parameters
+    ----------
+    loop
+        Load fixed, or held by its inputs at zero.
+    torques
+        In N·m, shape (n,).
+    translate
+        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
+    """
+    wanted = np.asarray(torques, dtype=float)
+    check_torque(loop.plant, float(np.max(np.abs(wanted))))
+    runs = run_periodic(loop, held_drive(loop, torques=wanted), translate=translate)
+    good = np.array([run.verdict.holds for run in runs])
+    error = np.array([_rms(run[loop.torque] - t) for run, t in zip(runs, wanted, strict=True)])
+    return HeldTorque(wanted, np.where(good, error, np.nan), tuple(run.verdict for run in runs))
 
 
 def zero_torque(
     loop: ClosedLoop,
     *,
     amplitude: float,
-    frequencies: Sequence[float],
+    frequencies: Sequence[float] | Array,
     load: str | None = None,
-    cycles: int = 4,
-) -> Array:
-    """Return the root mean square torque, in N·m, that a moved load feels while no torque is wanted.
+    cycles: int | None = None,
+    translate: Translate = as_it_is,
+) -> ZeroTorque:
+    """Return what a load feels that is moved as a sine while no torque is wanted: Fig. 9 of the paper.
 
     Parameters
     ----------
@@ -170,7 +341,9 @@ def zero_torque(
     load
         Name of the load; decided from the structure of the plant if it is left out.
     cycles
-        Number of cycles that are evaluated.
+        Number of cycles in a window, two of which are evaluated.
+    translate
+        For instance :func:`~nlsdesign.export.natively`: then compiled code runs.
 
     Raises
     ------
@@ -178,47 +351,59 @@ def zero_torque(
         If the plant has no driven load of that name.
     ArrangementError
         If the structure does not say which body is the load.
-    ConvergenceError
-        If the plant runs away.
+    ValueRangeError
+        If a frequency is not between zero and half the sampling frequency, or the amplitude not positive.
     """
-    moved, torques = moved_load(loop.plant, load), []
-    for wanted in frequencies:
-        frequency, samples, skip = _whole(wanted, loop.sample_time, cycles)
-        omega = 2.0 * math.pi * frequency
-        trace = loop.run(
-            (samples + skip) * loop.sample_time,
-            inputs={
-                loop.desired: 0.0,
-                f"{PLANT}.{moved.motion}": _Sine(amplitude, omega),
-                f"{PLANT}.{moved.rate}": _Sine(amplitude * omega, omega, ahead=math.pi / 2.0),
-            },
-        )
-        torques.append(_rms(trace[loop.torque][skip : skip + samples]))
-    return np.array(torques)
+    moved = moved_load(loop.plant, load)
+    _check_amplitude(amplitude, "rad")
+    motion, rate = f"{PLANT}.{moved.motion}", f"{PLANT}.{moved.rate}"
+    wanted = np.asarray(frequencies, dtype=float)
+    plain = PeriodicDrive(frequencies=wanted, drives=lambda _, __: {}, cycles=cycles)
+    omega = 2.0 * math.pi * plain.windows(loop.sample_time)[2]
+
+    def drives(time: Array, runs: NDArray[np.intp]) -> dict[str, Array | float]:
+        turned = omega[runs, None] * time
+        return {
+            loop.desired: 0.0,
+            motion: amplitude * np.sin(turned),
+            rate: amplitude * omega[runs, None] * np.cos(turned),
+        }
+
+    driven = PeriodicDrive(frequencies=wanted, drives=drives, cycles=cycles)
+    runs = run_periodic(loop, driven, keep=(motion, rate), translate=translate)
+    good = np.array([run.verdict.holds for run in runs])
+    rms = np.array([run.rms(loop.torque) for run in runs])
+    # A positive torque of the spring pushes the load on: what resists has the other sign.
+    power = np.array([-float(np.mean(run[loop.torque] * run[rate])) for run in runs])
+    frequency = np.array([run.frequency for run in runs])
+    ratio = np.array([-run.fundamental(loop.torque) / run.fundamental(rate) for run in runs])
+    return ZeroTorque(
+        amplitude,
+        frequency,
+        np.where(good, rms, np.nan),
+        np.where(good, power / frequency, np.nan),
+        np.where(good, ratio, np.nan),
+        tuple(run.verdict for run in runs),
+    )
 
 
-@dataclass(frozen=True)
-class _Sine:
-    """A sine of time."""
-
-    amplitude: float
-    omega: float
-    offset: float = 0.0
-    ahead: float = 0.0
-
-    def __call__(self, time: float) -> float:
-        return self.offset + self.amplitude * math.sin(self.omega * time + self.ahead)
+def _answer(run: PeriodicRun, torque: str, amplitude: float) -> complex:
+    # sin(ωt) = Im e^(iωt): its fundamental is −i times the amplitude.
+    return run.fundamental(torque) / (-1j * amplitude) if run.verdict.holds else complex(math.nan, math.nan)
 
 
-def _whole(frequency: float, sample_time: float, cycles: int) -> tuple[float, int, int]:
-    """Return a frequency of which the cycles fill whole samples, their number, and the samples before."""
-    if not 0.0 < frequency < 0.5 / sample_time:
-        raise ValueRangeError(
-            f"frequency {frequency:g} Hz", f"must lie between 0 and {0.5 / sample_time:g} Hz"
-        )
-    samples = round(cycles / (frequency * sample_time))
-    skip = max(round(0.5 / sample_time), samples // 2)
-    return cycles / (samples * sample_time), samples, skip
+def _distortion(run: PeriodicRun, torque: str) -> float:
+    if not run.verdict.holds:
+        return math.nan
+    fundamental, values = run.fundamental(torque), run[torque]
+    turn = np.exp(2j * math.pi * run.frequency * run.time)
+    rest = values - np.mean(values) - np.real(fundamental * turn)
+    return _rms(rest) / (abs(fundamental) / math.sqrt(2.0))
+
+
+def _check_amplitude(amplitude: float, unit: str) -> None:
+    if not (math.isfinite(amplitude) and amplitude > 0.0):
+        raise ValueRangeError(f"amplitude {amplitude:g} {unit}", "must be finite and positive")
 
 
 def _rms(values: Array) -> float:
