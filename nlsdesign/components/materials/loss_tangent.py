@@ -1,4 +1,4 @@
-"""From a loss tangent to relaxation, with the error that a few branches make; what the library knows of it."""
+"""From a loss tangent to relaxation, with the error of a few branches; what the library knows of it."""
 
 from __future__ import annotations
 
@@ -79,9 +79,9 @@ def flat_relaxation(
     """Return branches whose loss tangent hardly changes over a band of frequencies.
 
     Relaxation times are spaced evenly in their logarithm over a little more than the band; the shares follow
-    from least squares with none negative, since tan δ = t is linear in them. Below the band the rubber relaxes
-    to its equilibrium, above it no longer does. A flat loss tangent has a price: the modulus rises by about
-    2·tan δ/π per unit of ln ω, so rubber with much loss is much stiffer in motion than at rest.
+    from least squares with none negative, since tan δ = t is linear in them. Below the band the rubber
+    relaxes to its equilibrium, above it no longer does. A flat loss tangent has a price: the modulus rises by
+    about 2·tan δ/π per unit of ln ω, so rubber with much loss is much stiffer in motion than at rest.
     Sources: Tschoegl 1989 (Prony series); Lawson and Hanson 1974 (least squares).
 
     Parameters
@@ -298,7 +298,8 @@ def relaxation_of(known: KnownLoss, loss_tangent: float | None = None) -> Relaxa
     """Return the relaxation that the library's knowledge of a loss gives.
 
     A measured curve over the frequency is followed; one number at one frequency gives the standard linear
-    solid with its peak there; a range, or a number without a frequency, a flat loss tangent from 0.1 to 10 Hz.
+    solid with its peak there; a range, or a number without a frequency, gives a flat loss tangent from 0.1 to
+    10 Hz.
 
     Parameters
     ----------

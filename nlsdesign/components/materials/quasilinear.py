@@ -17,7 +17,7 @@ from ..core.part_numbers import parameter
 
 @dataclass(frozen=True, kw_only=True)
 class QuasilinearRelaxation(Combination):
-    """Laws that relax: F = F_e + Σ gᵢ·(F_e − yᵢ), dyᵢ/dt = (F_e − yᵢ)/τᵢ, with F_e the effort of those inside.
+    """Laws that relax: F = F_e + Σ gᵢ·(F_e − yᵢ), dyᵢ/dt = (F_e − yᵢ)/τᵢ, F_e the effort of those inside.
 
     F_e is the effort at equilibrium, yᵢ what branch i has relaxed to, gᵢ its share. A small motion about any
     strain sees the tangent of F_e times 1 + Σ gᵢ·iωτᵢ/(1 + iωτᵢ), so loss tangent and relaxation are the same
@@ -36,7 +36,7 @@ class QuasilinearRelaxation(Combination):
     >>> from nlsdesign.components import NeoHooke
     >>> gum = (("stiff", NeoHooke(shear_modulus=0.4e6)),)
     >>> round(QuasilinearRelaxation(members=gum, shares=(0.1, 0.1), times=(0.01, 0.1)).loss_tangent(1.0), 4)
-    0.0498
+    0.0499
     """
 
     phenomena: ClassVar[frozenset[str]] = frozenset({"relaxation"})

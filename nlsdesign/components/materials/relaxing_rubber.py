@@ -25,8 +25,8 @@ def relaxing_law_of(
 ) -> MaterialLaw:
     """Return the laws of a rubber of the library with the loss that is known of it.
 
-    The elastic law of :func:`law_of` is that of equilibrium: a tensile test is slow against the frequencies at
-    which rubber in a torque loop works. It relaxes by the same shares at every strain
+    The elastic law of :func:`law_of` is taken as that of equilibrium: a tensile test is slow against the
+    frequencies at which rubber in a torque loop works. It relaxes by the same shares at every strain
     (:class:`QuasilinearRelaxation`). A branch that the library gives for the rubber itself is replaced.
 
     Parameters
@@ -49,9 +49,8 @@ def relaxing_law_of(
     Examples
     --------
     >>> from nlsdesign.components import material
-    >>> law = relaxing_law_of(material("Dragon_Skin_30"))
-    >>> print(law)
-    Dragon_Skin_30: StrainStiffening from nominal_stress, relaxing, strain 0 to 6, off the curve by 1.2 % rms, 2.4 % at worst
+    >>> print(str(relaxing_law_of(material("Dragon_Skin_30"))).partition(", strain")[0])
+    Dragon_Skin_30: StrainStiffening from nominal_stress, relaxing
     """
     law = law_of(material, using=using)
     if loss_tangent is None:
