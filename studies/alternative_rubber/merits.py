@@ -1,0 +1,177 @@
+"""What a rubber is worth in the torque loop: gains by one rule, figures of merit, and how they vary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+import nlsdesign as nls
+from nlsdesign.design import CamDesign
+from nlsdesign.errors import ConvergenceError, NlsError
+
+from .bench import Bench, Measured, Rubber, Run
+from .candidates import Candidate, designed
+
+Array = NDArray[np.float64]
+
+LOW, HIGH = 0.3, 2.8
+"""Amplitudes of the torque in N·m: a tenth of, and all of, that of the published measurements."""
+HELD = (LOW, 1.4, HIGH)
+"""Torques in N·m that are held while the gain is looked for."""
+GAIN_MARGIN = 2.0
+"""The loop begins to limit-cycle at this many times its gain: 6 dB."""
+SWEPT = (6.0, 10.0, 14.0, 18.0, 24.0, 32.0)
+"""Frequencies in Hz at which the response is taken; whole numbers, so that a second has whole cycles."""
+FALL = 1.0 / np.sqrt(2.0)
+"""Of the torque over what was wanted, at the bandwidth: −3 dB."""
+AT, MOVED_AT, MOVED = 2.0, 5.0, nls.degrees(5.0)
+"""Hz of the energy lost and of the error of the estimate; Hz and amplitude in rad of the moved load."""
+
+METRICS = {
+    "bandwidth_low": f"bandwidth at {LOW} N·m, Hz",
+    "bandwidth_high": f"bandwidth at {HIGH} N·m, Hz",
+    "impedance": f"impedance at {MOVED_AT:g} Hz, N·m/rad",
+    "loss": f"energy lost per cycle at {AT:g} Hz, mJ",
+    "estimate_error": f"error of the torque estimate at {AT:g} Hz, mN·m",
+    "volume": "volume of rubber, cm³",
+}
+"""What is ranked, by name."""
+MORE_IS_BETTER = ("bandwidth_low", "bandwidth_high")
+
+
+@dataclass(frozen=True, eq=False)
+class Merits:
+    """Figures of merit of one rubber, over its loss tangent and the factor of its modulus.
+
+    Parameters
+    ----------
+    candidate, design
+        The rubber and the spring that was designed for it.
+    proportional
+        Gain of the torque loop; not a number where the target was missed and no loop was made.
+    loss_tangents, moduli
+        At which the figures were measured, shape (3,) each.
+    values
+        By name of the metric, shape (3, 3); infinite where the loop limit-cycles or the design misses.
+    """
+
+    candidate: Candidate
+    design: CamDesign | None
+    proportional: float
+    loss_tangents: Array
+    moduli: Array
+    values: dict[str, Array]
+
+    @property
+    def met(self) -> bool:
+        """Whether the design meets its target within its limits."""
+        return self.design is not None and self.design.met
+
+    def at(self, metric: str, loss_tangents: Array, moduli: Array) -> Array:
+        """Return a figure between the points at which it was measured, by quadratics, shape (n,)."""
+        weights = (_quadratic(self.loss_tangents, loss_tangents), _quadratic(self.moduli, moduli))
+        if not np.all(np.isfinite(self.values[metric])):
+            return np.full(len(loss_tangents), np.nan)
+        value: Array = np.einsum("ni,nj,ij->n", *weights, self.values[metric])
+        return value
+
+
+def _quadratic(knots: Array, at: Array) -> Array:
+    """Return the weights of three knots, shape (n, 3)."""
+    a, b, c = knots
+    return np.stack(
+        [
+            (at - b) * (at - c) / ((a - b) * (a - c)),
+            (at - a) * (at - c) / ((b - a) * (b - c)),
+            (at - a) * (at - b) / ((c - a) * (c - b)),
+        ],
+        axis=1,
+    )
+
+
+def merits_of(candidate: Candidate) -> Merits:
+    """Design the spring for a rubber, choose the gain by the rule, and measure what the loop does."""
+    loss, moduli = candidate.loss, 1.0 + 2.0 * candidate.spread * np.array([-1.0, 0.0, 1.0])
+    tangents = np.array([loss.lower, loss.middle, loss.upper])
+    design = _designed(candidate)
+    if design is None or not design.met:
+        missed = np.full((3, 3), np.nan)
+        return Merits(candidate, design, np.nan, tangents, moduli, dict.fromkeys(METRICS, missed))
+    bench = Bench(design.actuator)
+    gain = largest_gain(bench, Rubber(loss.middle)) / GAIN_MARGIN
+    rubbers = [Rubber(t, m) for t, m in product(tangents, moduli)]
+    columns = measured(bench, rubbers, gain)
+    columns["volume"] = np.full(len(rubbers), 1e6 * design.rubber_volume)
+    return Merits(
+        candidate, design, gain, tangents, moduli, {name: column.reshape(3, 3) for name, column in columns.items()}
+    )
+
+
+def _designed(candidate: Candidate) -> CamDesign | None:
+    try:
+        return designed(candidate.elastic, candidate.loss.middle)
+    except NlsError:
+        # Limits in conflict: a miss, which the ranking shows as one.
+        return None
+
+
+def largest_gain(bench: Bench, rubber: Rubber) -> float:
+    """Return the gain at which the loop begins to limit-cycle while it holds a torque, within 1 %."""
+    low, high = 5.0, 500.0
+    for _ in range(2):
+        gains = np.geomspace(low, high, 24)
+        runs = [Run(rubber, float(gain), torque) for gain in gains for torque in HELD]
+        cycling = np.any(bench.run(runs, stop=1.5).cycling.reshape(len(gains), len(HELD)), axis=1)
+        if cycling[0] or not cycling[-1]:
+            what = "limit-cycles at every gain" if cycling[0] else "limit-cycles at no gain"
+            raise ConvergenceError(bench.actuator.name, f"{what} from {low:g} to {high:g} rad/s/(N·m)")
+        first = int(np.argmax(cycling))
+        low, high = float(gains[first - 1]), float(gains[first])
+    return high
+
+
+def measured(bench: Bench, rubbers: Sequence[Rubber], gain: float) -> dict[str, Array]:
+    """Return the figures of merit of a loop with each rubber; not a number where the loop limit-cycles."""
+    held = bench.run([Run(r, gain, torque) for r in rubbers for torque in HELD], stop=1.5)
+    steady = ~np.any(held.cycling.reshape(len(rubbers), len(HELD)), axis=1)
+    low = bench.run([Run(r, gain, LOW, f) for r in rubbers for f in SWEPT])
+    high = bench.run([Run(r, gain, HIGH, f) for r in rubbers for f in (AT, *SWEPT)])
+    moved = bench.run([Run(r, gain, 0.0, MOVED_AT, MOVED) for r in rubbers])
+    first = slice(0, None, len(SWEPT) + 1)
+    columns = {
+        "bandwidth_low": bandwidths(low, len(rubbers)),
+        "bandwidth_high": bandwidths(high, len(rubbers)),
+        "impedance": np.abs(moved.impedance),
+        "loss": 1e3 * high.lost[first],
+        "estimate_error": 1e3 * high.estimate_error[first],
+    }
+    return {name: np.where(steady, column, np.nan) for name, column in columns.items()}
+
+
+def bandwidths(measured: Measured, count: int) -> Array:
+    """Return the frequencies in Hz at which the response has fallen by 3 dB; not a number if nowhere.
+
+    Parameters
+    ----------
+    measured
+        Runs of as many frequencies for each rubber.
+    count
+        Number of rubbers.
+    """
+    frequencies = np.array([run.frequency for run in measured.runs]).reshape(count, -1)
+    sizes = np.abs(measured.response).reshape(count, -1)
+    return np.array([_fall(*row) for row in zip(frequencies, sizes, strict=True)])
+
+
+def _fall(frequencies: Array, sizes: Array) -> float:
+    """Return where the size falls below −3 dB for good, linear in dB over the logarithm of the frequency."""
+    above = np.flatnonzero(sizes >= FALL)
+    if len(above) == 0 or above[-1] == len(sizes) - 1:
+        return float("nan")
+    k = above[-1]
+    x, y = np.log(frequencies[k : k + 2]), np.log(sizes[k : k + 2])
+    return float(np.exp(x[0] + (np.log(FALL) - y[0]) / (y[1] - y[0]) * (x[1] - x[0])))
