@@ -112,13 +112,13 @@ class Measured:
 
     @cached_property
     def response(self) -> NDArray[np.complex128]:
-        """Torque over what was wanted, of the fundamentals, shape (runs,)."""
-        return self.fundamental(self.torque) / np.array([run.torque for run in self.runs])
+        """Torque over the sine that was wanted, of the fundamentals, shape (runs,)."""
+        return self.fundamental(self.torque) / _or_none([run.torque for run in self.runs])
 
     @cached_property
     def impedance(self) -> NDArray[np.complex128]:
         """Torque on the moved load over its angle in N·m/rad, of the fundamentals, shape (runs,)."""
-        return -self.fundamental(self.torque) / np.array([run.moved for run in self.runs])
+        return -self.fundamental(self.torque) / _or_none([run.moved for run in self.runs])
 
     @cached_property
     def error(self) -> Array:
@@ -136,7 +136,12 @@ class Measured:
         torque, angle = self.torque[:, self.counted], self.deflection[:, self.counted]
         torque, angle = (np.concatenate([x, x[:, :1]], axis=1) for x in (torque, angle))
         work = np.sum((torque[:, 1:] + torque[:, :-1]) / 2.0 * np.diff(angle, axis=1), axis=1)
-        return work / (np.array([run.frequency for run in self.runs]) * COUNTED)
+        return work / (_or_none([run.frequency for run in self.runs]) * COUNTED)
+
+
+def _or_none(values: Sequence[float]) -> Array:
+    """Return values, not a number in place of zero: what was not asked has no answer."""
+    return np.array([value or np.nan for value in values])
 
 
 def _rms(rows: Array) -> Array:

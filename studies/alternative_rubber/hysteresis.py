@@ -12,7 +12,7 @@ from nlsdesign.components import Material
 
 from .bench import Bench, Measured, Rubber, Run
 from .candidates import TARGET, designed, with_loss
-from .merits import AT, GAIN_MARGIN, HELD, HIGH, HOLD, largest_gain
+from .merits import AT, GAIN_MARGIN, HELD, HIGH, largest_gains
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def hysteresis(elastic: Material, losses: Sequence[float] = LOSSES) -> Hysteresi
     columns: dict[str, list[Array]] = {"exact": [], "wrong": [], "static": []}
     for loss in losses:
         bench, rubber = Bench(with_loss(actuator, elastic, loss)), Rubber(loss)
-        gain = largest_gain(bench, rubber) / GAIN_MARGIN
+        gain = float(largest_gains(bench, [rubber])[0]) / GAIN_MARGIN
         columns["exact"].append(_measured(bench, [rubber], gain)[0])
         ends = [Rubber(loss * (1.0 - WRONG)), Rubber(loss * (1.0 + WRONG))]
         columns["wrong"].append(np.max(_measured(bench, ends, gain), axis=0))
@@ -84,12 +84,14 @@ def hysteresis(elastic: Material, losses: Sequence[float] = LOSSES) -> Hysteresi
 
 def _measured(bench: Bench, rubbers: Sequence[Rubber], gain: float) -> Array:
     """Return errors of estimate and torque and the energy lost, relative, shape (rubbers, 3)."""
-    held = bench.run([Run(r, gain, torque) for r in rubbers for torque in HELD], stop=HOLD)
-    steady = ~np.any(held.cycling.reshape(len(rubbers), len(HELD)), axis=1)
-    run = bench.run([Run(r, gain, HIGH, AT) for r in rubbers])
+    runs = [Run(r, gain, torque) for r in rubbers for torque in HELD] + [
+        Run(r, gain, HIGH, AT) for r in rubbers
+    ]
+    run, count = bench.run(runs), len(rubbers)
+    steady = ~np.any(run.cycling[:-count].reshape(count, len(HELD)), axis=1)
     size = HIGH / np.sqrt(2.0)
     rows = np.stack([run.estimate_error / size, run.error / size, run.lost / stored(run)], axis=1)
-    return np.where(steady[:, None], rows, np.nan)
+    return np.where(steady[:, None], rows[-count:], np.nan)
 
 
 def stored(run: Measured) -> Array:

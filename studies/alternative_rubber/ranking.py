@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 DRAWS = 4000
 PUBLISHED = "PMC-770"
+RESOLUTION = 0.02
+"""Relative difference of two figures below which they are alike: as well as gain and figures are known."""
 _REACH = 2.0
 """Standard deviations at which the factor of the modulus is cut off: the figures are not known beyond."""
 
@@ -101,13 +103,14 @@ def _mean_rank(columns: dict[str, Array]) -> Array:
 def _ranked(
     metric: str, labels: Sequence[str], columns: tuple[Array, Array], missed: tuple[str, ...]
 ) -> Ranking:
-    drawn, skewed = columns
+    drawn, _ = columns
     known = [i for i, row in enumerate(drawn) if np.all(np.isfinite(row))]
     order = sorted(known, key=lambda i: float(np.median(drawn[i])))
     rows = drawn[order]
     sign = -1.0 if metric in MORE_IS_BETTER else 1.0
     values = np.sort(sign * np.quantile(rows, (0.05, 0.5, 0.95), axis=1).T, axis=1)
-    least = rows <= np.min(rows, axis=0)
+    lowest = np.min(rows, axis=0)
+    least = rows <= lowest + RESOLUTION * np.abs(lowest)
     best = np.mean(least / np.sum(least, axis=0), axis=1)
     first_two = [_before(x[order[0]], x[order[1]]) if len(order) > 1 else np.nan for x in columns]
     names = tuple(labels[i] for i in order)
@@ -117,7 +120,8 @@ def _ranked(
 
 
 def _before(first: Array, second: Array) -> float:
-    """Return how often the first is less than the second; a tie counts half."""
+    """Return how often the first is less than the second; what is closer than the resolution counts half."""
     if np.any(np.isnan(first) | np.isnan(second)):
         return float("nan")
-    return float(np.mean((first < second) + 0.5 * (first == second)))
+    alike = np.abs(first - second) <= RESOLUTION * np.abs(second)
+    return float(np.mean(np.where(alike, 0.5, first < second)))

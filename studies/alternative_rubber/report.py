@@ -12,7 +12,7 @@ from nlsdesign.report import Chapter, FigureSection, Section, TableSection, Text
 
 from .hysteresis import ALLOWED, WRONG, Hysteresis
 from .merits import AT, GAIN_MARGIN, HELD, HIGH, METRICS, Merits
-from .ranking import PUBLISHED, Ranking
+from .ranking import PUBLISHED, RESOLUTION, Ranking
 
 _WAYS = {
     "static": "static torque curve",
@@ -45,7 +45,8 @@ def _conditions(merits: Sequence[Merits]) -> Section:
         "For each rubber cam, pretension, section and rest length are designed for 5 N·m at 53° with the "
         "same limits. The elastic curve of the library is taken as that of equilibrium; the loss tangent is "
         "flat from 0.1 to 10 Hz within 5 %. The observer takes the middle of the range for the loss; the "
-        f"gain is 1/{GAIN_MARGIN:g} of that at which the loop begins to limit-cycle while it holds "
+        f"gain of each made spring is 1/{GAIN_MARGIN:g} of that at which the loop begins to limit-cycle while "
+        "it holds "
         f"{', '.join(f'{torque:g}' for torque in HELD)} N·m.\n\n"
         "Over the draws the loss tangent is distributed evenly over its range, and the modulus normally with "
         "its spread, 15 % where none is known. Each made spring is weighed once, so observer and gain know "
@@ -101,9 +102,10 @@ def _order(rankings: Mapping[str, Ranking]) -> Section:
         "How probable the order is",
         ("by", "order", "first is best", "first two", "first two, skewed", f"better than {PUBLISHED}"),
         tuple(rows),
-        caption="Best on the right. Probabilities that the first is the best of all, that the first two are in "
-        "this order, the same where small losses are more probable (evenly over the logarithm), and that each "
-        "is better than the published rubber. 50 % is a toss-up. In brackets: misses its target.",
+        caption="Best on the right. Probabilities that the first is the best of all, that the first two are "
+        "in this order, the same where small losses are more probable (evenly over the logarithm), and that "
+        "each is better than the published rubber. 50 % is a toss-up: what differs by less than "
+        f"{RESOLUTION:.0%} counts half. In brackets: misses its target.",
     )
 
 
@@ -184,8 +186,8 @@ def _verdicts(merits: Sequence[Merits], errors: Hysteresis) -> Section:
         ("rubber", "static curve, %", "observer, %", "energy lost, %", "what to do"),
         rows,
         caption="Largest error of the torque estimate over the range of the loss, in % of the torque: of the "
-        "static curve, by the figure above, and of the observer with the middle of the range; energy lost per "
-        "cycle at the upper end.",
+        "static curve, by the figure above, and of the observer with the middle of the range; energy lost "
+        "per cycle at the upper end.",
     )
 
 
