@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -101,7 +101,8 @@ class Measured:
     @cached_property
     def cycling(self) -> NDArray[np.bool_]:
         """Whether a run with a constant torque limit-cycles or ran away, shape (runs,)."""
-        return ~(np.std(self.current[:, self.counted], axis=1) < CYCLING)
+        quiet: NDArray[np.bool_] = np.std(self.current[:, self.counted], axis=1) < CYCLING
+        return ~quiet
 
     def fundamental(self, signal: Array) -> NDArray[np.complex128]:
         """Return the complex amplitude of a sine at the frequency of each run, shape (runs,)."""
@@ -113,12 +114,12 @@ class Measured:
     @cached_property
     def response(self) -> NDArray[np.complex128]:
         """Torque over the sine that was wanted, of the fundamentals, shape (runs,)."""
-        return self.fundamental(self.torque) / _or_none([run.torque for run in self.runs])
+        return _over(self.fundamental(self.torque), [run.torque for run in self.runs])
 
     @cached_property
     def impedance(self) -> NDArray[np.complex128]:
         """Torque on the moved load over its angle in N·m/rad, of the fundamentals, shape (runs,)."""
-        return -self.fundamental(self.torque) / _or_none([run.moved for run in self.runs])
+        return _over(-self.fundamental(self.torque), [run.moved for run in self.runs])
 
     @cached_property
     def error(self) -> Array:
@@ -136,12 +137,15 @@ class Measured:
         torque, angle = self.torque[:, self.counted], self.deflection[:, self.counted]
         torque, angle = (np.concatenate([x, x[:, :1]], axis=1) for x in (torque, angle))
         work = np.sum((torque[:, 1:] + torque[:, :-1]) / 2.0 * np.diff(angle, axis=1), axis=1)
-        return work / (_or_none([run.frequency for run in self.runs]) * COUNTED)
+        cycles = np.array([run.frequency * COUNTED for run in self.runs])
+        return np.where(cycles > 0.0, work, np.nan) / np.maximum(cycles, 1.0)
 
 
-def _or_none(values: Sequence[float]) -> Array:
-    """Return values, not a number in place of zero: what was not asked has no answer."""
-    return np.array([value or np.nan for value in values])
+def _over(values: NDArray[np.complex128], asked: Sequence[float]) -> NDArray[np.complex128]:
+    """Return values over what was asked for; not a number where it is zero, for then nothing was asked."""
+    by, result = np.array(asked), np.full(len(values), np.nan, dtype=complex)
+    np.divide(values, by, out=result, where=by != 0.0)
+    return result
 
 
 def _rms(rows: Array) -> Array:
@@ -185,7 +189,8 @@ class Bench:
         """The closed loop; its load can be moved, and both ends of the spring have an encoder."""
         encoder = Encoder(of="load.angle", quantum=self.actuator.quantities()["motor_encoder.quantum"])
         parts = dict(self.actuator.parts) | {"load": Driven(), "load_encoder": encoder}
-        plant = nls.flatten(nls.assembly("bench", **parts), outputs=["motor.angle", "spring.torque"])
+        moved = replace(self.actuator, parts=tuple(parts.items()))
+        plant = nls.flatten(moved, outputs=["motor.angle", "spring.torque"])
         deflection = Variable("spring.angle.measured", "rad", "deflection as both encoders read it")
         plant = with_signal(
             plant, deflection, lambda n: n["motor_encoder.reading"] - n["load_encoder.reading"]

@@ -85,10 +85,8 @@ def _has_curve(rubber: Material) -> bool:
 
 def with_loss(actuator: nls.Assembly, elastic: Material, loss_tangent: float) -> nls.Assembly:
     """Return the actuator with a rubber that has a loss tangent from 0.1 to 10 Hz."""
-    piece = actuator.element("spring.rubber")
-    assert isinstance(piece, nls.components.Specimen)
-    law = relaxing_law_of(elastic, loss_tangent=flat_relaxation(loss_tangent, branches=BRANCHES))
-    return actuator.with_part("spring.rubber", law.in_place_of(piece))
+    relaxation = flat_relaxation(loss_tangent, branches=BRANCHES)
+    return nls.with_rubber(actuator, elastic, loss_tangent=relaxation)
 
 
 def designed(elastic: Material, loss_tangent: float) -> CamDesign:

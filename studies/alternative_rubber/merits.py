@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
 import nlsdesign as nls
 from nlsdesign.design import CamDesign
@@ -122,12 +123,12 @@ def merits_of(candidate: Candidate) -> Merits:
     columns = measured(
         bench, rubbers, _quadratic(tangents, np.array([r.loss_tangent for r in rubbers])) @ gains
     )
-    found, columns = {n: c[-1] for n, c in columns.items()}, {n: c[:-1] for n, c in columns.items()}
+    checked, columns = {n: c[-1] for n, c in columns.items()}, {n: c[:-1] for n, c in columns.items()}
     columns["volume"] = np.full(9, 1e6 * design.rubber_volume)
     values = {name: column.reshape(3, 3) for name, column in columns.items()}
     made = Merits(candidate, design, float(gains[1]), tangents, moduli, values)
     at = (np.array([check.loss_tangent]), np.array([check.modulus]))
-    return replace(made, between={n: float(made.at(n, *at)[0] / value - 1.0) for n, value in found.items()})
+    return replace(made, between={n: float(made.at(n, *at)[0] / value - 1.0) for n, value in checked.items()})
 
 
 def _designed(candidate: Candidate) -> CamDesign | None:
@@ -219,10 +220,12 @@ def bandwidths(frequencies: Sequence[float], sizes: Array) -> Array:
 
 
 def _fall(frequencies: Array, sizes: Array) -> float:
-    """Return where the size falls below −3 dB for good, linear in dB over the logarithm of the frequency."""
-    above = np.flatnonzero(sizes >= FALL)
-    if len(above) == 0 or above[-1] == len(sizes) - 1:
+    """Return where the size falls below −3 dB for good, on a monotone curve in dB over the logarithm."""
+    if not np.all(np.isfinite(sizes)):
         return float("nan")
-    k = above[-1]
-    x, y = np.log(frequencies[k : k + 2]), np.log(sizes[k : k + 2])
-    return float(np.exp(x[0] + (np.log(FALL) - y[0]) / (y[1] - y[0]) * (x[1] - x[0])))
+    fine = np.linspace(np.log(frequencies[0]), np.log(frequencies[-1]), 2001)
+    curve = PchipInterpolator(np.log(frequencies), np.log(sizes))(fine)
+    above = np.flatnonzero(curve >= np.log(FALL))
+    if len(above) == 0 or above[-1] == len(fine) - 1:
+        return float("nan")
+    return float(np.exp(fine[above[-1]]))

@@ -41,7 +41,7 @@ class Ranking:
     skewed
         The same if small loss tangents count more (evenly distributed in their logarithm).
     missed
-        Labels of rubbers whose spring misses its target; they come last.
+        Labels of rubbers whose spring misses its target, or whose loop limit-cycles; they come last.
     """
 
     metric: str
@@ -97,26 +97,34 @@ def _drawn(merits: Sequence[Merits], metric: str, draws: int, seed: int, *, skew
 def _mean_rank(columns: dict[str, Array]) -> Array:
     loop = [rows for metric, rows in columns.items() if metric != "volume"]
     mean: Array = np.mean([np.argsort(np.argsort(rows, axis=0), axis=0) + 1.0 for rows in loop], axis=0)
-    return mean
+    # Who has no number in one of them has no mean.
+    return np.where(np.all(np.isfinite(loop), axis=0), mean, np.nan)
 
 
 def _ranked(
     metric: str, labels: Sequence[str], columns: tuple[Array, Array], missed: tuple[str, ...]
 ) -> Ranking:
     drawn, _ = columns
+    if metric != "volume":
+        missed = (*(labels[i] for i, row in enumerate(drawn) if not np.all(np.isfinite(row))), *missed)
     known = [i for i, row in enumerate(drawn) if np.all(np.isfinite(row))]
     order = sorted(known, key=lambda i: float(np.median(drawn[i])))
+    if not order:
+        none = np.zeros((0, 3))
+        return Ranking(metric, (), none, none[:, 0], none[:, 0], float("nan"), float("nan"), missed)
     rows = drawn[order]
     sign = -1.0 if metric in MORE_IS_BETTER else 1.0
     values = np.sort(sign * np.quantile(rows, (0.05, 0.5, 0.95), axis=1).T, axis=1)
     lowest = np.min(rows, axis=0)
     least = rows <= lowest + RESOLUTION * np.abs(lowest)
     best = np.mean(least / np.sum(least, axis=0), axis=1)
-    first_two = [_before(x[order[0]], x[order[1]]) if len(order) > 1 else np.nan for x in columns]
+    first_two, skewed = (
+        _before(x[order[0]], x[order[1]]) if len(order) > 1 else float("nan") for x in columns
+    )
     names = tuple(labels[i] for i in order)
     published = rows[names.index(PUBLISHED)] if PUBLISHED in names else np.full(rows.shape[1], np.nan)
     over = np.array([_before(row, published) for row in rows])
-    return Ranking(metric, names, values, best, over, *first_two, missed)
+    return Ranking(metric, names, values, best, over, first_two, skewed, missed)
 
 
 def _before(first: Array, second: Array) -> float:

@@ -45,8 +45,8 @@ def _conditions(merits: Sequence[Merits]) -> Section:
         "For each rubber cam, pretension, section and rest length are designed for 5 N·m at 53° with the "
         "same limits. The elastic curve of the library is taken as that of equilibrium; the loss tangent is "
         "flat from 0.1 to 10 Hz within 5 %. The observer takes the middle of the range for the loss; the "
-        f"gain of each made spring is 1/{GAIN_MARGIN:g} of that at which the loop begins to limit-cycle while "
-        "it holds "
+        f"gain of each made spring is 1/{GAIN_MARGIN:g} of that at which the loop begins to limit-cycle "
+        "while it holds "
         f"{', '.join(f'{torque:g}' for torque in HELD)} N·m.\n\n"
         "Over the draws the loss tangent is distributed evenly over its range, and the modulus normally with "
         "its spread, 15 % where none is known. Each made spring is weighed once, so observer and gain know "
@@ -120,7 +120,7 @@ def _designs(merits: Sequence[Merits]) -> Section:
             "–" if m.design is None else f"{1e3 * m.design.values['spring.pretension'].number:.2f}",
             f"{m.proportional:.1f}" if m.met else "–",
             f"{m.candidate.loss.lower:g} to {m.candidate.loss.upper:g}, "
-            f"{m.candidate.loss.property.evidence} of {m.candidate.loss.of}",
+            f"{m.candidate.loss.known.evidence} of {m.candidate.loss.of}",
         )
         for m in merits
     )

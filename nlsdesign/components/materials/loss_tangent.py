@@ -208,7 +208,7 @@ class KnownLoss(NamedTuple):
 
     Parameters
     ----------
-    property
+    known
         The property of the library.
     of
         Name of the entry that it is taken from: the rubber itself, or the one that stands for its family.
@@ -216,7 +216,7 @@ class KnownLoss(NamedTuple):
         Least and greatest loss tangent; equal where one number or a measured curve is known.
     """
 
-    property: Property
+    known: Property
     of: str
     lower: float
     upper: float
@@ -241,9 +241,7 @@ class KnownLoss(NamedTuple):
         return 0.5 * (self.lower + self.upper)
 
     def __str__(self) -> str:
-        return (
-            f"{self.property.shown}, {self.property.evidence} of {self.of}: {self.property.quantity.source}"
-        )
+        return f"{self.known.shown}, {self.known.evidence} of {self.of}: {self.known.quantity.source}"
 
 
 def loss_of(
@@ -294,7 +292,7 @@ def loss_of(
     return KnownLoss(chosen, owner.name, min(values), max(values))
 
 
-def relaxation_of(known: KnownLoss, loss_tangent: float | None = None) -> Relaxation:
+def relaxation_of(loss: KnownLoss, loss_tangent: float | None = None) -> Relaxation:
     """Return the relaxation that the library's knowledge of a loss gives.
 
     A measured curve over the frequency is followed; one number at one frequency gives the standard linear
@@ -303,7 +301,7 @@ def relaxation_of(known: KnownLoss, loss_tangent: float | None = None) -> Relaxa
 
     Parameters
     ----------
-    known
+    loss
         As returned by :func:`loss_of`.
     loss_tangent
         Of a range, which value; the middle if it is left out. A curve is scaled to this mean.
@@ -313,10 +311,10 @@ def relaxation_of(known: KnownLoss, loss_tangent: float | None = None) -> Relaxa
     ValueRangeError
         If the loss tangent lies outside of its range.
     """
-    values = known.property.quantity.values
-    frequency = known.property.conditions.get("frequency")
-    if known.property.evidence == "range" or frequency is None:
-        return flat_relaxation(known.middle if loss_tangent is None else loss_tangent)
+    values = loss.known.quantity.values
+    frequency = loss.known.conditions.get("frequency")
+    if loss.known.evidence == "range" or frequency is None:
+        return flat_relaxation(loss.middle if loss_tangent is None else loss_tangent)
     if len(values) == 1:
         return peaked_relaxation(values[0] if loss_tangent is None else loss_tangent, frequency.values[0])
     scale = 1.0 if loss_tangent is None else loss_tangent / float(np.mean(values))
