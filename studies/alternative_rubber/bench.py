@@ -138,7 +138,8 @@ class Measured:
         torque, angle = (np.concatenate([x, x[:, :1]], axis=1) for x in (torque, angle))
         work = np.sum((torque[:, 1:] + torque[:, :-1]) / 2.0 * np.diff(angle, axis=1), axis=1)
         cycles = np.array([run.frequency * COUNTED for run in self.runs])
-        return np.where(cycles > 0.0, work, np.nan) / np.maximum(cycles, 1.0)
+        lost: Array = np.where(cycles > 0.0, work, np.nan) / np.maximum(cycles, 1.0)
+        return lost
 
 
 def _over(values: NDArray[np.complex128], asked: Sequence[float]) -> NDArray[np.complex128]:

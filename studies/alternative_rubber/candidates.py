@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import nlsdesign as nls
 from nlsdesign.components import KnownLoss, Material, flat_relaxation, loss_of, materials, relaxing_law_of
-from nlsdesign.design import AreaRange, CamDesign, DesignSettings
+from nlsdesign.design import AreaRange, CamDesign, DesignSettings, Target
 from nlsdesign.errors import ArrangementError
 
 from .._designed import with_machined_contour
@@ -89,12 +89,12 @@ def with_loss(actuator: nls.Assembly, elastic: Material, loss_tangent: float) ->
     return nls.with_rubber(actuator, elastic, loss_tangent=relaxation)
 
 
-def designed(elastic: Material, loss_tangent: float) -> CamDesign:
-    """Return cam, pretension and rubber for the target; the loss does not enter, for the law is static."""
+def designed(elastic: Material, loss_tangent: float, target: Target = TARGET) -> CamDesign:
+    """Return cam, pretension and rubber for a target; the loss does not enter, for the law is static."""
     actuator = with_loss(with_machined_contour(declared_actuator(), ANCHOR), elastic, loss_tangent)
     return nls.design_cam(
         actuator,
-        target=TARGET,
+        target=target,
         free=FREE,
         keep=[nls.MaximumCamRadius(LARGEST_RADIUS), nls.RestLengthRange(*LENGTHS), AreaRange(*AREA)],
         settings=DesignSettings(draws=0, look_for_size_ranges=False, look_for_remedies=False, starts=4),

@@ -27,7 +27,7 @@ HOLD = 1.25
 """Time in s for which it is held."""
 GAIN_MARGIN = 2.0
 """The loop begins to limit-cycle at this many times its gain: 6 dB."""
-SWEPT = (6.0, 10.0, 14.0, 18.0, 24.0, 32.0)
+SWEPT = (6.0, 10.0, 14.0, 18.0, 24.0, 32.0, 44.0)
 """Frequencies in Hz at which the response is taken; whole numbers, so that a second has whole cycles."""
 FALL = 1.0 / np.sqrt(2.0)
 """Of the torque over what was wanted, at the bandwidth: −3 dB."""
@@ -198,7 +198,7 @@ def measured(bench: Bench, rubbers: Sequence[Rubber], gains: Array) -> dict[str,
     sizes = np.abs(ran.response)[rows]
     columns = {
         "bandwidth_low": bandwidths(SWEPT, sizes[start : start + swept].T),
-        "bandwidth_high": bandwidths(SWEPT, sizes[start + swept + 1 : -1].T),
+        "bandwidth_high": bandwidths((AT, *SWEPT), sizes[start + swept : -1].T),
         "impedance": np.abs(ran.impedance[rows[-1]]),
         "loss": 1e3 * ran.lost[first],
         "estimate_error": 1e3 * ran.estimate_error[first],

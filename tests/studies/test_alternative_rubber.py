@@ -79,13 +79,13 @@ class _Met:
 def test_the_probability_of_an_order_is_that_of_two_even_distributions() -> None:
     """A from 1 to 2, B from 1.5 to 2.5, both even: P(A < B) = 1 − ½·½² = 7/8."""
     found = rankings([made_up("B", 1.5, 2.5), made_up("A", 1.0, 2.0)], draws=40_000)
-    assert found["loss"].labels == ("A", "B")
+    assert found["loss"].labels == ("A *", "B *")
     assert found["loss"].first_two == pytest.approx(7.0 / 8.0, abs=0.01)
     assert found["loss"].best == pytest.approx([7.0 / 8.0, 1.0 / 8.0], abs=0.015)
     # More is better: the same figures the other way round.
-    assert found["bandwidth_low"].labels == ("B", "A")
+    assert found["bandwidth_low"].labels == ("B *", "A *")
     assert found["bandwidth_low"].values[0, 1] == pytest.approx(2.0, abs=0.02)
-    assert found["loss"].quantiles("A") == pytest.approx([1.05, 1.5, 1.95], abs=0.02)
+    assert found["loss"].quantiles("A *") == pytest.approx([1.05, 1.5, 1.95], abs=0.02)
 
 
 def test_what_is_alike_is_a_toss_up_and_a_miss_comes_last() -> None:
@@ -93,18 +93,18 @@ def test_what_is_alike_is_a_toss_up_and_a_miss_comes_last() -> None:
     object.__setattr__(missed, "design", None)
     found = rankings([missed, made_up("A", 1.0, 1.0001), made_up("B", 1.0, 1.0001)])
     assert found["impedance"].first_two == 0.5
-    assert found["impedance"].missed == ("miss",)
+    assert found["impedance"].missed == ("miss *",)
     assert found["volume"].labels == (), "of none of them the own curve is known"
-    assert "miss" not in found["impedance"].labels
+    assert "miss *" not in found["impedance"].labels
 
 
 def test_a_loop_that_limit_cycles_has_no_rank() -> None:
     cycling = made_up("cycling", 1.0, 2.0)
     cycling.values["loss"] = np.full((3, 3), np.nan)
     found = rankings([cycling, made_up("A", 1.0, 2.0), made_up("B", 3.0, 4.0)])
-    assert found["loss"].labels == ("A", "B")
-    assert found["loss"].missed == ("cycling",)
-    assert found["mean_rank"].missed == ("cycling",)
+    assert found["loss"].labels == ("A *", "B *")
+    assert found["loss"].missed == ("cycling *",)
+    assert found["mean_rank"].missed == ("cycling *",)
     assert found["volume"].labels == ()
 
 
