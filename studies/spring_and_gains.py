@@ -177,10 +177,11 @@ def write(out: Path, results: Results) -> None:
             caption="Along each line the gain rises, from a quarter to half of that at which the loop "
             f"limit-cycles.{missed}",
             means="More gain is better in both until the margin is used up; what is left to choose is the "
-            "torque curve. The gain is bounded where the spring is stiffest, so a straight curve is better "
-            "in both than one that stiffens to the same torque at the same angle; of straight ones a stiff "
-            "one has more bandwidth, a soft one less impedance.",
-            assumed="Rubber of the published actuator with the middle of the range of its loss.",
+            "torque curve. One gain for all angles is bounded where the spring is stiffest, so nearly "
+            "straight curves make up most of the front: a stiff one for bandwidth, a soft one for impedance. "
+            "Only the one that stiffens most has less impedance still, at a third of the bandwidth.",
+            assumed="Rubber of the published actuator with the middle of the range of its loss; one gain for "
+            "all angles. A law that is scheduled over the stiffness would not be bounded like this.",
         ),
         TableSection(
             "Springs and gains",
