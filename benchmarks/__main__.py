@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-NAMES = ("observer_step", "bench_simulation", "bench_events", "fit", "cam_design")
+NAMES = ("observer_step", "bench_simulation", "bench_events", "fit", "cam_design", "analysis_over_angle")
 
 
 def main() -> None:

@@ -52,7 +52,12 @@ def chart(scale: float = 1.0, *, rank: float = 3.0) -> Chart:
             "observability.condition": scale * 40.0 / size,
             "deviation.model": 2e-3 * np.sqrt(size),
             "deviation.best": 1.2e-3 * np.sqrt(size),
-            "decay": -8.0 * size,
+            "sliding.decay": -8.0 * size,
+            "sliding.frequency": 18.0 * size,
+            "sliding.damping_ratio": 0.1 + 0.0 * size,
+            "stuck.decay": -70.0 + 0.0 * size,
+            "stuck.frequency": 0.0 * size,
+            "stuck.damping_ratio": 1.0 + 0.0 * size,
             "stiffness.slow": 8.0 * size,
             "stiffness.fast": 9.0 * size,
         }

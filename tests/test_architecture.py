@@ -19,7 +19,7 @@ WAIST = {"deck", "model"}
 SIMULATED = WAIST | {"simulation"}
 MIDDLE = {
     *("design", "analysis", "observer", "control"),
-    *("identification", "discrepancy", "export", "regeneration"),
+    *("identification", "discrepancy", "export", "regeneration", "calibration"),
 }
 
 # room: the rooms it may import, besides itself and BASE
@@ -37,6 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "discrepancy": SIMULATED | {"identification"},
     "export": SIMULATED,
     "regeneration": SIMULATED | {"observer", "identification", "discrepancy", "export"},
+    "calibration": SIMULATED | {"identification", "discrepancy"},
     "figures": SIMULATED | MIDDLE,
     "report": SIMULATED | MIDDLE | {"figures"},
     "cli": SIMULATED | MIDDLE | {"components", "figures", "report"},
@@ -45,8 +46,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 
 # Above the waist a flat model is enough, but for these: a design and a diagnosis give back a changed copy of
-# the assembly, a measured record takes the noise of its sensors. The drawing of a cam needs its geometry;
-# adding a missing effect means declaring the assembly again.
+# the assembly, a measured record takes the noise of its sensors, a calibration puts the machine on a bench.
+# The drawing of a cam needs its geometry; adding a missing effect means declaring the assembly again.
 ASSEMBLY = "components.assembly.named_parts"
 EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "design": (ASSEMBLY,),
@@ -56,6 +57,9 @@ EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "simulation.measure": (ASSEMBLY,),
     "design.statics": ("components.transmission",),
     "discrepancy.effects": ("components",),
+    "calibration": (ASSEMBLY,),
+    "calibration.bench_test": ("components",),
+    "calibration.calibrated_deck": ("components.assembly.deck_writer",),
     "discrepancy.diagnose": ("components",),
 }
 

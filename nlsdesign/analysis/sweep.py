@@ -6,49 +6,49 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..errors import unknown_name
 from ..model import FlatModel, Variable
-from ..model.linear import LinearModel, jacobian_function
 from ..model.roles import measured_motion
 from ..quantity import typeset_unit
 from ..writing import write_table
-from .rest import rest_states, typical_sizes
+from .rest_points import RestPoint, RestPoints, rest_points
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class RestPoint:
-    """The model at rest at one angle.
+class Columns(NamedTuple):
+    """What a view gives over all angles.
 
-    Parameters
-    ----------
-    model
-        Whole model.
-    angle
-        Name of the state that is swept.
-    state
-        Rest state, shape (states,).
-    linear
-        Exact linearisation there.
-    sizes
-        Typical size of states and outputs over the sweep.
+    ``columns``: name, unit and description of each number; ``values``, shape (N, columns); ``words``: by
+    name, one text per angle.
     """
 
-    model: FlatModel
-    angle: str
-    state: Array
-    linear: LinearModel
-    sizes: Mapping[str, float]
+    columns: tuple[Variable, ...]
+    values: Array
+    words: Mapping[str, tuple[str, ...]]
 
 
 class View(ABC):
-    """A property of a point; final classes say which numbers and words they give."""
+    """A property over the angle; final classes say which numbers and words they give."""
+
+    @abstractmethod
+    def over(self, points: RestPoints) -> Columns:
+        """Return the numbers at all angles, and findings in words.
+
+        Parameters
+        ----------
+        points
+            The model at rest at each angle.
+        """
+
+
+class PointView(View):
+    """A property that is computed angle by angle, the simplest way to write one of your own."""
 
     @abstractmethod
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:
@@ -69,6 +69,16 @@ class View(ABC):
         point
             The model at rest at one angle.
         """
+
+    def over(self, points: RestPoints) -> Columns:
+        """Return what :meth:`at` gives at each angle."""
+        columns = self.columns(points.model)
+        values, words = np.zeros((len(points.at), len(columns))), dict[str, list[str]]()
+        for row in range(len(points.at)):
+            values[row], texts = self.at(points.point(row))
+            for name, text in texts.items():
+                words.setdefault(name, []).append(text)
+        return Columns(columns, values, {name: tuple(texts) for name, texts in words.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,45 +179,16 @@ def over_angle(
     Raises
     ------
     ValueRangeError
-        If an angle is not finite, or the model has no finite slope at one.
+        If an angle is not finite, the model has no finite slope at one, or it is not continuous.
     ConvergenceError
         If the model does not come to rest.
     ArrangementError
         If no angle is named and the structure does not say which body is driven.
     """
     angle = measured_motion(model, angle)
-    at = np.asarray(angles, dtype=float)
-    if at.ndim != 1 or len(at) == 0 or not np.all(np.isfinite(at)):
-        raise ValueRangeError("angles", "must be a row of finite numbers in rad")
-    states = rest_states(model, at, angle=angle, consistent=consistent)
-    sizes = _sizes(model, states) if consistent else typical_sizes(model, at, angle=angle)
-    columns = tuple(column for view in views for column in view.columns(model))
-    values, words = np.zeros((len(at), len(columns))), dict[str, list[str]]()
-    for row, linear in enumerate(_linearised(model, states)):
-        views_here = [view.at(RestPoint(model, angle, states[row], linear, sizes)) for view in views]
-        values[row] = [number for numbers, _ in views_here for number in numbers]
-        for _, texts in views_here:
-            for name, text in texts.items():
-                words.setdefault(name, []).append(text)
-    return Chart(model.variable(angle), at, columns, values, {name: tuple(t) for name, t in words.items()})
-
-
-def _sizes(model: FlatModel, states: Array) -> dict[str, float]:
-    largest = np.max(np.abs(states), axis=0)
-    return {v.name: float(size) if size > 0.0 else 1.0 for v, size in zip(model.states, largest, strict=True)}
-
-
-def _linearised(model: FlatModel, states: Array) -> list[LinearModel]:
-    function = jacobian_function(model)
-    u, p = model.start(model.inputs), model.start(model.parameters)
-    names = [tuple(v.name for v in group) for group in (model.states, model.inputs, model.outputs)]
-    result = []
-    for x in states:
-        a, b, c, d = (np.array(m, dtype=float) for m in function(0.0, x, u, p, []))
-        if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
-            raise ValueRangeError(
-                f"linearisation of {model.name} at {x.tolist()}", "the slope is not finite there",
-                next_step="move away from the corner or use the smooth form of the law",
-            )  # fmt: skip
-        result.append(LinearModel(a, b, c, d, names[0], names[1], names[2], model.sample_time))
-    return result
+    points = rest_points(model, np.asarray(angles, dtype=float), angle=angle, consistent=consistent)
+    parts = [view.over(points) for view in views]
+    columns = tuple(column for each in parts for column in each.columns)
+    values = np.column_stack([np.zeros((len(points.at), 0)), *(each.values for each in parts)])
+    words = {name: texts for each in parts for name, texts in each.words.items()}
+    return Chart(model.variable(angle), points.at, columns, values, words)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import ArrangementError
+from .controller import export_controller
 from .output import deck_option, measured_option, out_option, spring_option
 from .units import Number
 
@@ -72,6 +73,9 @@ def observer(deck_name: str, sample_time: float, out: Path, real: str, **roles: 
 @click.group()
 def export() -> None:
     """Write C code or FMUs."""
+
+
+export.add_command(export_controller)
 
 
 @export.command("c")

@@ -9,6 +9,7 @@ import click
 from ..errors import NlsError
 from ..locations import version
 from .analyse import analyse
+from .analyse_angle import analyse_angle
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
@@ -31,6 +32,8 @@ for command in (
     *(cosimulation, simulate, fit, diagnose, study),
 ):
     program.add_command(command)
+for analysis in (analyse_angle,):  # the first is the default
+    analyse.add_command(analysis)
 
 
 def main() -> None:

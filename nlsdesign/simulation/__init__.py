@@ -3,7 +3,19 @@
 from .events import Event
 from .integrate import simulate
 from .measure import measure
+from .prior import Prior, declared_prior
 from .signals import Sine, sine
 from .trace import RangeWarning, Trace, range_warnings
 
-__all__ = ["Event", "RangeWarning", "Sine", "Trace", "measure", "range_warnings", "simulate", "sine"]
+__all__ = [
+    "Event",
+    "Prior",
+    "RangeWarning",
+    "Sine",
+    "Trace",
+    "declared_prior",
+    "measure",
+    "range_warnings",
+    "simulate",
+    "sine",
+]

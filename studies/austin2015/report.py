@@ -202,7 +202,8 @@ def observer_sections(results: Results) -> list[Section]:
         FigureSection(
             "Stability over the cam angle",
             nls.figures.stability_over_angle(charts),
-            caption="Poles and stiffness at rest. With pretension the designed spring is stiff at zero too.",
+            caption="Poles of the plant while it slides and while dry friction holds it; stiffness at rest. "
+            "With pretension the designed spring is stiff at zero too.",
         ),
     ]
     for name, each in results.both.items():

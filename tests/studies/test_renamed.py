@@ -30,6 +30,7 @@ from tests.unit.test_cli import Run, run
 __all__ = ["run"]
 
 DECKS = ("austin2015_figure_consistent", "austin2015_soft_spring", "one_sided_cable_drive")
+UNSEEN = ("first", "last", "eigenvalues")
 EVERY = pytest.mark.parametrize("scheme", SCHEMES)
 ONE = pytest.mark.parametrize("scheme", [in_words, exchanged])
 CATALOGUE = tuple(each for each in ALL if each.__name__ == "coulomb_friction")
@@ -88,12 +89,18 @@ def test_flat_model_and_simulation(scheme: Scheme, deck: str) -> None:
 @EVERY
 def test_analyse(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     write_deck(renamed(published(), scheme).assembly, tmp_path / "other.toml")
-    charts = []
+    charts, ranked = [], []
     for deck in (DECKS[0], str(tmp_path / "other.toml")):
         status, out, err = run("analyse", "--deck", deck, "--count", "3", "--out", "o", "--json")
         assert status == 0, err
-        charts.append({name: values for name, values in json.loads(out).items() if name != "file"})
+        chart = json.loads(out)
+        unseen = {f"unseen.{key}": [each[key] for each in chart["unseen"]] for key in UNSEEN}
+        sensors = [list(row.values())[1:] for row in chart["sensors"]["rows"]]
+        assert chart["detectable"]
+        charts.append({k: v for k, v in chart.items() if k == "angle" or "." in k} | unseen)
+        ranked.append(sensors)
     equal(*charts, tolerance=1e-9)
+    assert ranked[0] == ranked[1]
 
 
 @EVERY

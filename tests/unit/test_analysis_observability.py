@@ -7,13 +7,12 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from nlsdesign.analysis import EstimateDeviation, Observability, RestPoint, over_angle
+from nlsdesign.analysis import EstimateDeviation, Observability, over_angle
 from nlsdesign.analysis.kalman import discrete_noise, steady_state_kalman
 from nlsdesign.components import ROTATION, Dashpot, Inertia, Spring, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.linear import linearise
 
 INERTIA, STIFF, DAMPING = 2e-3, 5.0, 0.04
 
@@ -70,9 +69,12 @@ def test_a_mixed_direction_is_written_out() -> None:
         "spring": tie(Spring(stiffness=STIFF, domain=ROTATION), "motor", "load"),
     }
     model = flatten(assembly("pair", **parts), outputs=["spring.angle", "motor.angle"])
-    point = RestPoint(model, "motor.angle", np.zeros(4), linearise(model, np.zeros(4)), {})
-    numbers, words = Observability(measured=("spring.angle",)).at(point)
-    assert numbers[0] == 2
+    nominal = {v.name: 1.0 for v in model.states}
+    view = Observability(nominal=nominal, measured=("spring.angle",))
+    chart = over_angle(model, [view], angles=[0.1], angle="motor.angle")
+    assert chart["observability.rank"][0] == 2
+    words = {name: texts[0] for name, texts in chart.words.items()}
+    assert words["verdict"].endswith("does not decay (eigenvalue 0): not detectable")
     assert {"+0.71 motor.angle +0.71 load.angle", "+0.71 load.angle +0.71 motor.angle"} & {
         part.strip() for part in words["null vector"].split(" and ")
     }

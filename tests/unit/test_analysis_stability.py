@@ -24,9 +24,10 @@ def test_an_oscillator_has_its_textbook_eigenvalues() -> None:
     chart = over_angle(model, [Stability()], angles=[0.0, 0.4])
     omega = np.sqrt(STIFF / INERTIA)
     ratio = DAMPING / (2.0 * np.sqrt(STIFF * INERTIA))
-    assert chart["damping_ratio"] == pytest.approx([ratio] * 2)
-    assert chart["decay"] == pytest.approx([-ratio * omega] * 2)
-    assert chart["oscillation"] == pytest.approx([omega * np.sqrt(1.0 - ratio**2)] * 2)
+    assert chart["free.damping_ratio"] == pytest.approx([ratio] * 2)
+    assert chart["free.decay"] == pytest.approx([-ratio * omega] * 2)
+    frequency = omega * np.sqrt(1.0 - ratio**2) / (2.0 * np.pi)
+    assert chart["free.frequency"] == pytest.approx([frequency] * 2)
     assert chart["stiffness.slow"] == pytest.approx([STIFF] * 2)
     assert chart["stiffness.fast"] == pytest.approx([STIFF] * 2)
 
@@ -40,7 +41,7 @@ def test_a_relaxing_branch_is_stiff_only_when_moved_fast() -> None:
     chart = over_angle(model, [Stability()], angles=[0.2])
     assert chart["stiffness.slow"][0] == pytest.approx(STIFF)
     assert chart["stiffness.fast"][0] == pytest.approx(STIFF + 3.0)
-    assert chart.words["stability"] == ("stable or at its limit",)
+    assert chart.words["free.stability"] == ("stable or at its limit",)
 
 
 @pytest.mark.parametrize("state", ["strain", "force"])
@@ -75,5 +76,5 @@ def test_negative_stiffness_is_called_unstable() -> None:
     )
     flipped = replace(model, parameters=turned)
     chart = over_angle(flipped, [Stability()], angles=[0.0])
-    assert chart["decay"][0] == pytest.approx(np.sqrt(1.0 / INERTIA))
-    assert chart.words["stability"] == ("unstable",)
+    assert chart["free.decay"][0] == pytest.approx(np.sqrt(1.0 / INERTIA))
+    assert chart.words["free.stability"] == ("unstable",)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.analysis import Chart, RestPoint, Stability, View, over_angle
+from nlsdesign.analysis import Chart, PointView, RestPoint, Stability, over_angle
 from nlsdesign.analysis.rest import rate_state, rest_states, typical_sizes
 from nlsdesign.components import Dashpot, Mass, Spring, parallel, series, tie
 from nlsdesign.components.assembly.named_parts import assembly
@@ -20,7 +20,7 @@ from tests import observed as ob
 ANGLES = np.radians([-45.0, -5.0, 0.0, 5.0, 45.0])
 
 
-class Torque(View):
+class Torque(PointView):
     """The torque at rest and its sign in words."""
 
     def columns(self, model: FlatModel) -> tuple[Variable, ...]:

@@ -232,3 +232,43 @@ def test_a_folder_that_cannot_be_made_after_all_is_one_message(
     status, _, err = run("analyse", "--deck", DECK, "--out", str(tmp_path / "new"))
     assert status == 2
     assert "new: cannot be made (Read-only file system) -> name another folder" in err
+
+
+def test_analyse_without_a_command_goes_over_the_angle(run: Run, tmp_path: Path) -> None:
+    words = ("--deck", DECK, "--from", "-10 deg", "--to", "45 deg", "--count", "5", "--out", "o")
+    short, named = (run("analyse", *more, *words) for more in ((), ("angle",)))
+    assert short == named
+    status, out, _ = short
+    assert status == 0
+    assert "not seen at 0° (spring.cam.lever_arm_now is zero), decays with -70.4 1/s: detectable" in out
+    assert "not seen while the machine sticks" in out
+    assert "verdict: detectable at every angle from motor.angle" in out
+    assert "sliding: dry friction at its sliding level" in out
+    # Headings stand whole, one word to a line.
+    assert {"condition", "frequency", "stiffness"} <= set(out.split())
+    assert out.index("torque sensor") < out.index("present sensors")
+    files = {path.name for path in (tmp_path / "o").iterdir()}
+    assert files == {"over_angle.csv", "poles.svg", "observability.svg"}
+
+
+def test_analyse_as_json_says_what_is_not_seen_and_of_which_mode_each_pole_is(run: Run) -> None:
+    status, out, _ = run("analyse", "--deck", DECK, "--to", "45 deg", "--count", "2", "--out", "o", "--json")
+    assert status == 0
+    content = json.loads(out)
+    (drop,) = content["unseen"]
+    assert drop["first"] == drop["last"] == 0.0
+    assert drop["direction"] == "spring.rubber.relaxing.dashpot.strain"
+    assert drop["eigenvalues"] == [[pytest.approx(-1.479e6 / 21e3), 0.0]]
+    assert content["detectable"] is True
+    assert content["sliding.frequency"][1] == pytest.approx(18.2, abs=0.1)
+    assert "sliding level" in content["descriptions"]["sliding.decay"]
+    assert content["sensors"]["rows"][0]["sensor"] == "torque sensor"
+
+
+def test_analyse_names_what_is_wrong_with_a_range(run: Run, tmp_path: Path) -> None:
+    status, _, err = run("analyse", "--deck", DECK, "--from", "20 deg", "--to", "10 deg", "--out", "o")
+    assert status == 2
+    assert "must lie above --from" in err
+    assert run("analyse", "--deck", DECK, "--count", "1", "--out", "o")[0] == 2
+    assert run("analyse", "lop")[0] == 2
+    assert not (tmp_path / "o").exists()

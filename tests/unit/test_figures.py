@@ -61,7 +61,7 @@ def test_a_figure_has_words_labels_and_units(name: str) -> None:
         assert "mm" in figure.get_supxlabel()
         return
     for axes in shown:
-        if axes.get_ylabel() not in ("rank", "condition number", "|difference|"):
+        if axes.get_ylabel() not in ("rank", "condition number", "damping ratio", "|difference|"):
             labelled = axes.get_ylabel() or axes.get_shared_y_axes().get_siblings(axes)[0].get_ylabel()
             assert re.search(r" in \S", labelled or axes.get_xlabel()), labelled
     bottom = shown[-1]

@@ -1,72 +1,36 @@
-"""Torque controller of a series elastic drive: PID on the estimated torque around a velocity loop."""
+"""Torque controller of a series elastic drive: an outer law on the torque around a velocity loop."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-
-import casadi as ca
+from dataclasses import dataclass, replace
 
 from ...errors import ArrangementError, ValueRangeError
 from ...model import FlatModel, Variable
-from ...model.roles import motor_of, series_spring
-from ...symbolic import Expression
+from .known_drive import KnownDrive
+from .law_writer import LawWriter
+from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
+from .supply import voltage_is_limited
+from .velocity_loop import VelocityLoop
+from .wired_names import DESIRED
+from .wired_names import LoopNames as LoopNames
+from .wired_names import loop_names as loop_names
 
-DESIRED = "desired"
-"""What is added to the name of the torque for the torque that the spring should have."""
+SHARE_OF_RATE = 0.06
+"""Share of the sampling rate that the velocity loop of the default gains has at most: 60 Hz at 1 kHz."""
 
+CARRIED = 0.1
+"""Share of the sampling rate above which no loop is closed.
 
-@dataclass(frozen=True)
-class LoopNames:
-    """Names of the variables by which a torque loop is wired: those of the plant.
-
-    Parameters
-    ----------
-    angle, speed
-        Motion of the motor and its rate.
-    torque
-        Torque of the series spring.
-    current
-        Input of the motor.
-    """
-
-    angle: str
-    speed: str
-    torque: str
-    current: str
-
-    @property
-    def desired(self) -> str:
-        """Name of the torque that the spring should have."""
-        return f"{self.torque}.{DESIRED}"
-
-
-def loop_names(plant: FlatModel) -> LoopNames:
-    """Return the names of a plant by which its torque loop is wired, decided from its structure.
-
-    Parameters
-    ----------
-    plant
-        With one series spring and one motor that is driven by a current.
-
-    Raises
-    ------
-    ArrangementError
-        If the structure does not decide, or the motor is not driven by a current.
-    """
-    body, motor = motor_of(plant)
-    if motor.command is None or plant.variable(motor.command).unit != "A":
-        raise ArrangementError(
-            f"motor '{body.name}'", "is not driven by a current, which a torque controller gives",
-            next_step="declare it as a GearedMotor and keep its current among the inputs",
-        )  # fmt: skip
-    return LoopNames(body.motion, body.rate, series_spring(plant).effort, motor.command)
+From the mean time of a difference of angles to the middle of the hold of the current, one sample of
+computation between them, two samples pass: at a tenth of the rate 72° of phase, which leaves 18° of the 90°
+that an integrating plant has.
+"""
 
 
 @dataclass(frozen=True)
 class TorqueGains:
-    """Settings of both loops; all of them are parameters of the controller and can be tuned there.
+    """Settings of a PID law and its velocity loop in one list; all of them can be tuned in the controller.
 
     Parameters
     ----------
@@ -108,28 +72,32 @@ class TorqueGains:
     compensation: float = 1.0
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueRangeError(f"{each.name} {value:g}", "must be finite and not negative")
+        check_settings(self)
 
+    @property
+    def law(self) -> PidTorque:
+        """The outer law with these gains."""
+        return PidTorque(
+            self.proportional, self.integral, self.derivative, self.derivative_bandwidth, self.speed_limit
+        )
 
-_UNITS = {
-    "proportional": ("rad/s/N/m", "torque loop: speed command per torque error"),
-    "integral": ("rad/s^2/N/m", "torque loop: integral gain"),
-    "derivative": ("rad/N/m", "torque loop: derivative gain"),
-    "derivative_bandwidth": ("Hz", "torque loop: corner of the filter on the derivative"),
-    "speed_limit": ("rad/s", "torque loop: largest speed command"),
-    "velocity_bandwidth": ("Hz", "velocity loop: bandwidth"),
-    "velocity_integral": ("Hz", "velocity loop: corner below which it integrates"),
-    "speed_bandwidth": ("Hz", "velocity loop: corner of the filter on the difference of the encoder"),
-    "compensation": ("1", "velocity loop: share of the estimated spring torque added to the current"),
-}
+    @property
+    def velocity(self) -> VelocityLoop:
+        """The velocity loop with these gains, without compensation of friction."""
+        return VelocityLoop(
+            bandwidth=self.velocity_bandwidth,
+            integral=self.velocity_integral,
+            speed_bandwidth=self.speed_bandwidth,
+            compensation=self.compensation,
+            friction=None,
+        )
 
 
 def torque_controller(
     plant: FlatModel,
     *,
+    law: TorqueLaw | None = None,
+    velocity: VelocityLoop | None = None,
     gains: TorqueGains | None = None,
     sample_time: float = 1e-3,
     current: str | None = None,
@@ -139,17 +107,22 @@ def torque_controller(
     Inputs are the desired torque, the estimate of the spring's torque and the measured angle of the motor;
     output is the motor current. Their names are those of the plant, the desired torque has the ending
     ``.desired``: ``spring.torque.desired``, ``spring.torque``, ``motor.angle`` and ``motor.current`` where
-    the plant's parts are called spring and motor. Speed command v = Kp·e + ∫Ki·e dt + Kd·de/dt, held within
-    its limit; motor torque J·ω_b·(v − ω̂)·(1 + ω_i∫dt) + c·T̂, with J, gear ratio, torque constant and current
-    limit from the plant. Where a command is limited, the integrators that push further into the limit stand
-    still.
+    the plant's parts are called spring and motor. An outer law commands the speed of the spring, the velocity
+    loop makes it. Inertia, gear ratio, torque constant, limits and friction are parameters of the controller
+    under the names that they have in the plant, the settings are called ``controller.NAME``.
 
     Parameters
     ----------
     plant
-        Gives names, and inertia, gear ratio, torque constant and current limit of its motor.
+        Continuous, on the bench: load fixed or prescribed.
+    law
+        Outer law, such as :class:`~nlsdesign.control.laws.scheduled_torque.ScheduledTorque`; a PID with the
+        defaults of :class:`TorqueGains` if neither a law nor gains are given, its velocity loop at most at
+        0.06 of the sampling rate.
+    velocity
+        Velocity loop inside; with its defaults if only a law is given.
     gains
-        Settings; the defaults of :class:`TorqueGains` where none are given.
+        Settings of a PID and its velocity loop in one list, in place of ``law`` and ``velocity``.
     sample_time
         In s.
     current
@@ -158,115 +131,79 @@ def torque_controller(
     Raises
     ------
     ArrangementError
-        If the plant has no geared motor that is driven by a current, or no series spring.
+        If the plant has no motor that is driven by a current, or no series spring that it turns, or both
+        gains and parts are given.
     ValueRangeError
-        If the sample time is not positive.
+        If the sample time is not positive, a bandwidth is more than it carries, or the outer loop is faster
+        than the inner one.
     """
-    if not sample_time > 0.0:
+    if not (math.isfinite(sample_time) and sample_time > 0.0):
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
-    names, drive = loop_names(plant), _drive_numbers(plant)
-    settings = _settings(gains or TorqueGains())
-    inputs = (
-        Variable(names.desired, "N*m", "torque that the spring should have"),
-        Variable(names.torque, "N*m", "estimate of the torque that the spring has"),
-        Variable(names.angle, "rad", "measured angle of the motor"),
+    outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
+    _check_bandwidths(outer, inner, sample_time)
+    drive, writer = KnownDrive(plant), LawWriter(sample_time)
+    names = drive.names
+    heard = Heard(
+        writer.input(names.desired, "N*m", "torque that the spring should have"),
+        writer.input(names.torque, "N*m", "estimate of the torque that the spring has"),
+        writer.input(names.angle, "rad", "measured angle of the motor"),
     )
-    limit = drive["current_limit"].start
+    command = outer.command(writer, drive, heard)
+    motor = inner.current(writer, drive, heard, command)
+    command.finish(motor.held)
+    speed = command.speed / drive.spring_turns(writer)
+    writer.signal(f"{names.speed}.{DESIRED}", "rad/s", "speed command", speed)
+    writer.signal(f"{names.speed}.measured", "rad/s", "filtered speed", motor.speed)
+    limit = plant.variable(drive.motor.current_limit).start
     output = Variable(
         current or names.current, "A", "current for the coming sample",
         nominal=limit, minimum=-limit, maximum=limit,
     )  # fmt: skip
-    states = _states(names)
-    return FlatModel(
-        name="torque_controller",
-        description="PID on the estimated torque around a velocity loop",
-        states=tuple(states.values()),
-        inputs=inputs,
-        parameters=(*settings.values(), *drive.values()),
-        outputs=(output,),
-        signals=(
-            Variable(f"{names.speed}.{DESIRED}", "rad/s", "speed command"),
-            Variable(f"{names.speed}.measured", "rad/s", "filtered speed"),
-        ),
-        equations=_equations(states, settings | drive, sample_time),
-        sample_time=sample_time,
-    )
+    supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
+    description = f"{outer.title} around a velocity loop{supply}"
+    return writer.model("torque_controller", description, (output, motor.current))
 
 
-def _drive_numbers(plant: FlatModel) -> dict[str, Variable]:
-    body, motor = motor_of(plant)
-    if motor.gear_ratio is None:
+def _parts(
+    law: TorqueLaw | None, velocity: VelocityLoop | None, gains: TorqueGains | None
+) -> tuple[TorqueLaw, VelocityLoop]:
+    if gains is not None and (law is not None or velocity is not None):
         raise ArrangementError(
-            f"motor '{body.name}'", "has no gear ratio of its own",
-            next_step="declare it as a GearedMotor: the controller knows a motor behind its gear",
+            "gains", "are those of a PID law and its velocity loop, and law or velocity is given as well",
+            next_step="give law=PidTorque(...) and velocity=VelocityLoop(...) alone",
         )  # fmt: skip
-    return {
-        "inertia": plant.variable(motor.inertia),
-        "gear_ratio": plant.variable(motor.gear_ratio),
-        "torque_constant": plant.variable(motor.torque_constant),
-        "current_limit": plant.variable(motor.current_limit),
-    }
+    if gains is not None:
+        return gains.law, gains.velocity
+    return law or PidTorque(), velocity or VelocityLoop()
 
 
-def _settings(gains: TorqueGains) -> dict[str, Variable]:
-    values = {name: getattr(gains, name) for name in _UNITS}
-    return {
-        name: Variable(f"controller.{name}", unit, text, values[name], values[name] or 1.0, 0.0)
-        for name, (unit, text) in _UNITS.items()
-    }
+def _gains_by_default(
+    law: TorqueLaw | None, velocity: VelocityLoop | None, sample_time: float
+) -> TorqueGains | None:
+    """Return the default gains where nothing is given, with a velocity loop that the sample time carries."""
+    if law is not None or velocity is not None:
+        return None
+    usual = TorqueGains()
+    return replace(usual, velocity_bandwidth=min(usual.velocity_bandwidth, SHARE_OF_RATE / sample_time))
 
 
-def _states(names: LoopNames) -> dict[str, Variable]:
-    return {
-        "angle before": Variable(f"{names.angle}.previous", "rad", "measured angle one sample ago"),
-        "speed": Variable(f"{names.speed}.filtered", "rad/s", "filtered difference of the measured angle"),
-        "error before": Variable("torque_loop.error.previous", "N*m", "torque error one sample ago"),
-        "error rate": Variable("torque_loop.error.rate", "N*m/s", "filtered rate of the torque error"),
-        "speed integral": Variable("torque_loop.integral", "rad/s", "integral part of the speed command"),
-        "torque integral": Variable("velocity_loop.integral", "N*m", "integral part of the motor torque"),
-    }
-
-
-def _equations(
-    states: Mapping[str, Variable], parameters: Mapping[str, Variable], time: float
-) -> ca.Function:
-    p = {key: ca.SX.sym(v.name) for key, v in parameters.items()}
-    x = {key: ca.SX.sym(v.name) for key, v in states.items()}
-    desired, torque, angle = (ca.SX.sym(n) for n in ("desired", "torque", "angle"))
-    raw = (angle - x["angle before"]) / time
-    speed = _low_pass(x["speed"], raw, p["speed_bandwidth"], time)
-    error = desired - torque
-    difference = (error - x["error before"]) / time
-    rate = _low_pass(x["error rate"], difference, p["derivative_bandwidth"], time)
-    command = p["proportional"] * error + x["speed integral"] + p["derivative"] * rate
-    limited = _limited(command, p["speed_limit"])
-    stiffness = p["inertia"] * 2.0 * math.pi * p["velocity_bandwidth"]
-    slow = x["torque integral"]
-    constant = p["gear_ratio"] * p["torque_constant"]
-    wanted = (stiffness * (limited - speed) + slow + p["compensation"] * torque) / constant
-    current = _limited(wanted, p["current_limit"])
-    beyond_speed, beyond_current = command - limited, wanted - current
-    # An integrator rests while it pushes further into a limit, and only then.
-    free = (error * beyond_speed <= 0) * (error * beyond_current <= 0)
-    free_slow = (limited - speed) * beyond_current <= 0
-    integral = x["speed integral"] + time * p["integral"] * error * free
-    slow_rate = 2.0 * math.pi * p["velocity_integral"] * stiffness * (limited - speed)
-    following = [angle, speed, error, rate, integral, slow + time * slow_rate * free_slow]
-    return ca.Function(
-        "equations",
-        [
-            ca.SX.sym("time"), ca.vertcat(*x.values()), ca.vertcat(desired, torque, angle),
-            ca.vertcat(*p.values()), ca.SX(0, 1),
-        ],
-        [ca.vertcat(*following), current, ca.vertcat(limited, speed), ca.SX(0, 1)],
-        ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
-    )  # fmt: skip
-
-
-def _low_pass(old: Expression, new: Expression, bandwidth: Expression, time: float) -> Expression:
-    keep = ca.exp(-2.0 * math.pi * bandwidth * time)
-    return keep * old + (1 - keep) * new
-
-
-def _limited(value: Expression, limit: Expression) -> Expression:
-    return ca.fmin(ca.fmax(value, -limit), limit)
+def _check_bandwidths(law: TorqueLaw, velocity: VelocityLoop, sample_time: float) -> None:
+    outer, inner = law.closes_at(sample_time), velocity.closes_at(sample_time)
+    loops = {"torque loop": outer, "velocity loop": inner}
+    if velocity.disturbance is not None:
+        loops["disturbance observer"] = velocity.disturbance.bandwidth
+    for name, value in loops.items():
+        if value > CARRIED / sample_time * (1.0 + 1e-9):
+            raise ValueRangeError(
+                f"bandwidth of the {name} {value:g} Hz",
+                f"is more than a sample time of {1e3 * sample_time:g} ms carries: a tenth of the sampling "
+                f"rate, {CARRIED / sample_time:g} Hz, where the two samples between angle and current take "
+                "72° of phase",
+                next_step=f"ask for {CARRIED / sample_time:g} Hz or less, or sample faster",
+            )
+    if outer > inner:
+        raise ValueRangeError(
+            f"bandwidth of the torque loop {outer:g} Hz",
+            f"is above that of the velocity loop inside, {inner:g} Hz, which has to make its commands",
+            next_step=f"ask for a third of it or less, {inner / 3.0:g} Hz",
+        )

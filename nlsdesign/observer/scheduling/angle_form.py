@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -80,13 +81,27 @@ class AngleForm:
         def slopes(of: ca.SX, by: ca.SX) -> ca.SX:
             return ca.densify(ca.jacobian(of, by))
 
-        self._values = ca.Function("values", arguments, [rate, wanted])
+        self.rates_and_estimate = ca.Function("values", arguments, [rate, wanted])
         self._slopes = ca.Function(
             "slopes", arguments, [rate, slopes(rate, x), wanted, slopes(wanted, x), slopes(rate, led)]
         )
         follow = slopes(rate[: self.inner], x[self.speed]) if self.inner else ca.SX(0, 1)
         self._follow = ca.Function("follow", arguments, [follow])
         self._sum = self._summed()
+
+    def with_values(self, values: Mapping[str, float]) -> AngleForm:
+        """Return the same form of the model with other numbers.
+
+        Parameters
+        ----------
+        values
+            In SI by name.
+        """
+        other = copy.copy(self)
+        other.model = self.model.with_values(values)
+        other.p = other.model.start(other.model.parameters)
+        other._sum = other._summed()
+        return other
 
     def rest(self, angles: Array) -> Array:
         """Return rest states in the order of the observer, shape (N, n).
@@ -96,7 +111,7 @@ class AngleForm:
         angles
             Shape (N,).
         """
-        ordered: Array = self._rest(angles)[:, self.order]
+        ordered: Array = self.rest_in_model_order(angles)[:, self.order]
         return ordered
 
     def at(self, angles: Array) -> Coefficients:
@@ -107,7 +122,7 @@ class AngleForm:
         angles
             Shape (N,).
         """
-        rest, n, k, count = self._rest(angles), self.n, self.inner, len(angles)
+        rest, n, k, count = self.rest_in_model_order(angles), self.n, self.inner, len(angles)
         rate, jacobian, wanted, row, led = evaluate_rows(self._slopes, rest, self.u, self.p)
         # Slopes in the speed are those of the moving actuator: dry friction has none there.
         _, moving, _, moving_row, _ = evaluate_rows(
@@ -128,9 +143,13 @@ class AngleForm:
     def driven(self) -> tuple[ca.Function, tuple[int, ...]]:
         """Return what the inputs add to the rates, u -> d, and the states whose rates these are."""
         u = ca.SX.sym("input", len(self.free_inputs))
-        x0 = self._rest(np.zeros(1))[0]
-        given = ca.vertcat(*[self._input(i, u) for i in range(len(self.u))])
-        added = self._values(0.0, x0, given, self.p)[0] - self._values(0.0, x0, self.u, self.p)[0]
+        x0 = self.rest_in_model_order(np.zeros(1))[0]
+        free = self.free_inputs
+        given = ca.vertcat(*[u[free.index(i)] if i in free else float(v) for i, v in enumerate(self.u)])
+        added = (
+            self.rates_and_estimate(0.0, x0, given, self.p)[0]
+            - self.rates_and_estimate(0.0, x0, self.u, self.p)[0]
+        )
         values = _sampled(ca.Function("driven", [u], [added]), 1.0)
         scale = max(float(np.max(np.abs(values), initial=0.0)), 1e-300)
         rows = tuple(int(i) for i in np.flatnonzero(np.max(np.abs(values), axis=0) > 1e-12 * scale))
@@ -138,10 +157,10 @@ class AngleForm:
 
     def friction(self) -> ca.Function | None:
         """Return what the speed adds to its own rate beyond its linear part, ω -> ω̇; ``None`` for nothing."""
-        speed, x0 = ca.SX.sym("speed"), self._rest(np.zeros(1))[0]
+        speed, x0 = ca.SX.sym("speed"), self.rest_in_model_order(np.zeros(1))[0]
         slope = float(self.at(np.zeros(1)).a[0, self.speed, self.speed])
         x = ca.vertcat(*[speed if i == self.speed_state else x0[i] for i in range(len(x0))])
-        moving, still = (self._values(0.0, at, self.u, self.p)[0][self.speed] for at in (x, x0))
+        moving, still = (self.rates_and_estimate(0.0, at, self.u, self.p)[0][self.speed] for at in (x, x0))
         function = ca.Function("friction", [speed], [moving - still - slope * speed])
         size = self.layout.speed_size
         values = _sampled(function, size)
@@ -170,9 +189,9 @@ class AngleForm:
         speeds = self.layout.speed_size * draw.normal(size=40)
         inputs = np.tile(self.u, (40, 1))
         inputs[:, self.free_inputs] = draw.normal(size=(40, len(self.free_inputs)))
-        x = self._rest(at)
+        x = self.rest_in_model_order(at)
         x[:, self.speed_state] = speeds
-        rate, _ = evaluate_rows(self._values, x, inputs, self.p)
+        rate, _ = evaluate_rows(self.rates_and_estimate, x, inputs, self.p)
         c = self.at(at)
         form = np.einsum("aij,aj->ai", c.a, x[:, self.order] - c.shift) + c.drive
         form[:, : self.inner] += self._followed(at) * speeds[:, None]
@@ -198,11 +217,15 @@ class AngleForm:
         angles, k = self.layout.angles, self.inner
         if not k:
             return 0.0
-        c, x, before = self.at(angles), self._rest(angles), np.array([0.0, angles[0], angles[-1]])
+        c, x, before = (
+            self.at(angles),
+            self.rest_in_model_order(angles),
+            np.array([0.0, angles[0], angles[-1]]),
+        )
         off, largest = 0.0, 1e-300
         for carried in self.rest(before)[:, :k] - self._shift(before):
             x[:, self.order[:k]] = carried + c.shift[:, :k]
-            wanted = evaluate_rows(self._values, x, self.u, self.p)[1][:, 0]
+            wanted = evaluate_rows(self.rates_and_estimate, x, self.u, self.p)[1][:, 0]
             tangent = c.estimate[:, :k] @ carried + c.estimate[:, -1]
             off = max(off, float(np.max(np.abs(wanted - tangent))))
             largest = max(largest, float(np.max(np.abs(wanted))))
@@ -210,11 +233,15 @@ class AngleForm:
 
     # --- inside ---------------------------------------------------------------------------------------
 
-    def _rest(self, angles: Array) -> Array:
-        return rest_states(self.model, angles, angle=self.layout.angle, consistent=self.layout.consistent)
+    def rest_in_model_order(self, angles: Array) -> Array:
+        """Return rest states in the order of the model, shape (N, n).
 
-    def _input(self, i: int, u: ca.SX) -> ca.SX | float:
-        return u[self.free_inputs.index(i)] if i in self.free_inputs else float(self.u[i])
+        Parameters
+        ----------
+        angles
+            Shape (N,).
+        """
+        return rest_states(self.model, angles, angle=self.layout.angle, consistent=self.layout.consistent)
 
     def _followed(self, angles: Array) -> Array:
         """Return ∂ż/∂ω of the inner states, shape (N, inner); it may depend on the angle only."""

@@ -26,7 +26,7 @@ def held(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
     n, m = b.shape[-2:]
     block = np.zeros((*a.shape[:-2], n + m, n + m))
     block[..., :n, :n], block[..., :n, n:] = a, b
-    whole = expm(block * sample_time)
+    whole = _exponentials(block * sample_time)
     return whole[..., :n, :n], whole[..., :n, n:]
 
 
@@ -47,6 +47,19 @@ def linear(a: Array, sample_time: float) -> tuple[Array, Array, Array]:
     block[..., :n, :n] = a * sample_time
     block[..., :n, n : 2 * n] = np.eye(n) * sample_time
     block[..., n : 2 * n, 2 * n :] = np.eye(n)
-    whole = expm(block)
+    whole = _exponentials(block)
     end = whole[..., :n, 2 * n :]
     return whole[..., :n, :n], whole[..., :n, n : 2 * n] - end, end
+
+
+def _exponentials(blocks: Array) -> Array:
+    """Return the exponential of each matrix; those that are equal at all angles are computed once."""
+    if (
+        blocks.ndim == 3
+        and len(blocks) > 1
+        and np.array_equal(blocks, np.broadcast_to(blocks[0], blocks.shape))
+    ):
+        same: Array = np.broadcast_to(expm(blocks[0]), blocks.shape).copy()
+        return same
+    result: Array = expm(blocks)
+    return result

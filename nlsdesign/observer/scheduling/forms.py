@@ -69,16 +69,33 @@ class Minimal:
         UnknownNameError
             If the angle is no state of the model.
         """
-        if angle not in {v.name for v in model.states}:
-            raise unknown_name("state", angle, (v.name for v in model.states))
-        model = without_idle_states(model, [estimate, angle])
-        sizes, speed = typical_sizes(model, angles, angle=angle), rate_state(model, angle)
-        form = AngleForm(model, ScheduledNames(angle, speed, sizes[speed], angles, {}))
-        size = np.array([sizes[model.states[i].name] for i in form.order])
-        carried = form.rest(angles) - form.at(angles).shift
-        largest = np.max(np.abs(carried[:, : form.inner]), axis=0)
-        size[: form.inner] = np.where(largest > 0.0, largest, size[: form.inner])
-        return _finished(form, size, ())
+        form, size = minimal_form(model, estimate=estimate, angle=angle, angles=angles)
+        return finished(form, size, ())
+
+
+def minimal_form(model: FlatModel, *, estimate: str, angle: str, angles: Array) -> tuple[AngleForm, Array]:
+    """Return the model in its own states, reduced to those that matter, and the typical sizes of the states.
+
+    Parameters
+    ----------
+    model, estimate, angle, angles
+        As for :meth:`StateForm.plant`.
+
+    Raises
+    ------
+    UnknownNameError
+        If the angle is no state of the model.
+    """
+    if angle not in {v.name for v in model.states}:
+        raise unknown_name("state", angle, (v.name for v in model.states))
+    model = without_idle_states(model, [estimate, angle])
+    sizes, speed = typical_sizes(model, angles, angle=angle), rate_state(model, angle)
+    form = AngleForm(model, ScheduledNames(angle, speed, sizes[speed], angles, {}))
+    size = np.array([sizes[model.states[i].name] for i in form.order])
+    carried = form.rest(angles) - form.at(angles).shift
+    largest = np.max(np.abs(carried[:, : form.inner]), axis=0)
+    size[: form.inner] = np.where(largest > 0.0, largest, size[: form.inner])
+    return form, size
 
 
 @dataclass(frozen=True)
@@ -132,12 +149,32 @@ class PaperForm:
         speed_size = float(sizes[names.index(n.speed)])
         layout = ScheduledNames(angle, n.speed, speed_size, angles, consistent, n.rate)
         form = AngleForm(published, layout)
-        return _finished(form, sizes[form.order], (n.extension,), self.rate_bandwidth)
+        return finished(form, sizes[form.order], (n.extension,), self.rate_bandwidth)
 
 
-def _finished(
+def finished(
     form: AngleForm, sizes: Array, measured: tuple[str, ...], bandwidth: float = float("inf")
 ) -> AngleScheduledPlant:
+    """Return the plant of a form, checked.
+
+    Parameters
+    ----------
+    form
+        The model in the form of an angle-scheduled plant.
+    sizes
+        Typical sizes of its states, shape (n,).
+    measured
+        States that are measured besides the angle.
+    bandwidth
+        Cut-off frequency of the filter on their rate in Hz.
+
+    Raises
+    ------
+    ArrangementError
+        If the equations do not have the form.
+    ValueRangeError
+        If the estimate is far from linear in the inner states.
+    """
     (driven, rows), friction = form.driven(), form.friction()
     form.check_additive(driven, rows, friction, sizes)
     deviation, model = form.affine_error(), form.model

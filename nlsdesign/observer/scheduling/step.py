@@ -69,26 +69,9 @@ class ObserverStep:
             (N, 1, n + 1), ``shift`` (N, n, 1) and ``measured`` (N, r − 1, 1).
         """
         plant, c = self.plant, self.plant.at(angles)
-        n, count = len(plant.states), len(angles)
-        transition, begin, end = linear(c.a, self.sample_time)
-        if plant.measured:
-            # Tangents at the angle of the sample: their offset belongs to their slope and is held with it.
-            begin, end = begin + end, np.zeros_like(end)
-        pushed = np.zeros((count, n, len(plant.rows) + 1))
-        pushed[:, list(plant.rows), range(len(plant.rows))] = 1.0
-        pushed[:, :, -1] = c.rate
-        _, push = held(c.a, pushed, self.sample_time)
-        drive = c.drive[:, :, None]
-        return {
-            "prior": end @ drive,
-            "correction": np.array(
-                [self._correction(*row) for row in zip(angles, c.a, transition, strict=True)]
-            ),
-            "next": np.concatenate([transition, begin @ drive, push], axis=2),
-            "estimate": c.estimate[:, None, :],
-            "shift": c.shift[:, :, None],
-            "measured": c.measured[:, :, None],
-        }
+        transition, _, _ = linear(c.a, self.sample_time)
+        correction = [self._correction(*row) for row in zip(angles, c.a, transition, strict=True)]
+        return {**without_correction(plant, self.sample_time, angles), "correction": np.array(correction)}
 
     def _correction(self, angle: float, a: Array, transition: Array) -> Array:
         plant = self.plant
@@ -210,3 +193,39 @@ def _per(unit: str, other: str) -> str:
         if atom != "1"
     )
     return f"{unit}{turned}"
+
+
+def without_correction(plant: AngleScheduledPlant, sample_time: float, angles: Array) -> dict[str, Array]:
+    """Return the matrices of the step at many angles that no gain decides.
+
+    Parameters
+    ----------
+    plant
+        In the form of an angle-scheduled plant.
+    sample_time
+        In s.
+    angles
+        Shape (N,).
+
+    Returns
+    -------
+    dict
+        As :meth:`ObserverStep.matrices`, without ``correction``.
+    """
+    c, n, count = plant.at(angles), len(plant.states), len(angles)
+    transition, begin, end = linear(c.a, sample_time)
+    if plant.measured:
+        # Tangents at the angle of the sample: their offset belongs to their slope and is held with it.
+        begin, end = begin + end, np.zeros_like(end)
+    pushed = np.zeros((count, n, len(plant.rows) + 1))
+    pushed[:, list(plant.rows), range(len(plant.rows))] = 1.0
+    pushed[:, :, -1] = c.rate
+    _, push = held(c.a, pushed, sample_time)
+    drive = c.drive[:, :, None]
+    return {
+        "prior": end @ drive,
+        "next": np.concatenate([transition, begin @ drive, push], axis=2),
+        "estimate": c.estimate[:, None, :],
+        "shift": c.shift[:, :, None],
+        "measured": c.measured[:, :, None],
+    }

@@ -1,0 +1,122 @@
+"""``nlsdesign observer calibrate``: records of a calibration become smaller spreads in the deck."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..errors import MeasurementError
+from ..writing import write_text
+from .output import deck_option, json_option, out_option, show_json, show_table
+
+if TYPE_CHECKING:
+    from ..calibration import CalibrationPlan, CalibrationRecords, CalibrationTest
+
+KINDS = ("hung_weight", "load_cell", "free_run")
+_file = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command()
+@deck_option
+@click.option("--kind", "kinds", multiple=True, type=click.Choice(KINDS),
+              help="What was done; repeatable, once for each --records.")  # fmt: skip
+@click.option("--records", "folders", multiple=True, type=click.Path(path_type=Path),
+              help="Folder of records of that kind, with its records.toml; repeatable.")  # fmt: skip
+@click.option("--known", type=_file, default=None,
+              help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip
+@click.option("--plan", is_flag=True, help="Rank calibrations by what they would buy; needs no records.")
+@out_option("out/calibration")
+@json_option
+def calibrate(
+    deck_name: str,
+    kinds: tuple[str, ...],
+    folders: tuple[Path, ...],
+    known: Path | None,
+    plan: bool,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Turn an afternoon at the bench into smaller spreads in the deck, or plan that afternoon."""
+    from ..calibration import (
+        calibrated,
+        estimate,
+        load_calibration,
+        read_joint_numbers,
+        shown_numbers,
+        what_calibration_buys,
+        write_calibration,
+    )
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..progress import Steps
+
+    deck = load_deck(deck_name)
+    actuator = declare(deck)
+    prior = read_joint_numbers(known) if known else None
+    steps = Steps()
+    if plan:
+        chosen = [_kind(kind) for kind in kinds or KINDS]
+        with steps.step("plan"):
+            ranked = what_calibration_buys(actuator, chosen, prior=prior)
+        file = out / "plan.json"
+        write_text(file, json.dumps(ranked.to_dict(), indent=2, ensure_ascii=False) + "\n")
+        _show_plan(ranked, as_json)
+        if not as_json:
+            click.echo(f"written: {file}; next: nlsdesign observer calibrate --deck {deck_name} "
+                       "--kind KIND --records FOLDER")  # fmt: skip
+        return
+    if not folders or len(kinds) != len(folders):
+        raise MeasurementError(
+            f"{len(kinds)} --kind and {len(folders)} --records",
+            "each folder of records needs its kind",
+            next_step=f"write --kind {KINDS[0]} --records FOLDER, or --plan to see what would help most",
+        )
+    with steps.step("read"):
+        tests = [
+            load_calibration(actuator, _kind(kind), folder)
+            for kind, folder in zip(kinds, folders, strict=True)
+        ]
+    with steps.step("estimate"):
+        result = calibrated(actuator, estimate(actuator, tests, prior=prior))
+    paths = write_calibration(result, out, deck=deck.path)
+    if as_json:
+        show_json({**result.to_dict(), "deck": str(paths["deck"]), "joint": str(paths["joint"])})
+        return
+    heads = ("name", "before", "after", "unit", "moved, in spreads", "known from")
+    show_table("Numbers", heads, shown_numbers(result.numbers))
+    for sentence in (*_remarks(tests), *result.words()):
+        click.echo(sentence)
+    click.echo(f"written: {', '.join(map(str, paths.values()))}")
+
+
+def _kind(name: str) -> CalibrationTest:
+    from ..calibration import FreeRunTest, HungWeightTest, LoadCellTest
+
+    kinds: dict[str, CalibrationTest] = dict(
+        zip(KINDS, (HungWeightTest(), LoadCellTest(), FreeRunTest()), strict=True)
+    )
+    return kinds[name]
+
+
+def _remarks(tests: Sequence[CalibrationRecords]) -> list[str]:
+    """Return what was found in the files."""
+    suspect = [f"suspect: {finding}" for test in tests for finding in test.records.findings]
+    return suspect + [str(remark) for test in tests for remark in test.records.remarks]
+
+
+def _show_plan(ranked: CalibrationPlan, as_json: bool) -> None:
+    if as_json:
+        show_json(ranked.to_dict())
+        return
+    rows = [("nothing", f"{1e3 * ranked.now.torque_rms:.3g}", "")]
+    for each in ranked.ranked:
+        best = list(each.narrowed(ranked.now.known).items())[:4]
+        spreads = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in best)
+        rows.append((each.title, f"{1e3 * each.torque_rms:.3g}", spreads))
+    show_table("What a calibration buys", ("calibration", "spring torque, mN·m", "spreads, best four"), rows)
+    for title, reason in ranked.left_out.items():
+        click.echo(f"{title} is left out: {reason}")

@@ -1,0 +1,274 @@
+"""Writes the filter of an adaptive observer: two halves of a sample, their slopes, and the correction between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...symbolic import Expression
+from ..scheduling.table import Compact
+from .adaptive_step import AdaptiveStep
+from .settings import Trust
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FilterNoise:
+    """What the filter does not know.
+
+    Parameters
+    ----------
+    angle
+        Standard deviation of the measured angle in rad.
+    acceleration
+        Of what the equations miss, in rad/s².
+    estimate
+        Of the estimate beyond what its states explain, in its unit.
+    safe_inputs
+        Size of each limited input up to which the drive surely gives it.
+    """
+
+    angle: float
+    acceleration: float
+    estimate: float
+    safe_inputs: Mapping[str, float]
+
+
+class FilterEquations:
+    """Writes the filter with the entries read from the table.
+
+    Parameters
+    ----------
+    step
+        One step and its slopes along the slow states.
+    compact
+        Its table.
+    trust
+        How far the equations are trusted.
+    noise
+        What the filter does not know.
+    """
+
+    def __init__(self, step: AdaptiveStep, compact: Compact, trust: Trust, noise: FilterNoise) -> None:
+        self.step, self.compact, self.trust, self.noise = step, compact, trust, noise
+        self.plant = step.nominal.plant
+        self.n, self.slow = len(self.plant.states), len(step.raised)
+        self.angle, self.speed = self.plant.moving
+        self.w = ca.SX.sym("w", len(compact.columns))
+        time = step.nominal.sample_time
+        # Units in which all covariances are near one: counts, counts per sample, sizes of inner states.
+        self.units = self.plant.sizes.copy()
+        self.units[self.angle], self.units[self.speed] = noise.angle, noise.angle / time
+        self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]))
+
+    # --- reading the table ------------------------------------------------------------------------------
+
+    def _read(self, kind: str, i: int, j: int = 0) -> Expression:
+        place = self.compact.places[f"{kind}[{i}][{j}]"]
+        return ca.SX(place.factor) if place.column is None else place.factor * self.w[place.column]
+
+    def _matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
+        """Return a matrix of the step at the slow states."""
+        total = ca.SX(rows, columns)
+        for i in range(rows):
+            for j in range(columns):
+                parts = [self._read(kind, i, j)]
+                parts += [slow[d] * self._read(f"{kind}.{d}", i, j) for d in range(self.slow)]
+                total[i, j] = sum(parts, start=ca.SX(0))
+                if self._accelerates(kind, i, j):
+                    total[i, j] *= self._lightness(slow)
+        return total
+
+    def _accelerates(self, kind: str, i: int, j: int) -> bool:
+        """Return whether an entry is what a torque does to angle or speed."""
+        moves = i >= self.step.inner
+        return moves and (
+            kind in ("prior", "coupling") or (kind == "next" and (j < self.step.inner or j == self.n))
+        )
+
+    def _lightness(self, slow: Expression) -> Expression:
+        """Return the declared inertia over that at the slow states."""
+        slopes = [c if abs(c) > 1e-6 else 0.0 for c in self.step.lightness]
+        return ca.exp(sum((c * slow[d] for d, c in enumerate(slopes) if c), start=ca.SX(0)))
+
+    # --- the two halves of a sample ---------------------------------------------------------------------
+
+    def _begin(self, memory: Expression, slow: Expression) -> Expression:
+        """Return the states expected at a sample: what the angle adds at its end, then friction."""
+        state = memory + self._matrix("prior", self.n, 1, slow)
+        inner = self.step.inner
+        if inner:
+            state += ca.mtimes(self._matrix("coupling", self.n, inner, slow), state[:inner])
+        friction_of = self.step.friction
+        speed = ca.SX.sym("speed")
+        given = friction_of(speed)
+        if given is None:
+            return state
+        own, slopes = given
+        rate = self._lightness(slow) * (
+            own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
+        )
+        time = self.step.nominal.sample_time
+        # The exponential Rosenbrock–Euler step of the scheduled observers: it stops but never turns around.
+        x = time * ca.jacobian(rate, speed)
+        x = x - 1e-9 * (ca.fabs(x) < 1e-9)
+        left = speed + time * rate * ca.expm1(x) / x
+        change = ca.substitute(left * (left * speed > 0) - speed, speed, state[self.speed])
+        state[self.angle] += time / 2.0 * change
+        state[self.speed] += change
+        return state
+
+    def _end(self, state: Expression, slow: Expression, u: Expression) -> Expression:
+        """Return what goes on to the next sample."""
+        count = self.n + 1 + len(self.plant.rows)
+        matrix = self._matrix("next", self.n, count, slow)
+        own, slopes = self.step.driven(u)
+        pushed = self._lightness(slow) * (
+            own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
+        )
+        return ca.SX(ca.mtimes(matrix, ca.vertcat(state, 1, pushed)))
+
+    def _slopes(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
+        """Return slopes by states and slow states, both in the units of the filter.
+
+        They are taken at the deck, not at the estimate: what no motion can tell apart (a drive, a rubber and
+        an inertia that are all ten per cent larger) must be the same direction at every sample, or the filter
+        would believe to have seen it. Source: Huang et al. 2010 (first-estimates Jacobian).
+        """
+        jacobian = ca.substitute(
+            ca.jacobian(expression, ca.vertcat(of, slow)), slow, ca.SX.zeros(self.slow, 1)
+        )
+        return ca.SX(ca.mtimes(jacobian, ca.diag(np.concatenate([self.units, np.ones(self.slow)]))))
+
+    def _carried(self, expression: Expression, of: Expression, slow: Expression) -> Expression:
+        """Return the slopes of one half of a sample, those of the slow states, which stay, below the others."""
+        upper = ca.mtimes(ca.diag(1.0 / self.units), self._slopes(expression, of, slow))
+        return ca.SX(ca.vertcat(upper, ca.horzcat(ca.SX(self.slow, self.n), ca.SX.eye(self.slow))))
+
+    def _gain(
+        self, covariance: Expression, speed: Expression, surprise: Expression
+    ) -> tuple[Expression, Expression]:
+        """Return the gain, and how far the actuator moves: 0 at standstill, 1 in motion.
+
+        A surprise, the squared innovation over its variance, beyond what noise gives teaches the less the
+        larger it is: a drive at its limit or a jump of the encoder is no news of the rubber.
+        """
+        moving = speed**2 / (speed**2 + self.calm**2) if self.calm else ca.SX(1)
+        column = covariance[:, self.angle] / (covariance[self.angle, self.angle] + 1.0)
+        for i in range(self.n):
+            if i not in (self.angle, self.speed):
+                column[i] = 0
+        column[self.n :] *= moving * ca.fmin(1.0, self.trust.surprise / ca.sqrt(surprise + 1e-12))
+        return column, moving
+
+    def sample(self) -> ca.Function:
+        """Return one sample as the equations of a discrete flat model."""
+        n, slow_count, plant = self.n, self.slow, self.plant
+        size = n + slow_count
+        memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", slow_count)
+        packed = ca.SX.sym("covariance", size * (size + 1) // 2)
+        angle, u = ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
+        slopes = self._carried(self._begin(memory, slow), memory, slow)
+        before = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
+        expected = self._begin(memory, slow)
+        innovation = angle - expected[self.angle]
+        surprise = (innovation / self.noise.angle) ** 2 / (before[self.angle, self.angle] + 1.0)
+        gain, moving = self._gain(before, expected[self.speed], surprise)
+        for i, v in enumerate(plant.inputs):
+            if v.name in self.noise.safe_inputs:
+                gain[n:] *= ca.fabs(u[i]) < self.noise.safe_inputs[v.name]
+        step = gain * (innovation / self.noise.angle)
+        state = expected + step[:n] * self.units
+        slow_after = ca.fmin(ca.fmax(slow + step[n:], -self.trust.limit), self.trust.limit)
+        keep = ca.SX.eye(size)
+        keep[:, self.angle] -= gain
+        after = ca.mtimes([keep, before, keep.T]) + ca.mtimes(gain, gain.T)
+        s, free = ca.SX.sym("s", n), ca.SX.sym("free", slow_count)
+        end = self._end(s, free, u)
+        following = ca.substitute(end, ca.vertcat(s, free), ca.vertcat(state, slow_after))
+        onward = ca.substitute(
+            self._carried(end, s, free), ca.vertcat(s, free), ca.vertcat(state, slow_after)
+        )
+        forget = moving * (1.0 - math.exp(-2.0 * self.step.nominal.sample_time / self.trust.drift_time))
+        fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
+        onward = ca.mtimes(ca.diag(fading), onward)
+        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget)
+        row = self._matrix("estimate", 1, n + 1, free)
+        wanted = ca.mtimes(row, ca.vertcat(s, 1))
+        slopes_of_estimate = self._slopes(wanted, s, free)
+        both = (ca.vertcat(s, free), ca.vertcat(state, slow_after))
+        estimate, row_at = ca.substitute(wanted, *both), ca.substitute(slopes_of_estimate, *both)
+        variance = ca.mtimes([row_at, after, row_at.T]) + self.noise.estimate**2
+        shown = state + self._matrix("shift", n, 1, slow_after)
+        outputs = [estimate, ca.sqrt(variance), shown, innovation, slow_after]
+        states = [following, slow_after * fading[n:], _packed(next_covariance)]
+        arguments = [ca.SX.sym("time"), ca.vertcat(memory, slow, packed), ca.vertcat(angle, u), ca.SX(0, 1)]
+        results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
+        return ca.Function(
+            "equations",
+            [*arguments, self.w],
+            [*results, ca.SX(0, 1), ca.SX(0, 1)],
+            ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
+        )  # fmt: skip
+
+    def _process_noise(self, forget: Expression) -> Expression:
+        """Return what one sample adds to the covariance.
+
+        A torque that stays the same over the correlation time is, to a filter that takes it as white, one of
+        2·correlation/sample times the variance.
+        """
+        time = self.step.nominal.sample_time
+        density = self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
+        push = np.zeros(self.n)
+        push[self.angle], push[self.speed] = density * time**2 / 2.0, density * time
+        push /= self.units
+        size = self.n + self.slow
+        noise = ca.SX.zeros(size, size)
+        noise[: self.n, : self.n] = ca.DM(np.outer(push, push))
+        for i in range(self.n):
+            # Rounding of a small number beside large ones; without it single precision may lose its sign.
+            noise[i, i] += 1e-6 if i in (self.angle, self.speed) else 1e-12
+        for d in range(self.slow):
+            noise[self.n + d, self.n + d] += forget
+        return noise
+
+
+def _calm_speed(friction: ca.Function | None, size: float) -> float:
+    """Return a speed below which dry friction is not at its level: twice that of 90 % of it; 0 for none."""
+    if friction is None:
+        return 0.0
+    speeds = size * np.logspace(-7.0, 0.0, 400)
+    level = np.abs(friction.map(len(speeds))(speeds[None, :]).full().ravel())
+    reached = np.flatnonzero(level >= 0.9 * np.max(level))
+    return float(2.0 * speeds[reached[0]])
+
+
+def pairs(size: int) -> list[tuple[int, int]]:
+    """Return the places of the upper triangle of a matrix, row by row.
+
+    Parameters
+    ----------
+    size
+        Number of rows.
+    """
+    return [(i, j) for i in range(size) for j in range(i, size)]
+
+
+def _packed(matrix: Expression) -> Expression:
+    """Return the upper triangle, row by row; symmetric by taking both halves."""
+    size = matrix.shape[0]
+    return ca.SX(ca.vertcat(*[(matrix[i, j] + matrix[j, i]) / 2.0 for i, j in pairs(size)]))
+
+
+def _unpacked(packed: Expression, size: int) -> Expression:
+    matrix = ca.SX(size, size)
+    for place, (i, j) in enumerate(pairs(size)):
+        matrix[i, j] = packed[place]
+        matrix[j, i] = packed[place]
+    return matrix
