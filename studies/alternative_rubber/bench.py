@@ -14,7 +14,7 @@ from nlsdesign.analysis.rest import rest_states
 from nlsdesign.components import Driven, Encoder, flat_relaxation
 from nlsdesign.model import Variable
 from nlsdesign.model.transform import with_signal
-from nlsdesign.observer import ObserverDesign
+from nlsdesign.observer import CascadeGain, ObserverDesign
 from nlsdesign.simulation.sampled_batch import run_batch
 
 from .candidates import BRANCHES, without_loss
@@ -182,7 +182,9 @@ class Bench:
         """The observer, with the loss that was declared or with the static torque curve."""
         known = without_loss(self.actuator) if self.static else self.actuator
         return nls.design_observer_with_details(
-            nls.flatten(known, outputs=["motor.angle", "spring.torque"]), sample_time=SAMPLE
+            nls.flatten(known, outputs=["motor.angle", "spring.torque"]),
+            sample_time=SAMPLE,
+            gain=CascadeGain(),
         )
 
     @cached_property
