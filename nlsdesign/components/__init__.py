@@ -21,6 +21,15 @@ from .materials.finite_viscoelasticity import FlowingChains
 from .materials.hardening import HardeningSpring
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.library import Material, Property, material, materials
+from .materials.loss_tangent import (
+    KnownLoss,
+    Relaxation,
+    flat_relaxation,
+    loss_of,
+    measured_relaxation,
+    peaked_relaxation,
+    relaxation_of,
+)
 from .materials.material_law import MaterialLaw, law_of, material_laws, rubber_of
 from .materials.named_networks import (
     burgers,
@@ -30,7 +39,9 @@ from .materials.named_networks import (
     standard_linear_solid,
 )
 from .materials.permanent_set import Following, PermanentSet, Rising
+from .materials.quasilinear import QuasilinearRelaxation
 from .materials.rate_independent import SlidingFillers
+from .materials.relaxing_rubber import relaxing_law_of, relaxing_rubber_of
 from .materials.self_heating import HeatBalance, LossHeat, SelfHeating, ViscousHeat, WorkHeat
 from .materials.smooth_hysteresis import BoucWen
 from .materials.specimen import Area, Specimen, Strength, Strip, specimen
@@ -134,6 +145,7 @@ __all__ = [
     "Inertial",
     "InextensibleCable",
     "Integral",
+    "KnownLoss",
     "LargestMotion",
     "LinearDrive",
     "LinearElastic",
@@ -159,8 +171,10 @@ __all__ = [
     "PullOnly",
     "Pulley",
     "QuadraticDrag",
+    "QuasilinearRelaxation",
     "RateFeedback",
     "Regularised",
+    "Relaxation",
     "ResistiveMotor",
     "RigidStop",
     "Rising",
@@ -206,15 +220,22 @@ __all__ = [
     "assembly",
     "burgers",
     "control_values",
+    "flat_relaxation",
     "generalised_maxwell",
     "kelvin_voigt",
     "law_of",
+    "loss_of",
     "material",
     "material_laws",
     "materials",
     "maxwell",
+    "measured_relaxation",
     "parallel",
+    "peaked_relaxation",
     "pull_only",
+    "relaxation_of",
+    "relaxing_law_of",
+    "relaxing_rubber_of",
     "rubber_of",
     "series",
     "smoothed",

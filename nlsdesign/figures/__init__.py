@@ -25,6 +25,7 @@ from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
+from .ranked import ranked_intervals
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
@@ -71,6 +72,7 @@ __all__ = [
     "observer_stability",
     "over_time",
     "pareto_front",
+    "ranked_intervals",
     "significant",
     "stability_over_angle",
     "styled",

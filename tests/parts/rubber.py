@@ -13,6 +13,7 @@ from nlsdesign.components import (
     OgdenRoxburgh,
     Part,
     PermanentSet,
+    QuasilinearRelaxation,
     Rising,
     SelfHeating,
     Springpot,
@@ -38,6 +39,7 @@ _PARTS: tuple[Part, ...] = (
     Ogden(moduli=(0.618e6, 1.18e3, -9.81e3), exponents=(1.3, 5.0, -2.0), data=DATA),
     StrainStiffening(modulus=(0.43e6, 0.1e6), knots=(0.0, 1.0), data=DATA),
     PermanentSet(members=(("law", SOLID),), share=0.05, memory=Rising(width=1e-3)),
+    QuasilinearRelaxation(members=(("gum", GUM),), shares=(0.2, 0.3), times=(0.02, 0.4)),
     SelfHeating(
         members=(("law", SOLID),), heat=HeatBalance(heat_capacity=1.8e6, cooling=4e4, softening=3e-3)
     ),

@@ -20,6 +20,12 @@ ROWS: tuple[Row, ...] = (
         "test_finite_viscoelasticity.py::test_work_is_stored_or_lost",
     ),
     Row(
+        c.QuasilinearRelaxation,
+        "relaxation",
+        ("simulated law", "hereditary integral over the path of the strain, by quadrature"),
+        "test_quasilinear.py::test_the_stress_is_the_hereditary_integral",
+    ),
+    Row(
         c.Springpot,
         "relaxation",
         ("simulated Prony series", "power law with the gamma function"),

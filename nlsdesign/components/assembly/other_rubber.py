@@ -5,13 +5,20 @@ from __future__ import annotations
 from ...errors import ArrangementError, unknown_name
 from ..core.tie import Tie
 from ..materials.library import Material
+from ..materials.loss_tangent import Relaxation
 from ..materials.material_law import law_of
+from ..materials.relaxing_rubber import relaxing_law_of
 from ..materials.specimen import Specimen
 from .named_parts import Assembly
 
 
 def with_rubber(
-    actuator: Assembly, material: Material, *, piece: str | None = None, using: str | None = None
+    actuator: Assembly,
+    material: Material,
+    *,
+    piece: str | None = None,
+    using: str | None = None,
+    loss_tangent: float | Relaxation | None = None,
 ) -> Assembly:
     """Return a copy whose rubber is one of the library: other laws and strength, the same sizes.
 
@@ -25,6 +32,9 @@ def with_rubber(
         Path of the piece, for instance ``"spring.rubber"``; not needed where there is but one.
     using
         As for :func:`~nlsdesign.components.law_of`.
+    loss_tangent
+        If given, the rubber relaxes with it, as for :func:`~nlsdesign.components.relaxing_law_of`; what the
+        library knows of it is ``loss_of(material)``.
 
     Raises
     ------
@@ -33,6 +43,8 @@ def with_rubber(
         the rubber gives an elastic law.
     UnknownNameError
         If there is no such piece.
+    ValueRangeError
+        If the loss tangent is not above 0 and at most 2.
 
     Examples
     --------
@@ -56,4 +68,9 @@ def with_rubber(
             else "declare one with specimen(...)",
         )  # fmt: skip
     path = piece or next(iter(pieces))
-    return actuator.with_part(path, law_of(material, using=using).in_place_of(pieces[path]))
+    law = (
+        law_of(material, using=using)
+        if loss_tangent is None
+        else relaxing_law_of(material, loss_tangent=loss_tangent, using=using)
+    )
+    return actuator.with_part(path, law.in_place_of(pieces[path]))

@@ -15,6 +15,7 @@ from ..core.springs import FittedLaw, FittedRange, LinearElastic, StrainStiffeni
 from .curve_fit import fit_curve
 from .hyperelastic import NeoHooke, Ogden
 from .library import Material, Property, materials
+from .quasilinear import QuasilinearRelaxation
 from .specimen import Specimen, Strength, specimen
 
 _CURVE, _ENGAGING, _OGDEN, _GAUSS = "nominal_stress", "engaging_moduli", "ogden_moduli", "shear_modulus"
@@ -50,7 +51,13 @@ class MaterialLaw:
     @property
     def strains(self) -> Range:
         """Least and greatest strain for which the elastic law is stated to hold."""
-        return self.members[0][1].valid
+        return self._elastic.valid
+
+    @property
+    def _elastic(self) -> Element:
+        """The elastic law, also where it stands inside one that relaxes."""
+        law = self.members[0][1]
+        return law.members[0][1] if isinstance(law, QuasilinearRelaxation) else law
 
     def in_place_of(self, piece: Specimen) -> Specimen:
         """Return a piece of this rubber in the sizes of another.
@@ -63,8 +70,8 @@ class MaterialLaw:
         return replace(piece, members=self.members, strength=self.strength)
 
     def __str__(self) -> str:
-        law, (low, high) = self.members[0][1], self.strains
-        more = "".join(f", {name}" for name, _ in self.members[1:])
+        law, (low, high) = self._elastic, self.strains
+        more = "".join(f", {name}" for name, each in self.members if each is not law)
         text = (
             f"{self.material.name}: {type(law).__name__} from {self.using}{more}, strain {low:g} to {high:g}"
         )

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import casadi as ca
 
+from ...errors import ArrangementError
 from ...quantity import Quantity
 from ...symbolic import Expression
 from ..core.domain import MATERIAL, ROTATION, TRANSLATION, Domain
@@ -16,6 +17,7 @@ from ..core.element import UNBOUNDED, Combination, Element, Scope, observed_effo
 from ..core.part import walk
 from ..core.part_numbers import Reading, parameter, read_as
 from ..core.springs import Elastic
+from .quasilinear import QuasilinearRelaxation
 
 _ROOM = 293.15
 
@@ -212,6 +214,11 @@ class SelfHeating(Combination):
     :class:`LossHeat` around laws of which some relax or slide.
     Source: first law of thermodynamics.
 
+    Raises
+    ------
+    ArrangementError
+        If the heat is that of what is lost, and a member relaxes without saying what it loses.
+
     Examples
     --------
     >>> from nlsdesign.components import LinearElastic
@@ -224,6 +231,17 @@ class SelfHeating(Combination):
     phenomena: ClassVar[frozenset[str]] = frozenset({"self-heating"})
 
     heat: Heat = read_as(HeatBalance, WorkHeat, ViscousHeat, LossHeat)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.heat, RelativeHeat):
+            return
+        for path, part in walk(self):
+            if isinstance(part, QuasilinearRelaxation):
+                raise ArrangementError(
+                    f"SelfHeating member '{path}'", "relaxes without saying what it loses",
+                    next_step="use linear branches (springs with dashpots), or WorkHeat around the piece",
+                )  # fmt: skip
 
     def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
         """Return the effort at the present temperature."""
