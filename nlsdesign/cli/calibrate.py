@@ -105,7 +105,7 @@ def _kind(name: str) -> CalibrationTest:
 
 
 def _while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
-    """Return the least error of the torque that any observer could have, where there is a torque to observe."""
+    """Return the least error of the torque that any observer could have, where there is one to observe."""
     from ..errors import ArrangementError, ValueRangeError
     from ..model import flatten
     from ..observer import bench_trial, least_torque_error
