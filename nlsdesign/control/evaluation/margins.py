@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
 from .linear_loop import Complex, LinearLoop, linear_loop
-from .linear_parts import PlantMode, TableSlope
+from .linear_parts import LinearMode, TableSlope
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def loop_margins(
     angles: Sequence[float] | Array,
     *,
     opening: str | None = None,
-    mode: PlantMode | None = None,
+    mode: LinearMode | None = None,
     tables: TableSlope | None = None,
 ) -> LoopMargins:
     """Return gain, phase and delay margins at rest at many angles.
