@@ -16,7 +16,7 @@ from ..adaptive.adaptive_settings import AdaptiveSettings
 from ..adaptive.adaptive_variables import SPREAD
 from ..scheduling.forms import StateForm
 from ..scheduling.gains import FittedGain, GainRule
-from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
+from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
 from ..scheduling.table import Grid
 from .bench_trial import bench_trial
 
@@ -76,10 +76,12 @@ def choose_observer(
     ArrangementError
         If the equations cannot be scheduled over one angle.
     ValueRangeError
-        If the estimate is far from linear in the inner states, or a setting is out of range.
+        If the model is discrete, the estimate is far from linear in the inner states, or a setting is out of
+        range.
     ConvergenceError
         If a table does not keep its error bound.
     """
+    check_sampling(model, sample_time)
     settings = settings or AdaptiveSettings()
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     cascade = design_observer_with_details(
@@ -138,8 +140,8 @@ def design_observer(
     """Design an observer that estimates a torque from a measured angle and the known inputs.
 
     Without ``gain`` and ``form`` it is the one that errs least over the spread of the deck, as
-    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled observer
-    of that kind, designed at the declared numbers.
+    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled
+    observer of that kind, designed at the declared numbers.
 
     Its inputs are the measured angle and the inputs of the model, held over the coming sample; its outputs
     the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have
