@@ -240,11 +240,11 @@ class FilterEquations:
 
 
 def _calm_speed(friction: ca.Function | None, size: float) -> float:
-    """Return a speed below which nothing is learned: twenty times that at which friction is at 90 %; 0 for none.
+    """Return a speed below which nothing is learned: twenty times that of 90 % of the friction; 0 for none.
 
     Within a sample in which the motion reverses, friction is known on average only. At twice that speed the
-    filter took what is left for a scale of the torque: 10 mN·m on the published actuator with exact numbers, 2
-    at twenty times.
+    filter took what is left for a scale of the torque: 10 mN·m on the published actuator with exact numbers,
+    and 2 at twenty times.
     """
     if friction is None:
         return 0.0
