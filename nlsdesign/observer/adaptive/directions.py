@@ -110,6 +110,11 @@ def uncertain_directions(
         If no number of the model is uncertain enough to matter.
     """
     known = prior.only([name for name in prior.names if name in form.model.values])
+    if not known.names:
+        raise ArrangementError(
+            f"model '{form.model.name}'", "has no number with a spread, so there is nothing to learn",
+            next_step="give numbers a spread, or leave the adaptation out",
+        )  # fmt: skip
     root = _root_of(known.covariance)
     features, own = _features(form, operating_points(form, duty), known, root)
     left, singular, right = np.linalg.svd(features, full_matrices=False)
