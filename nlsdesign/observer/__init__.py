@@ -34,6 +34,7 @@ from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .spread.bench_trial import Trial, bench_trial
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer
+from .spread.least_error import least_torque_error
 from .spread.spread_errors import SpreadErrors, observer_errors
 
 __all__ = [
@@ -76,6 +77,7 @@ __all__ = [
     "design_observer",
     "design_observer_with_details",
     "estimator_bound",
+    "least_torque_error",
     "observe",
     "observer_errors",
     "read_certificate",

@@ -84,10 +84,10 @@ def choose_observer(
     """
     check_sampling(model, sample_time)
     settings = settings or AdaptiveSettings()
-    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
+    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     unit = typeset_unit(model.variable(estimate).unit)
     try:
         adaptive = design_adaptive_observer(
