@@ -52,6 +52,11 @@ def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProv
         Cascade or certified gain.
     wanted
         What is to be proved.
+
+    Raises
+    ------
+    ArrangementError
+        If observers of that kind cannot be certified.
     """
     from ..observer import ObserverDesign, certify, declared_assumptions
 
