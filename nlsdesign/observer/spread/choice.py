@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import ArrangementError, ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
+from ...quantity import typeset_unit
 from ...simulation.sampled_batch import run_batch
 from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
 from ..adaptive.adaptive_settings import AdaptiveSettings
@@ -87,7 +88,7 @@ def choose_observer(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
-    unit = model.variable(estimate).unit
+    unit = typeset_unit(model.variable(estimate).unit)
     try:
         adaptive = design_adaptive_observer(
             model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
