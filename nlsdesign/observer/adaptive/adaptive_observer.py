@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ...errors import ArrangementError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
+from ...quantity import typeset_unit
 from ...simulation.prior import Prior, declared_prior
 from ..scheduling.forms import finished, minimal_form
 from ..scheduling.gains import CascadeGain
@@ -86,6 +87,7 @@ class AdaptiveDesign:
     def __str__(self) -> str:
         grid = self.compact.angles
         estimate = self.step.nominal.plant.estimate
+        unit = typeset_unit(estimate.unit)
         lines = [
             f"Adaptive observer of {estimate.name} every {self.step.nominal.sample_time:g} s",
             f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
@@ -95,8 +97,8 @@ class AdaptiveDesign:
         for d, effect in enumerate(self.directions.effect):
             where = "spring" if self.directions.torque_share[d] > 0.5 else "drive"
             words = self.directions.in_words(d)
-            lines.append(f"    [{d + 1}] {1e3 * effect:.3g} m{estimate.unit}, {where}: {words}")
-        return "\n".join([*lines, f"  left out: {1e3 * self.directions.left_out:.2g} m{estimate.unit}"])
+            lines.append(f"    [{d + 1}] {1e3 * effect:.3g} m{unit}, {where}: {words}")
+        return "\n".join([*lines, f"  left out: {1e3 * self.directions.left_out:.2g} m{unit}"])
 
 
 def design_adaptive_observer(
