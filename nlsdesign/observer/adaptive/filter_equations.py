@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 
 from ...symbolic import Expression
 from ..scheduling.table import Compact
@@ -68,7 +69,8 @@ class FilterEquations:
         # Units in which all covariances are near one: counts, counts per sample, sizes of inner states.
         self.units = self.plant.sizes.copy()
         self.units[self.angle], self.units[self.speed] = noise.angle, noise.angle / time
-        self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]))
+        self.blur = _speed_deviation(noise.angle, self._acceleration_density(), time)
+        self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]), self.blur)
 
     # --- reading the table ------------------------------------------------------------------------------
 
@@ -110,10 +112,16 @@ class FilterEquations:
             state += ca.mtimes(self._matrix("coupling", self.n, inner, slow), state[:inner])
         friction_of = self.step.friction
         speed = ca.SX.sym("speed")
-        given = friction_of(speed)
-        if given is None:
+        length = ca.sqrt(speed**2 + self.blur**2)
+        ahead, back = friction_of(length), friction_of(-length)
+        if ahead is None or back is None:
             return state
-        own, slopes = given
+
+        def blurred(forward: Expression, backward: Expression) -> Expression:
+            return (forward + backward) / 2.0 + (forward - backward) / 2.0 * speed / length
+
+        own = blurred(ahead[0], back[0])
+        slopes = [blurred(one, other) for one, other in zip(ahead[1], back[1], strict=True)]
         rate = self._lightness(slow) * (
             own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
         )
@@ -220,14 +228,17 @@ class FilterEquations:
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
 
+    def _acceleration_density(self) -> float:
+        time = self.step.nominal.sample_time
+        return self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
+
     def _process_noise(self, forget: Expression) -> Expression:
         """Return what one sample adds to the covariance.
 
         A torque that stays the same over the correlation time is, to a filter that takes it as white, one of
         2·correlation/sample times the variance.
         """
-        time = self.step.nominal.sample_time
-        density = self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
+        time, density = self.step.nominal.sample_time, self._acceleration_density()
         push = np.zeros(self.n)
         push[self.angle], push[self.speed] = density * time**2 / 2.0, density * time
         push /= self.units
@@ -276,14 +287,30 @@ def within_a_count(off: Expression, variance: Expression) -> tuple[Expression, E
     return ca.SX(ca.sign(off) * moved), ca.SX(kept)
 
 
-def _calm_speed(friction: ca.Function | None, size: float) -> float:
-    """Return a speed below which dry friction is not at its level: twice that of 90 % of it; 0 for none."""
+def _calm_speed(friction: ca.Function | None, size: float, blur: float) -> float:
+    """Return a speed below which dry friction is not at its level, as the filter sees it; 0 for none.
+
+    That is twice the speed at which 90 % of it are reached.
+    """
     if friction is None:
         return 0.0
     speeds = size * np.logspace(-7.0, 0.0, 400)
     level = np.abs(friction.map(len(speeds))(speeds[None, :]).full().ravel())
     reached = np.flatnonzero(level >= 0.9 * np.max(level))
-    return float(2.0 * speeds[reached[0]])
+    return 2.0 * max(float(speeds[reached[0]]), 2.0 * blur)
+
+
+def _speed_deviation(angle: float, acceleration: float, time: float) -> float:
+    """Return how well the speed of a free body is known from readings of its angle, before each reading.
+
+    The dry friction of a speed that is known no better is a mean over its deviation: taken at the estimate,
+    noise of the reading would be rectified, and learned as a torque of the spring.
+    """
+    carried = np.array([[1.0, time], [0.0, 1.0]])
+    push = acceleration * np.array([[time**2 / 2.0], [time]])
+    seen, tiny = np.array([[1.0, 0.0]]), 1e-12 * np.diag([angle, angle / time]) ** 2
+    covariance = solve_discrete_are(carried.T, seen.T, push @ push.T + tiny, np.array([[angle**2]]))
+    return math.sqrt(float(covariance[1, 1]))
 
 
 def pairs(size: int) -> list[tuple[int, int]]:
