@@ -12,8 +12,9 @@ from .filter_equations import FilterEquations, pairs
 
 Array = NDArray[np.float64]
 
-DEVIATION, SPREAD = "deviation", "standard_deviation"
-"""Endings of the name of the estimate: slow states, and the deviation that the filter expects."""
+DEVIATION, SPREAD, UNREST = "deviation", "standard_deviation", "unrest"
+"""Endings of the name of the estimate: slow states, the deviation that the filter expects, and the factor on
+the noise that it reckons with."""
 
 
 def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> FlatModel:
@@ -73,6 +74,8 @@ class _Variables:
         for d, name in enumerate(self._slow_names()):
             text = f"distance from the deck in standard deviations; one is {self.directions.in_words(d)}"
             states.append(Variable(f"{name}.{MEMORY}", "1", text))
+        text = "factor on the variances of all noise, from innovations that were larger than expected"
+        states.append(Variable(f"{plant.estimate.name}.{UNREST}", "1", text, 1.0))
         initial = np.concatenate([self._initial_variances(), np.ones(self.slow)])
         names = [*plant.names, *self._slow_names()]
         for i, j in pairs(len(names)):

@@ -18,6 +18,10 @@ from .adaptive_step import AdaptiveStep
 
 Array = NDArray[np.float64]
 
+UNREST_TIME = 1.0
+"""Seconds over which innovations that are larger than expected raise the noise that is reckoned with."""
+MOST_UNREST = 1e4
+"""Largest factor on the variances of that noise."""
 _WIDE = 5.0
 """Deviation of a prediction, in deviations of rounding, beyond which rounding is as good as normal noise."""
 
@@ -177,7 +181,7 @@ class FilterEquations:
         n, slow_count, plant = self.n, self.slow, self.plant
         size = n + slow_count
         memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", slow_count)
-        packed = ca.SX.sym("covariance", size * (size + 1) // 2)
+        packed, unrest = ca.SX.sym("covariance", size * (size + 1) // 2), ca.SX.sym("unrest")
         angle, u = ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
         slopes = self._carried(self._begin(memory, slow), memory, slow)
         before = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
@@ -187,12 +191,14 @@ class FilterEquations:
         direction, moving = self._direction(before, expected[self.speed])
         # A surprise beyond what noise gives teaches the less the larger it is: a drive at its limit or a
         # jump of the encoder is no news of the rubber.
-        surprise = ca.sqrt(off**2 / (variance_of_angle + 1.0) + 1e-12)
+        squared = off**2 / (variance_of_angle + unrest)
+        surprise = ca.sqrt(squared + 1e-12)
         direction[n:] *= ca.fmin(1.0, self.trust.surprise / surprise)
         for i, v in enumerate(plant.inputs):
             if v.name in self.noise.safe_inputs:
                 direction[n:] *= ca.fabs(u[i]) < self.noise.safe_inputs[v.name]
-        moved, kept = within_a_count(off, variance_of_angle)
+        moved, kept = within_a_count(off / ca.sqrt(unrest), variance_of_angle / unrest)
+        moved *= ca.sqrt(unrest)
         step, gain = direction * moved, direction * (1.0 - kept)
         state = expected + step[:n] * self.units
         slow_after = ca.fmin(ca.fmax(slow + step[n:], -self.trust.limit), self.trust.limit)
@@ -209,7 +215,7 @@ class FilterEquations:
         forget = moving * (1.0 - math.exp(-2.0 * self.step.nominal.sample_time / self.trust.drift_time))
         fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
         onward = ca.mtimes(ca.diag(fading), onward)
-        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget)
+        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest)
         row = self._matrix("estimate", 1, n + 1, free)
         wanted = ca.mtimes(row, ca.vertcat(s, 1))
         slopes_of_estimate = self._slopes(wanted, s, free)
@@ -218,8 +224,11 @@ class FilterEquations:
         variance = ca.mtimes([row_at, after, row_at.T]) + self.noise.estimate**2
         shown = state + self._matrix("shift", n, 1, slow_after)
         outputs = [estimate, ca.sqrt(variance), shown, innovation, slow_after]
-        states = [following, slow_after * fading[n:], _packed(next_covariance)]
-        arguments = [ca.SX.sym("time"), ca.vertcat(memory, slow, packed), ca.vertcat(angle, u), ca.SX(0, 1)]
+        excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
+        restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)
+        restless = ca.fmin(ca.fmax(restless, 1.0), MOST_UNREST)
+        states = [following, slow_after * fading[n:], restless, _packed(next_covariance)]
+        arguments = [ca.SX.sym("time"), ca.vertcat(memory, slow, unrest, packed), ca.vertcat(angle, u), ca.SX(0, 1)]
         results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
         return ca.Function(
             "equations",
@@ -232,7 +241,7 @@ class FilterEquations:
         time = self.step.nominal.sample_time
         return self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
 
-    def _process_noise(self, forget: Expression) -> Expression:
+    def _process_noise(self, forget: Expression, unrest: Expression) -> Expression:
         """Return what one sample adds to the covariance.
 
         A torque that stays the same over the correlation time is, to a filter that takes it as white, one of
@@ -244,7 +253,7 @@ class FilterEquations:
         push /= self.units
         size = self.n + self.slow
         noise = ca.SX.zeros(size, size)
-        noise[: self.n, : self.n] = ca.DM(np.outer(push, push))
+        noise[: self.n, : self.n] = unrest * ca.DM(np.outer(push, push))
         for i in range(self.n):
             # Rounding of a small number beside large ones; without it single precision may lose its sign.
             noise[i, i] += 1e-6 if i in (self.angle, self.speed) else 1e-12
