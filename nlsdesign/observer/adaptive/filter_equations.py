@@ -18,6 +18,8 @@ from .adaptive_step import AdaptiveStep
 
 Array = NDArray[np.float64]
 
+FOLLOWING_TIME = 0.01
+"""Seconds by which an angle lags the measured one; their distance says whether the actuator moves at all."""
 UNREST_TIME = 1.0
 """Seconds over which innovations that are larger than expected raise the noise that is reckoned with."""
 MOST_UNREST = 1e4
@@ -188,7 +190,11 @@ class FilterEquations:
         expected = self._begin(memory, slow)
         innovation = angle - expected[self.angle]
         off, variance_of_angle = innovation / self.noise.angle, before[self.angle, self.angle]
-        direction, moving = self._direction(before, expected[self.speed])
+        followed = ca.SX.sym("followed")
+        seen_speed = (angle - followed) / FOLLOWING_TIME
+        direction, moving = self._direction(
+            before, ca.fmin(ca.fabs(expected[self.speed]), ca.fabs(seen_speed))
+        )
         # A surprise beyond what noise gives teaches the less the larger it is: a drive at its limit or a
         # jump of the encoder is no news of the rubber.
         squared = off**2 / (variance_of_angle + unrest)
@@ -227,8 +233,15 @@ class FilterEquations:
         excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
         restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)
         restless = ca.fmin(ca.fmax(restless, 1.0), MOST_UNREST)
-        states = [following, slow_after * fading[n:], restless, _packed(next_covariance)]
-        arguments = [ca.SX.sym("time"), ca.vertcat(memory, slow, unrest, packed), ca.vertcat(angle, u), ca.SX(0, 1)]
+        follows = 1.0 - math.exp(-self.step.nominal.sample_time / FOLLOWING_TIME)
+        behind = followed + follows * (angle - followed)
+        states = [following, slow_after * fading[n:], restless, behind, _packed(next_covariance)]
+        arguments = [
+            ca.SX.sym("time"),
+            ca.vertcat(memory, slow, unrest, followed, packed),
+            ca.vertcat(angle, u),
+            ca.SX(0, 1),
+        ]
         results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
         return ca.Function(
             "equations",
