@@ -37,7 +37,7 @@ from ..scheduling.step import ObserverStep
 from ..scheduling.table import Compact, Grid
 from .adaptive_settings import AdaptiveSettings, Trust
 from .adaptive_step import AdaptiveStep, adaptive_step
-from .adaptive_variables import filter_model
+from .adaptive_variables import FOLLOWED, filter_model
 from .directions import UncertainDirections, uncertain_directions
 from .duty import Duty, operating_points
 from .filter_equations import FilterEquations, FilterNoise
@@ -82,7 +82,8 @@ class AdaptiveDesign:
         matrices = self.step.matrices(at)
         state = plant.rest(at)[0] - matrices["shift"][0, :, 0]
         memory = state - matrices["prior"][0, :, 0] - matrices["coupling"][0] @ state[: self.step.inner]
-        return {f"{n}.{MEMORY}": float(m) for n, m in zip(plant.names, memory, strict=True)}
+        start = {f"{n}.{MEMORY}": float(m) for n, m in zip(plant.names, memory, strict=True)}
+        return start | {f"{plant.angle}.{FOLLOWED}": float(angle)}
 
     def __str__(self) -> str:
         grid = self.compact.angles
