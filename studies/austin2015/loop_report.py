@@ -18,13 +18,16 @@ def loop_sections(results: Results) -> list[Section]:
     return [
         Chapter(
             "Torque loop: what the new design is worth",
-            "The same observer rule, the same controller and the same gains on the published and on the "
-            "designed actuator; only the spring differs.",
+            "The same observer rule (the cascade, with exact numbers), the same controller and the same "
+            "gains on the published and on the designed actuator; only the spring differs.",
         ),
         _errors(results),
         _table(results),
         _one_run(results),
-        Chapter("Co-simulation", "Plant, observer and torque controller as FMUs, wired by name."),
+        Chapter(
+            "Co-simulation",
+            "Plant, the generated observer and torque controller as FMUs, wired by name; exact numbers.",
+        ),
         *(_cosimulated(name, each) for name, each in results.both.items()),
     ]
 
