@@ -103,8 +103,6 @@ class Regeneration:
     observer
         Of the better model, cascade or adaptive, whichever errs less on these records; ``None`` where none
         can be designed.
-    chosen
-        Which, and why.
     reasons
         Why there is no observer, or no comparison; empty if nothing is lacking.
     quantity, unit
@@ -114,6 +112,8 @@ class Regeneration:
     adaptive
         Of the adaptive observer by record, begun at the declared numbers; empty where it cannot be designed
         for both models or a record lacks an input of it.
+    chosen
+        Which observer was taken, and why.
     spread_before, spread_after
         Root mean square error over these records for each draw of the numbers, where an observer could be
         designed.
@@ -248,14 +248,7 @@ def regenerate(
         ObserverTorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
         for run, (a, b) in zip(runs, pairs, strict=True)
     )
-    known_error, learning_error = (_over_records(each)[1] for each in (errors, adaptive))
-    generated: ObserverDesign | AdaptiveDesign = after
-    said = "cascade"
-    if adaptive:
-        learns = learned[1] if learning_error < known_error else None
-        generated = learns if isinstance(learns, AdaptiveDesign) else after
-        kinds = ("cascade", "adaptive observer") if generated is after else ("adaptive observer", "cascade")
-        said = f"{kinds[0]}: it errs less on these records than the {kinds[1]}"
+    generated, chosen = _generated(after, learned[1], errors, adaptive)
     progress("designing observers over the spread of the numbers")
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
@@ -266,7 +259,7 @@ def regenerate(
         (*lacking, *_failures(spread)),
         errors=errors,
         adaptive=adaptive,
-        chosen=said,
+        chosen=chosen,
         spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
         spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
         course=(runs[0].trace.time, runs[0].torque, *pairs[0]),
@@ -317,6 +310,20 @@ def _compared(
         for run, (before, after) in zip(runs, pairs, strict=True)
     )
     return errors, ()
+
+
+def _generated(
+    cascade: ObserverDesign,
+    learning: AdaptiveDesign | str,
+    errors: Sequence[ObserverTorqueError],
+    adaptive: Sequence[ObserverTorqueError],
+) -> tuple[ObserverDesign | AdaptiveDesign, str]:
+    """Return the observer of the better model that errs less on the records, and why in words."""
+    if isinstance(learning, str) or not adaptive:
+        return cascade, "cascade"
+    if _over_records(adaptive)[1] < _over_records(errors)[1]:
+        return learning, "adaptive observer: it errs less on these records than the cascade"
+    return cascade, "cascade: it errs less on these records than the adaptive observer"
 
 
 @dataclass(frozen=True, eq=False)

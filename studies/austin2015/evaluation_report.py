@@ -28,35 +28,35 @@ def evaluation_sections(results: Results) -> list[Section]:
 
 
 def _of_one(name: str, results: ActuatorResults) -> list[Section]:
-    found = results.evaluation
+    judged = results.evaluation
     lost = [
         f"{response.amplitude:g} N·m at {f:.2g} Hz: {verdict}"
-        for response in found.responses
+        for response in judged.responses
         for f, verdict in zip(response.frequency, response.verdicts, strict=True)
         if not verdict.holds
     ]
     return [
         FigureSection(
             f"Desired to actual torque, {name}",
-            nls.figures.torque_responses(found.responses),
+            nls.figures.torque_responses(judged.responses),
             caption="Simulated with counts, friction, delay and limits, at two amplitudes. "
             + (f"Not settled: {'; '.join(lost)}." if lost else "Settled at every frequency."),
         ),
         FigureSection(
             f"Margins over the angle, {name}",
-            nls.figures.margins_over_angle([found.margins]),
+            nls.figures.margins_over_angle([judged.margins]),
             caption="Of the linearised sampled loop, cut at the current, while the machine slides; nothing "
             "where it is unstable or the drive cannot hold the angle.",
-            means=f"{str(found.onset).capitalize()}.",
+            means=f"{str(judged.onset).capitalize()}.",
         ),
         FigureSection(
             f"Output impedance, {name}",
-            nls.figures.impedance_over_frequency(found.impedance),
+            nls.figures.impedance_over_frequency(judged.impedance),
             caption="Torque that a moved load feels. "
             + "; ".join(
                 f"{np.degrees(angle):.0f}°: {passivity_words(float(first))}"
                 for angle, first in zip(
-                    found.impedance.linear.angles, found.impedance.first_active(), strict=True
+                    judged.impedance.linear.angles, judged.impedance.first_active(), strict=True
                 )
             )
             + ".",
@@ -67,17 +67,17 @@ def _of_one(name: str, results: ActuatorResults) -> list[Section]:
 def _table(results: Results) -> TableSection:
     rows = []
     for name, each in results.both.items():
-        found = each.evaluation
-        margin, linear = found.least_gain_margin, found.margins.linear
+        judged = each.evaluation
+        margin, linear = judged.least_gain_margin, judged.margins.linear
         unstable = int(np.sum(linear.reached & ~linear.stable()))
         rows.append(
             (
                 name,
                 f"{margin:.2f}" if np.isfinite(margin) else "none: unstable",
                 f"{unstable} of {int(np.sum(linear.reached))}",
-                *(f"{sum(v.holds for v in r.verdicts)} of {len(r.verdicts)}" for r in found.responses),
-                f"{found.onset.value:.1f}" if np.isfinite(found.onset.value) else "not found",
-                f"{found.onset.linear:.1f}" if np.isfinite(found.onset.linear) else "not found",
+                *(f"{sum(v.holds for v in r.verdicts)} of {len(r.verdicts)}" for r in judged.responses),
+                f"{judged.onset.value:.1f}" if np.isfinite(judged.onset.value) else "not found",
+                f"{judged.onset.linear:.1f}" if np.isfinite(judged.onset.linear) else "not found",
             )
         )
     settled = tuple(f"settled at {a:g} N·m" for a in AMPLITUDES)

@@ -55,8 +55,8 @@ class ObserverOverSpread:
     @property
     def hashes(self) -> dict[str, str]:
         """SHA-256 of the certified C files by name, as the certificate has them."""
-        found = hashes_of_code(self.code.source.parent)
-        return {path.name: found[path.name] for path in (self.code.header, self.code.source)}
+        digests = hashes_of_code(self.code.source.parent)
+        return {path.name: digests[path.name] for path in (self.code.header, self.code.source)}
 
 
 def over_spread(
