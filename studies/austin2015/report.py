@@ -66,7 +66,7 @@ def write_page(results: Results, out: Path) -> None:
 def key_numbers(results: Results) -> Section:
     """Return what stands at the top of the page."""
     numbers, assumed = results.numbers, nls.sources(results.published.actuator.quantities())["assumed"]
-    old, new = (each.followed(32.0, 5.0).error.relative_error for each in results.both.values())
+    old, new = (each.followed(32.0, 5.0).relative_error for each in results.both.values())
     design, trimmed = (
         numbers["design_torque_error_mNm_rms"], numbers["design_quantile_after_trim_mNm_rms"]
     )  # fmt: skip
