@@ -63,7 +63,7 @@ def work_up(
     with steps.step(f"observers, on the bench and with the load free, {name}"):
         observers = compare_observers(actuator, model, 2.0 if fast else 5.0)
     with steps.step(f"observers over the spread, and what is proved, {name}"):
-        spread = over_spread(model, observers, deck, out, 4 if fast else 24)
+        spread = over_spread(model, observers, deck, out, 4 if fast else 16)
     with steps.step(f"torque loop, {name}"):
         following = follow_sines(model, observers.minimal)
         evaluation = evaluate_loop(actuator, model, observers.minimal, 6 if fast else 12)

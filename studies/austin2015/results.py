@@ -109,6 +109,11 @@ class Results:
                 f"{name}_cosimulation_difference_Nm": difference,
                 f"{name}_nominal_error_minimal_form_mNm_rms": 1e3 * each.observers.minimal_error,
                 f"{name}_nominal_error_published_form_mNm_rms": 1e3 * each.observers.published_error,
+                f"{name}_expected_over_spread_cascade_mNm_rms": 1e3 * each.spread.chosen.expected[0],
+                f"{name}_expected_over_spread_best_mNm_rms": 1e3 * min(each.spread.chosen.expected),
+                f"{name}_certified_decay_per_s": each.spread.certificate.decay,
+                f"{name}_certified_condition": each.spread.certificate.condition,
+                f"{name}_onset_of_limit_cycling_Kp": each.evaluation.onset.value,
                 f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
             }
         return numbers | tracking_numbers({name: each.following for name, each in self.both.items()})

@@ -52,6 +52,12 @@ class ObserverOverSpread:
     code: CSource
     file: Path
 
+    @property
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of the certified C files by name, as the certificate has them."""
+        digests = hashes_of_code(self.code.source.parent)
+        return {path.name: digests[path.name] for path in (self.code.header, self.code.source)}
+
 
 def over_spread(
     model: nls.FlatModel, observers: ObserverComparison, deck: Path, out: Path, draws: int
@@ -61,7 +67,9 @@ def over_spread(
     compared = {
         "best": chosen.model, "cascade": observers.minimal.model, "published form": observers.published.model,
     }  # fmt: skip
-    errors = observer_errors(compared, bench_trial(model), draws=draws, bounded=2, translate=natively)
+    errors = observer_errors(
+        compared, bench_trial(model), draws=draws, bounded=1 if draws < 8 else 2, translate=natively
+    )
     angles = np.radians(np.linspace(-50.0, 50.0, 101))
     drops = rank_drops(model, angles=angles, angle="motor.angle", measured=("motor.angle",))
     design = nls.observer.design_observer_with_details(model, gain=CertifiedGain())
