@@ -144,9 +144,7 @@ def certify_continuous(
     )  # fmt: skip
 
 
-def _designed(
-    system: ErrorSystem, decay: float | None, condition: float
-) -> tuple[GainAndLyapunov, float]:
+def _designed(system: ErrorSystem, decay: float | None, condition: float) -> tuple[GainAndLyapunov, float]:
     """Return a gain and P, rounded and decided in fractions, and their decay."""
     matrices, most = system.scaled_corners(), 2.0 * math.pi * BANDWIDTH
     rows = sorted({*system.moving, *system.seen}), list(range(len(system.states)))
@@ -264,7 +262,7 @@ def covers(claimed: ErrorSystem, again: ErrorSystem) -> bool:
     """
     low, high, least, most = (np.array(v) for v in (claimed.lower, claimed.upper, again.lower, again.upper))
     spare = 1e-7 * np.maximum(np.abs(least), np.abs(most))
-    alike = (same.states, same.moving, same.seen, same.angles) == (
+    alike = (again.states, again.moving, again.seen, again.angles) == (
         claimed.states, claimed.moving, claimed.seen, claimed.angles,
     )  # fmt: skip
     return alike and bool(np.all(low <= least + spare) and np.all(high >= most - spare))

@@ -130,7 +130,8 @@ def error_system(
     for k in range(n * n):
         if k != fast * n + fast and ca.depends_on(others[k], speed):
             raise ArrangementError(
-                f"rate of '{plant.names[k // n]}'", f"is not linear in '{plant.names[k % n]}' at a given angle",
+                f"rate of '{plant.names[k // n]}'",
+                f"is not linear in '{plant.names[k % n]}' at a given angle",
                 next_step="a certificate in continuous time needs friction that depends on the speed alone",
             )  # fmt: skip
     entries = ca.Function("slopes", [theta, speed], [others])
@@ -183,9 +184,9 @@ def _slopes(
     slopes[:, angle] = 0
     for i in inner:  # what follows the speed is carried as a function of the measured angle
         slopes[i, speed] = 0
-    known = [(s.parameter, ca.DM(model.start(model.parameters)))]
+    known = [(s.parameter, ca.SX(ca.DM(model.start(model.parameters))))]
     if published:
-        known.append((s.input, ca.DM(model.start(model.inputs))))
+        known.append((s.input, ca.SX(ca.DM(model.start(model.inputs)))))
         own = named(model, s)
         known += [(own[name], own[f"{name}.{GEOMETRIC}"]) for name in plant.measured]
     for symbol, value in reversed(known):

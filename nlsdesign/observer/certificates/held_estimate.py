@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 LARGEST = 100.0
 """Boxes up to so many times as wide as the range of an inner state at the deck are tried."""
-GROWTH = 1.05
+NARROWINGS = 5
 
 
 class LearningStep(Protocol):
@@ -149,8 +149,8 @@ def held_estimate_bound(
         least, most = 0.0, limit
         while most - least > 1e-3 * limit:
             middle = (least + most) / 2.0
-            held = all(table.box(k, middle) is not None for k in range(table.inner))
-            least, most = (middle, most) if held else (least, middle)
+            stays = all(table.box(k, middle) is not None for k in range(table.inner))
+            least, most = (middle, most) if stays else (least, middle)
         name = table.names[next(k for k, box in enumerate(boxes) if box is None)]
         raise ValueRangeError(
             f"slow states up to {limit:g} deviations",
@@ -191,7 +191,8 @@ class _Table:
             wrong = [key for key in row if places[key].column is not None or places[key].factor != 0.0]
             if wrong:
                 raise ArrangementError(
-                    f"bound of the estimate, entry {wrong[0]}", "another state or an input enters an inner state"
+                    f"bound of the estimate, entry {wrong[0]}",
+                    "another state or an input enters an inner state",
                 )  # fmt: skip
 
     def _inputs(self, kind: str) -> range:
@@ -224,17 +225,25 @@ class _Table:
         The next state is affine in the state, in each slow state and, within cells, in both angles, so the
         corners of the box and the grid points decide for all angles that follow each other, also by a jump.
         """
-        box = self.deck_box(k)
-        width = max(float(box[1] - box[0]), 1e-12)
-        middle = float(box[0] + box[1]) / 2.0
-        size = 1.0
-        while size <= LARGEST:
+        deck = self.deck_box(k)
+        width = max(float(deck[1] - deck[0]), 1e-12)
+        middle = float(deck[0] + deck[1]) / 2.0
+
+        def tried(size: float) -> tuple[float, float] | None:
             ends = middle - size * width / 2.0, middle + size * width / 2.0
             low, high = self._reached(k, ends, limit)
-            if low >= ends[0] and high <= ends[1]:
-                return ends
-            size *= GROWTH
-        return None
+            return ends if low >= ends[0] and high <= ends[1] else None
+
+        size, found = 1.0 + 1e-6, None
+        while found is None and size <= LARGEST:
+            size, found = 1.5 * size, tried(size)
+        least, most = size / 2.25, size / 1.5
+        for _ in range(NARROWINGS if found is not None else 0):
+            between = (least + most) / 2.0
+            narrower = tried(between)
+            least, most = (between, most) if narrower is None else (least, between)
+            found = narrower or found
+        return found
 
     def _reached(self, k: int, box: tuple[float, float], limit: float) -> tuple[float, float]:
         """Return the range of the next state from a box, over all angles and slow states."""
@@ -259,6 +268,8 @@ class _Table:
         total = np.zeros((len(self.compact.angles),) * 2)
         for d in range(self.slow):
             kept, drive, prior = (self.read(f"{key}[{k}][{j}]") for key, j in self._keys(k, d))
+            if not (np.any(kept) or np.any(drive) or np.any(prior)):
+                continue
             both = (kept * z + drive)[:, None] + prior[None, :]
             total += limit * (np.abs(both) + self.faded * np.abs(prior)[None, :])
         return total
