@@ -10,6 +10,7 @@ from ..errors import NlsError
 from ..locations import version
 from .analyse import analyse
 from .analyse_angle import analyse_angle
+from .analyse_loop import loop
 from .calibrate import calibrate
 from .cosimulate import cosimulation
 from .decks import deck
@@ -37,7 +38,7 @@ for command in (
     *(cosimulation, simulate, fit, diagnose, study),
 ):
     program.add_command(command)
-for analysis in (analyse_angle,):  # the first is the default
+for analysis in (analyse_angle, loop):  # the first is the default
     analyse.add_command(analysis)
 
 

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..errors import ArrangementError
 from .output import json_option, show_json
 
 if TYPE_CHECKING:
     from ..deck import Deck
+    from ..export import CSource
     from ..model import FlatModel
+    from ..observer import Certificate
+    from .observer_kinds import DesignedObserver
 
 CERTIFICATE = "certificate.json"
 
@@ -37,44 +41,65 @@ class ToProve:
     real: str
 
 
-def write_certified(
-    plant: FlatModel, deck: Deck, out: Path, *, sample_time: float, wanted: ToProve, **roles: str | None
-) -> None:
-    """Write an observer as C, with a certificate beside it.
+def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve) -> Certificate:
+    """Prove what can be proved of an observer.
 
     Parameters
     ----------
     plant, deck
         Flat model of an actuator, and its deck.
-    out
-        Folder.
-    sample_time
-        In s.
+    chosen
+        Cascade or certified gain.
     wanted
         What is to be proved.
-    roles
-        ``spring`` and ``measured``, where the structure leaves them open.
-    """
-    from ..export import export_c
-    from ..model.roles import measured_motion, series_spring
-    from ..observer import CertifiedGain, certify, declared_assumptions, write_certificate
-    from ..observer.scheduling.scheduled import design_observer_with_details
 
-    design = design_observer_with_details(
-        plant, estimate=series_spring(plant, roles.get("spring")).effort,
-        measured=measured_motion(plant, roles.get("measured")),
-        sample_time=sample_time, gain=None if wanted.decay is None else CertifiedGain(decay=wanted.decay),
-    )  # fmt: skip
+    Raises
+    ------
+    ArrangementError
+        If observers of that kind cannot be certified.
+    """
+    from ..observer import ObserverDesign, certify, declared_assumptions
+
+    design = chosen.design
+    if not isinstance(design, ObserverDesign):
+        raise ArrangementError(
+            f"observer of kind '{chosen.kind}'", "cannot be certified", next_step="take --kind certified"
+        )
     spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if wanted.with_spread else {}
     assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real)
     text = deck.path.read_text(encoding="utf-8-sig")
-    proved = certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
-    source = export_c(design.model, out, real=wanted.real, name="observer")
-    proved = replace(proved, code=_hashes(source.header, source.source))
-    path = write_certificate(proved, out / CERTIFICATE)
-    for sentence in proved.statement:
-        click.echo(sentence)
-    click.echo(f"written: {path}, {source.header}, {source.source}, {source.selftest}")
+    return certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
+
+
+def with_statement(observer: FlatModel, proved: Certificate) -> FlatModel:
+    """Return an observer whose description, and so the head of its C code, ends with what is proved.
+
+    Parameters
+    ----------
+    observer
+        As designed.
+    proved
+        Its certificate.
+    """
+    words = " ".join(proved.statement)
+    return replace(observer, description=f"{observer.description}; certified, see {CERTIFICATE}: {words}")
+
+
+def write_proved(proved: Certificate, out: Path, source: CSource) -> Path:
+    """Write the certificate beside the C code, with the hashes of both files.
+
+    Parameters
+    ----------
+    proved
+        Without the hashes.
+    out
+        Folder.
+    source
+        The C code.
+    """
+    from ..observer import write_certificate
+
+    return write_certificate(replace(proved, code=_hashes(source.header, source.source)), out / CERTIFICATE)
 
 
 def _hashes(*files: Path) -> dict[str, str]:

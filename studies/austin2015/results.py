@@ -11,8 +11,10 @@ from nlsdesign.analysis import Chart
 from nlsdesign.discrepancy import Verdict
 
 from .._designed import MadeCam
+from .evaluation import LoopEvaluation
 from .figures import FigureComparison
 from .observer import ObserverComparison
+from .spread import ObserverOverSpread
 from .torque_loop import TorqueLoop
 from .tracking import Following, tracking_numbers
 
@@ -33,6 +35,10 @@ class ActuatorResults:
         Closed torque loop on sines of the wanted torque.
     loop
         Generated code and the co-simulated torque loop.
+    spread
+        Errors of the observers over the spread of the deck, and what is proved.
+    evaluation
+        Verdicts, margins, impedance and onset of limit cycling of the torque loop.
     """
 
     actuator: nls.Assembly
@@ -41,6 +47,8 @@ class ActuatorResults:
     observers: ObserverComparison
     following: tuple[Following, ...]
     loop: TorqueLoop
+    spread: ObserverOverSpread
+    evaluation: LoopEvaluation
 
     @property
     def rank_at_zero(self) -> float:

@@ -25,13 +25,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ArrangementError, ValueRangeError
+from ...errors import ArrangementError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
 from ...simulation.prior import Prior, declared_prior
 from ..scheduling.forms import finished, minimal_form
 from ..scheduling.gains import CascadeGain
-from ..scheduling.scheduled import MEMORY, whole_contour
+from ..scheduling.scheduled import MEMORY, check_sampling, whole_contour
 from ..scheduling.step import ObserverStep
 from ..scheduling.table import Compact, Grid
 from .adaptive_settings import AdaptiveSettings, Trust
@@ -134,12 +134,12 @@ def design_adaptive_observer(
         If no number of the deck is uncertain enough to matter, no encoder of the angle is declared, or the
         equations cannot be scheduled over one angle.
     ValueRangeError
-        If the estimate is far from linear in the inner states, or a setting is out of range.
+        If the model is discrete, the estimate is far from linear in the inner states, or a setting is out of
+        range.
     ConvergenceError
         If the table does not keep its error bound.
     """
-    if not 0.0 < sample_time < 1.0:
-        raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
+    check_sampling(model, sample_time)
     settings = settings or AdaptiveSettings()
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     trust, over = settings.trust, grid or whole_contour(model)
