@@ -59,8 +59,7 @@ def evaluate_loop(
     angles, frequencies = np.radians(np.linspace(0.0, 50.0, 26)), np.geomspace(0.5, 11.0, count)
     return LoopEvaluation(
         tuple(
-            sine_response(fixed, amplitude=a, frequencies=frequencies, translate=natively)
-            for a in AMPLITUDES
+            sine_response(fixed, amplitude=a, frequencies=frequencies, translate=natively) for a in AMPLITUDES
         ),
         loop_margins(fixed, angles),
         output_impedance(free, angles[::5]),

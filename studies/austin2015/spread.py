@@ -66,9 +66,7 @@ def over_spread(
     drops = rank_drops(model, angles=angles, angle="motor.angle", measured=("motor.angle",))
     design = nls.observer.design_observer_with_details(model, gain=CertifiedGain())
     text = deck.read_text(encoding="utf-8")
-    proved = certify(
-        model, design, assumptions=declared_assumptions(model, design), deck=(deck.stem, text)
-    )
+    proved = certify(model, design, assumptions=declared_assumptions(model, design), deck=(deck.stem, text))
     words = f"{design.model.description}; certified, see certificate.json: {' '.join(proved.statement)}"
     code = nls.export_c(replace(design.model, description=words), out / "certified", name="observer")
     hashes = hashes_of_code(out / "certified")

@@ -18,7 +18,7 @@ from .held_estimate import (
 )
 from .polytope import ErrorPolytope, error_polytope
 from .torque_bound import Assumptions, TorqueErrorBound, torque_bound
-from .verification import Check, CodeToCompare, Verification, verify
+from .verification import Check, CodeToCompare, Verification, certified_design, verify
 
 __all__ = [
     "Assumptions",
@@ -35,6 +35,7 @@ __all__ = [
     "TorqueErrorBound",
     "Verification",
     "certificate_text",
+    "certified_design",
     "certify",
     "certify_continuous",
     "certify_held_estimate",

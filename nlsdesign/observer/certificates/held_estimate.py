@@ -24,6 +24,7 @@ from ..scheduling.scheduled import ObserverDesign
 from ..scheduling.step import ObserverStep
 from ..scheduling.table import ColumnPlace, Compact
 from .box_bound import clamped_estimate_bound
+from .certificate import declared_assumptions
 from .exact import corners
 from .torque_bound import OPERATIONS, ROUNDING, SLACK, Assumptions, torque_bound
 
@@ -305,6 +306,19 @@ class _Table:
             bound = clamped_estimate_bound(rows, held, np.zeros_like(held))
             worst = max(worst, bound + self.rounding * size)
         return worst
+
+
+def held_assumptions(model: FlatModel, design: LearningDesign) -> Assumptions:
+    """Return the whole table, and half a count of the encoder that the deck declares.
+
+    Parameters
+    ----------
+    model
+        Its readings say how the angle is measured.
+    design
+        The adaptive observer.
+    """
+    return declared_assumptions(model, _nominal(design))
 
 
 @dataclass(frozen=True, eq=False)

@@ -244,15 +244,38 @@ def _differs(one: Path, other: Path, name: str) -> bool:
 Again: TypeAlias = tuple[FlatModel, ObserverDesign] | Check
 
 
+def certified_design(
+    certificate: Certificate, model: FlatModel, *, grid: Grid | None = None
+) -> ObserverDesign:
+    """Return the observer of a certificate, designed from its deck with its gain: what belongs into C.
+
+    Parameters
+    ----------
+    certificate
+        Of a scheduled observer.
+    model
+        Flat model of its deck.
+    grid
+        With which it was designed, if not the default one.
+
+    Raises
+    ------
+    NlsError
+        If the model does not give this observer.
+    """
+    return design_observer_with_details(
+        model.with_values(dict(certificate.parameters)), estimate=certificate.estimate,
+        measured=certificate.measured, sample_time=certificate.polytope.sample_time,
+        gain=certificate.gain, grid=grid,
+    )  # fmt: skip
+
+
 def _designed_again(certificate: Certificate, model: FlatModel | None, grid: Grid | None) -> Again:
     if model is None:
         return Check("table and torque bound", None, "needs the deck")
     try:
         changed = model.with_values(dict(certificate.parameters))
-        return changed, design_observer_with_details(
-            changed, estimate=certificate.estimate, measured=certificate.measured,
-            sample_time=certificate.polytope.sample_time, gain=certificate.gain, grid=grid,
-        )  # fmt: skip
+        return changed, certified_design(certificate, model, grid=grid)
     except NlsError as error:  # the deck does not give this observer, whatever the reason
         return Check("table", False, str(error))
 
