@@ -89,9 +89,11 @@ def certify_adaptive_estimate(
 
     _, text, plant = _plant(deck_name)
     trust = Trust() if limit is None else Trust(limit=limit)
+    roles = _roles(plant, options)
     design = design_adaptive_observer(
-        plant, sample_time=sample_time, settings=AdaptiveSettings(trust=trust), **_roles(plant, options)
-    )
+        plant, estimate=roles["estimate"], measured=roles["measured"], sample_time=sample_time,
+        settings=AdaptiveSettings(trust=trust),
+    )  # fmt: skip
     assumed = replace(held_assumptions(plant, design), real=real, **given_ranges(options))
     proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
     source = export_c(with_statement(design.model, proved), out, real=real, name="observer")
@@ -115,7 +117,8 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
 
     if model is None or not isinstance(proved, HeldEstimateCertificate):
         return None
-    trust = Trust(**{k: int(v) if k == "most" else v for k, v in proved.settings.items()})
+    numbers = dict(proved.settings)
+    trust = Trust(most=int(numbers.pop("most")), **numbers)
     return design_adaptive_observer(
         model.with_values(dict(proved.parameters)), estimate=proved.estimate, measured=proved.measured,
         sample_time=proved.sample_time, settings=AdaptiveSettings(trust=trust),
