@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import nlsdesign as nls
 from nlsdesign.components import Backlash, Rounded, Tie
-from nlsdesign.control import TorqueGains, with_fine_counts
+from nlsdesign.control import LoopJudge, TorqueGains, with_fine_counts
 
-from .benches import Cause, angle_of, linear_spring
+from .benches import NONLINEAR, Bench, Cause, angle_of, linear_spring
 
 FAST_VELOCITY = 100.0  # Hz; the largest that a loop of 1 kHz carries
 SLOW_VELOCITY = 15.0  # Hz
@@ -25,9 +25,9 @@ def secant_spring(torque: float) -> Cause:
 
 
 def tangent_spring(torque: float) -> Cause:
-    """Replace the cam by a linear spring as stiff as the cam is at a torque."""
-    slope = 2.09 * torque / angle_of(torque)
-    return Cause("linear spring of the same tangent", known=linear_spring(slope))
+    """Replace the cam by a linear spring as stiff as the cam is anywhere up to a torque."""
+    slope = LoopJudge(Bench(NONLINEAR).loop()).stiffness(angle_of(torque))
+    return Cause("linear spring of the largest tangent stiffness", known=linear_spring(slope))
 
 
 def _without_relaxation(actuator: nls.Assembly) -> nls.Assembly:
@@ -80,7 +80,8 @@ def _with_backlash(actuator: nls.Assembly) -> nls.Assembly:
 
 def _viscous(actuator: nls.Assembly) -> nls.Assembly:
     name = "spring.rubber.relaxing.dashpot.viscosity"
-    return actuator.with_values({name: VISCOUS * actuator.quantities()[name].value_si})
+    viscosity = actuator.quantities()[name]
+    return actuator.with_values({name: viscosity.with_value(VISCOUS * viscosity.number)})
 
 
 def _coarse_load(plant: nls.FlatModel) -> nls.FlatModel:
