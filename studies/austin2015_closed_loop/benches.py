@@ -23,7 +23,7 @@ from nlsdesign.control import (
     zero_torque,
 )
 from nlsdesign.export import natively
-from nlsdesign.observer import CascadeGain
+from nlsdesign.observer import CascadeGain, GridByTolerance
 
 from .late_torque import late_torque
 
@@ -39,6 +39,9 @@ FILES = {NONLINEAR: "nls", SOFT: "soft_spring", STIFF: "stiff_spring"}
 """How the files of the points call the springs."""
 LOW, HIGH = 0.8, 2.8
 """Amplitudes of Fig. 10 in N·m."""
+
+REACH = GridByTolerance(lower=-2.0, upper=2.0)
+"""Angles in rad that the observer of a linear spring covers: the soft one turns 1.65 rad at 2.8 N·m."""
 
 OUTPUTS = ("motor.angle", "spring.torque")
 POWER_LAW = (4.35, 2.09)
@@ -133,7 +136,9 @@ class Bench:
     def loop(self, *, moved: bool = False) -> ClosedLoop:
         """Return the closed loop, with the load fixed or moved."""
         bench = nls.flatten(self.actuator, outputs=list(OUTPUTS))
-        observer = nls.design_observer(bench, gain=CascadeGain())
+        # A cam ends by itself; where there is none the observer's own range would end at 90 degrees.
+        reach = None if any(spring.cams for spring in bench.springs) else REACH
+        observer = nls.design_observer(bench, gain=CascadeGain(), grid=reach)
         if self.law is None:
             controller = torque_controller(bench, gains=self.cause.gains(self.gains))
         else:
