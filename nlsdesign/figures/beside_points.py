@@ -55,9 +55,7 @@ class PointPanel:
 
 
 @styled
-def curves_beside_points(
-    shown: Sequence[PointPanel], *, across: str, words: str, columns: int = 1
-) -> Figure:
+def curves_beside_points(shown: Sequence[PointPanel], *, across: str, words: str, columns: int = 1) -> Figure:
     """Draw curves as lines and points as hollow marks, over a logarithmic abscissa.
 
     Parameters
@@ -90,9 +88,7 @@ def curves_beside_points(
                 color=tone, linestyle="none", marker="x", markeredgewidth=1.6,
             )  # fmt: skip
             if label in panel.points:
-                axis.plot(
-                    *panel.points[label], color=tone, linestyle="none", marker=point, fillstyle="none"
-                )
+                axis.plot(*panel.points[label], color=tone, linestyle="none", marker=point, fillstyle="none")
         if panel.logarithmic:
             log_axis(axis)
         axis.set_title(panel.title)

@@ -56,7 +56,7 @@ class FeltTorque:
     added: Mapping[str, tuple[float, str]]
 
     def deviation(self, spring: str, *, late: bool, up_to: float) -> float:
-        """Return the largest relative deviation from the points from 0.5 Hz up to a frequency; NaN if lost."""
+        """Return the largest relative deviation from the points up to a frequency; NaN if lost."""
         result = (self.late if late else self.prompt)[spring]
         chosen = result.frequency <= 1.01 * up_to
         wanted = np.interp(result.frequency[chosen], *self.points[spring].T)

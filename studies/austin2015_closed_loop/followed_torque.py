@@ -98,7 +98,7 @@ FollowedTorque = Mapping[tuple[str, str, str], Followed]
 def followed_torque(*, fast: bool = False) -> FollowedTorque:
     """Simulate Fig. 10 for the three springs at the published frequencies."""
     result = {}
-    for setting in SETTINGS:
+    for setting in (GENTLE, LATE_TORQUE) if fast else SETTINGS:
         for amplitude in AMPLITUDES:
             for spring in DECKS:
                 bench = Bench(spring, setting.gains, late=setting.late)
@@ -112,7 +112,8 @@ def followed_torque(*, fast: bool = False) -> FollowedTorque:
 def published_response(amplitude: str, spring: str) -> Array:
     """Return frequency in Hz, magnitude in dB and phase in degrees of Fig. 10, shape (n, 3)."""
     magnitude, phase = (
-        figure_points(f"fig10_{amplitude}_amplitude_{each}_{FILES[spring]}") for each in ("magnitude", "phase")
+        figure_points(f"fig10_{amplitude}_amplitude_{each}_{FILES[spring]}")
+        for each in ("magnitude", "phase")
     )
     return np.column_stack([magnitude, phase[:, 1]])
 

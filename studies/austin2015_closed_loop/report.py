@@ -13,7 +13,7 @@ from nlsdesign.report import Chapter, FigureSection, Section, TableSection, writ
 from .._published import figure_points
 from .benches import DECKS, FILES, NONLINEAR, SOFT, STIFF
 from .felt_torque import FeltTorque
-from .followed_torque import AMPLITUDES, GENTLE, LATE_TORQUE, SETTINGS, FollowedTorque
+from .followed_torque import AMPLITUDES, GENTLE, LATE_TORQUE, FollowedTorque
 from .scheduled_law import GOALS, ScheduledLaw
 from .statement import Statement
 from .statements import static_torque
@@ -26,7 +26,12 @@ NOT_PRINTED = (
 
 
 def write_page(
-    out: Path, felt: FeltTorque, followed: FollowedTorque, *, law: ScheduledLaw, statements: tuple[Statement, ...]
+    out: Path,
+    felt: FeltTorque,
+    followed: FollowedTorque,
+    *,
+    law: ScheduledLaw,
+    statements: tuple[Statement, ...],
 ) -> None:
     """Write figures and report."""
     pictures = {"fig08": _torque(), "fig09": _felt(felt)}
@@ -42,9 +47,9 @@ def write_page(
         FigureSection(
             "Fig. 9", pictures["fig09"],
             caption="Lines are simulated, marks published; a cross at the lower edge is a loop that does not "
-            "settle. Left Kp 64, Ki 110 (linear) and Kp 135, Ki 100 (nonlinear), ±20°. Right Kp 32, Ki 50 and "
+            "settle. Left Kp 64, Ki 110 (linear), Kp 135, Ki 100 (nonlinear), ±20°. Right Kp 32, Ki 50 and "
             "Kp 70, Ki 100, ±10°, the torque 8 ms late.",
-            means="To 2 Hz all is gain and amplitude. Above, a late torque lifts the linear springs onto their "
+            means="To 2 Hz all is gain and amplitude. Above, a late torque lifts the linear springs to their "
             "points; the rise of the nonlinear one beyond 6 Hz is not reproduced.",
             assumed=NOT_PRINTED,
         ),
@@ -97,13 +102,16 @@ def _followed(followed: FollowedTorque, amplitude: str) -> Figure:
                 PointPanel(
                     setting.name if column == 1 else "",
                     up,
-                    {s: (f.response.frequency, f.decibel if column == 1 else f.phase) for s, f in each.items()},
+                    {
+                        s: (f.response.frequency, f.decibel if column == 1 else f.phase)
+                        for s, f in each.items()
+                    },
                     {s: (f.published[:, 0], f.published[:, column]) for s, f in each.items()},
                 )
             )
     return nls.figures.curves_beside_points(
         panels, across=ACROSS, columns=2,
-        words=f"Desired to actual torque at {AMPLITUDES[amplitude]:g} N·m for three springs, simulated with two "
+        words=f"Desired to actual torque at {AMPLITUDES[amplitude]:g} N·m for three springs, simulated with 2 "
         "settings and published: magnitude above, phase below.",
     )  # fmt: skip
 
@@ -125,13 +133,10 @@ def _section(picture: Figure, amplitude: str) -> FigureSection:
 
 def _deviations(followed: FollowedTorque) -> TableSection:
     rows = []
-    for setting in SETTINGS:
-        for amplitude in AMPLITUDES:
-            for spring in DECKS:
-                one = followed[setting.name, amplitude, spring]
-                db, degrees = one.deviation
-                rows.append((setting.name, AMPLITUDES[amplitude], spring, db, degrees,
-                             f"{one.lost} of {len(one.published)}"))  # fmt: skip
+    for (setting, amplitude, spring), one in followed.items():
+        db, degrees = one.deviation
+        lost = f"{one.lost} of {len(one.published)}"
+        rows.append((setting, AMPLITUDES[amplitude], spring, db, degrees, lost))
     return TableSection(
         "Fig. 10: rms deviation from the published points",
         ("setting", "N·m", "spring", "dB", "degrees", "points without a settled answer"),
@@ -141,9 +146,7 @@ def _deviations(followed: FollowedTorque) -> TableSection:
 
 
 def _law(law: ScheduledLaw) -> TableSection:
-    rows = tuple(
-        (f"{f:g} Hz", error, GOALS[f], str(verdict)) for f, (error, verdict) in law.errors.items()
-    )
+    rows = tuple((f"{f:g} Hz", error, GOALS[f], str(verdict)) for f, (error, verdict) in law.errors.items())
     return TableSection(
         "Speed by tangent stiffness, 2.8 N·m",
         ("sine", "error over desired torque", "goal", "verdict"),

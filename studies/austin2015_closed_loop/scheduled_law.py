@@ -37,7 +37,9 @@ class ScheduledLaw:
     @property
     def held(self) -> float:
         """Share of the draws in which both held torques settle."""
-        kept = np.all([[v.holds for v in each.verdicts] for each in self.spreads if not each.frequency], axis=0)
+        kept = np.all(
+            [[v.holds for v in each.verdicts] for each in self.spreads if not each.frequency], axis=0
+        )
         return float(np.mean(kept))
 
     @property

@@ -18,7 +18,7 @@ from .statement import NOT_REPRODUCED, OTHERWISE, REPRODUCED, Statement, Trial, 
 
 OVERSHOOT = np.array([2.0, 3.0, 4.0, 5.0])  # Hz
 STRONG = TorqueGains(proportional=32.0, integral=800.0)
-STABILITY = np.array([1.0, 2.0, 3.0, 5.0, 11.0])  # Hz
+STABILITY = np.array([1.0, 1.5, 3.0, 5.0, 11.0])  # Hz; at 2 Hz the loop that is shown is at the edge
 HARD = TorqueGains(proportional=40.0, integral=800.0)
 HARDER = TorqueGains(proportional=70.0, integral=100.0)
 LATE = 6  # ms
@@ -67,13 +67,13 @@ def instability(*, fast: bool = False) -> tuple[Statement, dict[str, float]]:
     statement = Statement(
         "Paper: at 2.8 N·m the nonlinear spring is unstable beyond 2 Hz",
         REPRODUCED if shown else NOT_REPRODUCED,
-        "With Kp 40, Ki 800 the loop settles to 2 Hz and limit-cycles at "
-        f"{', '.join(f'{f:g}' for f in beyond)} Hz. With Kp 70 it limit-cycles at all frequencies, and what "
+        "With Kp 40, Ki 800 the loop settles at 1 and 1.5 Hz, is at the edge at 2 Hz and limit-cycles at "
+        f"{', '.join(f'{f:.3g}' for f in beyond)} Hz. With Kp 70 it limit-cycles at all of them, and what "
         f"cures that, one at a time, is: {'; '.join(cured) or 'nothing tried'}. "
         + (
             "A linear spring as stiff as the cam is at most does the same as the cam: fixed gain times "
-            "stiffness and delay, neither relaxation nor integral."
-            if not settles(stiff) else "A linear spring as stiff as the cam is at most settles: not stiffness."
+            "stiffness, and the delay."
+            if not settles(stiff) else "A linear spring as stiff as the cam is at most settles."
         ),
         _trials(found),
     )  # fmt: skip
@@ -96,9 +96,12 @@ def gentle_integral() -> tuple[Statement, dict[str, float]]:
     statement = Statement(
         "Paper: with a gentler integral the loop is stable to 11 Hz at 2.8 N·m",
         (OTHERWISE if by_gain else REPRODUCED) if settles(pairs[32, 100, 0]) else NOT_REPRODUCED,
-        "Kp 32, Ki 100 settles to 11 Hz. On the deck as it is, Kp decides: Kp 32 settles with Ki 800 as well, "
-        "Kp 40 does not even without an integral."
-        + (f" If the torque comes {LATE} ms late, Ki decides at Kp 20: 0 settles, 400 does not." * by_integral),
+        "Kp 32, Ki 100 settles to 11 Hz. On the deck as it is, Kp decides: 32 settles with Ki 800 as well, "
+        "40 does not even without an integral."
+        + (
+            f" If the torque comes {LATE} ms late, Ki decides at Kp 20: 0 settles, 400 does not."
+            * by_integral
+        ),
         _trials({f"Kp {a}, Ki {b}" + f", torque {c} ms late" * bool(c): r for (a, b, c), r in pairs.items()}),
     )
     return statement, {
@@ -144,17 +147,17 @@ def impedance(felt: FeltTorque) -> tuple[tuple[Statement, ...], dict[str, float]
     lower = Statement(
         "Paper: the nonlinear spring has less output impedance than both linear ones up to 9 Hz",
         REPRODUCED if below else NOT_REPRODUCED,
-        "With Kp 135 against 64 and ±20° (assumed; they meet all nine points to 2 Hz within 10 %) its torque is "
-        "below both wherever it settles. To 2 Hz that is the gain, for there the torque is θω/(√2·Kp) whatever "
+        "With Kp 135 against 64 and ±20° (assumed; they meet all nine points to 2 Hz) its torque is "
+        "below both wherever it settles. To 2 Hz that is the gain: there the torque is θω/(√2·Kp) whatever "
         "the spring; the dead zone does the rest.",
         tuple(Trial(f"{s}, ±20°", f"{1e3 * felt.prompt[s].rms[0]:.1f} mN·m at 0.5 Hz") for s in DECKS),
     )
     rise = Statement(
         f"Paper: the torque of the nonlinear spring rises to {last:.2f} N·m rms at 11 Hz",
         NOT_REPRODUCED if reached < 0.8 * last else REPRODUCED,
-        f"At most {reached:.2f} N·m with one cause added at a time. The spring alone, its motor at rest, would "
-        f"give {alone[10.0]:.2f} N·m at ±10° and {alone[20.0]:.2f} at ±20°: so the published torque means that "
-        "the motor moved against the load, as in a loop near its limit of stability. A torque that comes 8 ms "
+        f"At most {reached:.2f} N·m with one cause added at a time. The spring alone, motor at rest, would "
+        f"give {alone[10.0]:.2f} N·m at ±10° and {alone[20.0]:.2f} at ±20°: the published torque means "
+        "that the motor moved against the load, as in a loop near its limit of stability. A torque 8 ms "
         "late lifts the linear springs onto their points to 9 Hz (soft within "
         f"{100 * felt.deviation(SOFT, late=True, up_to=9.1):.0f} %, stiff within "
         f"{100 * felt.deviation(STIFF, late=True, up_to=9.1):.0f} %, Kp 32, Ki 50, ±10°).",
@@ -181,8 +184,8 @@ def margins() -> tuple[Statement, dict[str, float]]:
         "Design notes: at Kp 70 the gain margin falls from +4.9 to −5.2 dB over the angle",
         REPRODUCED if margin[0] > 4.0 and margin[-1] < -4.0 else NOT_REPRODUCED,
         f"{margin[0]:+.1f} dB at 15°, {margin[-1]:+.1f} dB at 45°, zero near 25°: cut at the desired torque, "
-        "sliding. Beyond that angle the loop is unstable, so its margin is read from the loop with Kp 1, which "
-        "is stable everywhere, less 36.9 dB. At 0° there is no stiffness and no limit to the gain.",
+        "sliding. Beyond that angle the loop is unstable, so its margin is read from the loop with Kp 1, "
+        "which is stable everywhere, less 36.9 dB. At 0° there is no stiffness and no limit to the gain.",
         tuple(Trial(f"{d:g}°", f"{m:+.1f} dB") for d, m in zip(degrees, margin, strict=True)),
     )
     return statement, {"margin_at_15_deg_dB": float(margin[0]), "margin_at_45_deg_dB": float(margin[-1])}
@@ -193,7 +196,7 @@ def torque_curve(error: float) -> Statement:
     return Statement(
         "Paper, Fig. 8: torque curve of the nonlinear spring",
         REPRODUCED if error < 0.10 else NOT_REPRODUCED,
-        f"{error:.3f} N·m rms from the points, the authors' own model 0.10. The deck was made from these points.",
+        f"{error:.3f} N·m rms from the points, the authors' own model 0.10. The deck rests on these points.",
         (Trial("figure-consistent deck at rest", f"{error:.3f} N·m rms"),),
     )
 
