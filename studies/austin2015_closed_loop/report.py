@@ -11,7 +11,7 @@ from nlsdesign.figures import Figure, PointPanel
 from nlsdesign.report import Chapter, FigureSection, Section, TableSection, write_report
 
 from .._published import figure_points
-from .benches import DECKS, FILES, NONLINEAR, SOFT, STIFF
+from .benches import DECKS, FILES, NONLINEAR, SOFT
 from .felt_torque import FeltTorque
 from .followed_torque import AMPLITUDES, GENTLE, LATE_TORQUE, FollowedTorque
 from .scheduled_law import GOALS, ScheduledLaw
@@ -111,7 +111,7 @@ def _followed(followed: FollowedTorque, amplitude: str) -> Figure:
             )
     return nls.figures.curves_beside_points(
         panels, across=ACROSS, columns=2,
-        words=f"Desired to actual torque at {AMPLITUDES[amplitude]:g} N·m for three springs, simulated with 2 "
+        words=f"Desired to actual torque at {AMPLITUDES[amplitude]:g} N·m of three springs, simulated with 2 "
         "settings and published: magnitude above, phase below.",
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from nlsdesign.control import SineResponse, TorqueGains, loop_margins
 from nlsdesign.model.linear import rest_state
 
 from . import causes
-from .benches import AS_IT_IS, DECKS, HIGH, LOW, NONLINEAR, SOFT, STIFF, Bench, Cause
+from .benches import AS_IT_IS, DECKS, HIGH, LOW, NONLINEAR, SOFT, STIFF, Bench, Cause, angle_of
 from .felt_torque import FeltTorque, held_motor
 from .followed_torque import GENTLE, FollowedTorque
 from .statement import NOT_REPRODUCED, OTHERWISE, REPRODUCED, Statement, Trial, in_words, lost_at, settles
@@ -120,7 +120,7 @@ def like_a_linear_spring(followed: FollowedTorque) -> tuple[tuple[Statement, ...
             for s in (SOFT, STIFF)
         }
         other = STIFF if like == SOFT else SOFT
-        secant = torque / causes.angle_of(torque)
+        secant = torque / angle_of(torque)
         statements.append(
             Statement(
                 f"Paper: at {torque:g} N·m the nonlinear spring {does} like the {like} one to 1.5 Hz",
