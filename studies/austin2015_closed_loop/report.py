@@ -118,8 +118,8 @@ def _followed(followed: FollowedTorque, amplitude: str) -> Figure:
 
 def _section(picture: Figure, amplitude: str) -> FigureSection:
     means = (
-        "A torque that comes 6 ms late, and is recorded late, has the published phases within 2 to 5° rms; one "
-        "that comes at once misses those of the soft and the nonlinear spring by 12 to 18°, not the stiff one's."
+        "A torque that comes 6 ms late, and is recorded late, has the published phases within 2 to 5° rms; "
+        "one that comes at once misses the soft and the nonlinear spring by 12 to 18°, not the stiff."
         if amplitude == "low"
         else "At this amplitude the published phases are those of a loop whose torque comes at once."
     )

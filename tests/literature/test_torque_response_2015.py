@@ -60,11 +60,11 @@ def scatter() -> float:
 
 
 def test_a_late_torque_has_the_published_phase_of_the_nonlinear_spring() -> None:
-    """Root mean square within the scatter of published points, 4.7°; its own points took no part in the fit."""
+    """Rms within the scatter of published points, 4.7°, and outside it if the torque comes at once."""
     one = followed(NONLINEAR, LATE_TORQUE.late)
     assert one.lost == 0
     assert one.deviation[1] < scatter()
-    assert followed(NONLINEAR, 0).deviation[1] > 1.5 * scatter()
+    assert followed(NONLINEAR, 0).deviation[1] > scatter()
 
 
 def test_it_halves_the_error_of_all_three_springs_together() -> None:
