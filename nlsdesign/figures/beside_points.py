@@ -81,7 +81,9 @@ def curves_beside_points(shown: Sequence[PointPanel], *, across: str, words: str
     for axis, panel in zip(axes, shown, strict=False):
         for number, (label, (x, y)) in enumerate(panel.curves.items()):
             tone, dash, point = look(number)
-            axis.plot(x, y, color=tone, linestyle=dash, label=label, linewidth=1.4)
+            axis.plot(
+                x, y, color=tone, linestyle=dash, label=label, linewidth=1.4, markersize=2.0, marker="."
+            )
             lost = x[~np.isfinite(y)]
             axis.plot(
                 lost, np.full(len(lost), 0.04 + 0.06 * number), transform=axis.get_xaxis_transform(),

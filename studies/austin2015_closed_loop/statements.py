@@ -148,7 +148,8 @@ def impedance(felt: FeltTorque) -> tuple[tuple[Statement, ...], dict[str, float]
         "Paper: the nonlinear spring has less output impedance than both linear ones up to 9 Hz",
         REPRODUCED if below else NOT_REPRODUCED,
         "With Kp 135 against 64 and ±20° (assumed; they meet all nine points to 2 Hz) its torque is "
-        "below both wherever it settles. To 2 Hz that is the gain: there the torque is θω/(√2·Kp) whatever "
+        f"below both wherever it settles; it limit-cycles at {_lost(felt)}. "
+        " To 2 Hz that is the gain: there the torque is θω/(√2·Kp) whatever "
         "the spring; the dead zone does the rest.",
         tuple(Trial(f"{s}, ±20°", f"{1e3 * felt.prompt[s].rms[0]:.1f} mN·m at 0.5 Hz") for s in DECKS),
     )
@@ -171,6 +172,12 @@ def impedance(felt: FeltTorque) -> tuple[tuple[Statement, ...], dict[str, float]
         "spring_alone_at_20_deg_mNm": 1e3 * alone[20.0],
         "largest_torque_with_one_cause_added_mNm": 1e3 * reached,
     }
+
+
+def _lost(felt: FeltTorque) -> str:
+    own = felt.prompt[NONLINEAR]
+    lost = [f"{f:.3g}" for f, v in zip(own.frequency, own.verdicts, strict=True) if not v.holds]
+    return f"{', '.join(lost)} Hz" if lost else "none of the frequencies"
 
 
 def margins() -> tuple[Statement, dict[str, float]]:
