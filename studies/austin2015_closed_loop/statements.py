@@ -149,7 +149,7 @@ def impedance(felt: FeltTorque) -> tuple[tuple[Statement, ...], dict[str, float]
         REPRODUCED if below else NOT_REPRODUCED,
         "With Kp 135 against 64 and ±20° (assumed; they meet all nine points to 2 Hz) its torque is "
         f"below both wherever it settles; it limit-cycles at {_lost(felt)}. "
-        " To 2 Hz that is the gain: there the torque is θω/(√2·Kp) whatever "
+        "To 2 Hz that is the gain: there the torque is θω/(√2·Kp) whatever "
         "the spring; the dead zone does the rest.",
         tuple(Trial(f"{s}, ±20°", f"{1e3 * felt.prompt[s].rms[0]:.1f} mN·m at 0.5 Hz") for s in DECKS),
     )
