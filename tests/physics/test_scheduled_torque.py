@@ -51,7 +51,9 @@ def loop_of(plant: FlatModel, *, sample_time: float = 1e-3, **parts: object) -> 
 
 def error(loop: ClosedLoop, frequency: float, amplitude: float = 2.8) -> float:
     settled = max(1.0 / frequency, 0.2)
-    trace = loop.run(settled + 2.0 / frequency, inputs={loop.desired: Sine(amplitude, frequency)})
+    # At the current limit the answer is full of harmonics; more periods tell them from an oscillation.
+    periods = 2.0 if frequency < 3.0 else 8.0
+    trace = loop.run(settled + periods / frequency, inputs={loop.desired: Sine(amplitude, frequency)})
     return tracking(loop, trace, settled=settled).relative_error
 
 
@@ -61,7 +63,7 @@ def loop() -> ClosedLoop:
 
 
 def test_it_follows_with_the_errors_that_were_set_as_a_goal(loop: ClosedLoop) -> None:
-    assert not {f: e for f, goal in GOALS.items() if (e := error(loop, f)) > goal}
+    assert not {f: e for f, goal in GOALS.items() if not (e := error(loop, f)) <= goal}
 
 
 def test_it_follows_on_other_machines_and_with_a_coarse_encoder(loop: ClosedLoop) -> None:
@@ -72,7 +74,7 @@ def test_it_follows_on_other_machines_and_with_a_coarse_encoder(loop: ClosedLoop
         "half the rate": (loop_of(loop.plant, sample_time=2e-3), 2.8),
         "coarse": (coarse, 2.8),
     }
-    assert not {n: e for n, (other, size) in others.items() if (e := error(other, 5.0, size)) > GOALS[5.0]}
+    assert not {n for n, (other, size) in others.items() if not error(other, 5.0, size) <= GOALS[5.0]}
 
 
 def test_a_disturbance_observer_in_place_of_the_integral_follows_as_well(loop: ClosedLoop) -> None:

@@ -24,6 +24,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from ...analysis.rest import evaluate_rows, rate_state, rest_states
 from ...model import FlatModel
@@ -49,6 +50,8 @@ _FAST = 3.0
 _RISES = 1.1
 """Odd harmonic over the one before from which on it stands out."""
 _STEP = math.log(1.3)
+_PERIODS = 4
+"""Periods of a sine from which on its harmonics are told from an oscillation near one of them."""
 _SWINGS = 6
 """Half swings beyond the threshold, one after the other, that make an oscillation: three whole ones."""
 
@@ -217,7 +220,8 @@ class LoopJudge:
         """Return the verdict on a stretch of any course, from what oscillates faster than it.
 
         What counts is the torque error above three times the frequency below which 99.9 % of the power of the
-        desired torque lie.
+        desired torque lie. Where that is one sine, its harmonics do not count: a limit that is reached in
+        every half period distorts the answer without an oscillation of the loop.
 
         Parameters
         ----------
@@ -226,7 +230,7 @@ class LoopJudge:
         """
         desired, error = signals[self.loop.desired], signals[self.loop.torque] - signals[self.loop.desired]
         if len(error) > 2 * _SWINGS and np.all(np.isfinite(error)):
-            error = _faster(error, desired)
+            error = _faster(_without_answer(error, desired), desired)
         return self._verdict(signals, error, True)
 
     def _verdict(self, signals: Mapping[str, Array], rest: Array, steady: bool) -> LoopVerdict:
@@ -301,6 +305,40 @@ def _faster(error: Array, desired: Array) -> Array:
     spectrum[: 3 * max(last, 2) + 1] = 0.0
     faster: Array = np.fft.irfft(spectrum, len(error))
     return faster
+
+
+def _without_answer(error: Array, desired: Array) -> Array:
+    """Return an error without the harmonics of the desired torque, where that is a sine over some periods."""
+    frequency = _frequency_of_sine(desired)
+    if frequency is None or frequency * len(error) < _PERIODS:
+        return error
+    turns = 2.0 * math.pi * frequency * np.arange(len(error))
+    orders = np.arange(1, min(HARMONICS, int(0.45 / frequency)) + 1)
+    waves = np.concatenate([np.cos(np.outer(orders, turns)), np.sin(np.outer(orders, turns))]).T
+    rest: Array = error - waves @ np.linalg.lstsq(waves, error, rcond=None)[0]
+    return rest
+
+
+def _frequency_of_sine(values: Array) -> float | None:
+    """Return the frequency of a sine in periods per sample, or ``None`` where it is none."""
+    centred = values - np.mean(values)
+    power = float(np.sum(centred**2))
+    if power == 0.0:
+        return None
+    spectrum = np.abs(np.fft.rfft(np.hanning(len(values)) * centred))
+    start = max(int(np.argmax(spectrum)), 1) / len(values)
+    time = np.arange(len(values))
+
+    def left(frequency: float) -> float:
+        waves = np.stack([np.cos(2.0 * math.pi * frequency * time), np.sin(2.0 * math.pi * frequency * time),
+                          np.ones(len(values))], axis=1)  # fmt: skip
+        rest = values - waves @ np.linalg.lstsq(waves, values, rcond=None)[0]
+        return float(np.sum(rest**2))
+
+    width = 1.0 / len(values)
+    best = minimize_scalar(left, bounds=(max(start - width, 1e-9), start + width), method="bounded",
+                               options={"xatol": 1e-9})  # fmt: skip
+    return float(best.x) if best.fun < 1e-6 * power else None
 
 
 def sustained(rest: Array, threshold: float, sample_time: float) -> tuple[float, float]:
