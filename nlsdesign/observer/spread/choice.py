@@ -138,8 +138,8 @@ def design_observer(
     """Design an observer that estimates a torque from a measured angle and the known inputs.
 
     Without ``gain`` and ``form`` it is the one that errs least over the spread of the deck, as
-    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled observer
-    of that kind, designed at the declared numbers.
+    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled
+    observer of that kind, designed at the declared numbers.
 
     Its inputs are the measured angle and the inputs of the model, held over the coming sample; its outputs
     the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have
