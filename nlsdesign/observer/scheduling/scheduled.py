@@ -97,12 +97,14 @@ def design_observer_with_details(
 
     Parameters
     ----------
-    model, estimate, measured, sample_time, grid
+    model, estimate, measured, sample_time
         As for :func:`~nlsdesign.observer.design_observer`.
     gain
         Rule for the correction; :class:`~nlsdesign.observer.scheduling.gains.CascadeGain` by default.
     form
         Which states are carried; :class:`~nlsdesign.observer.scheduling.forms.Minimal` by default.
+    grid
+        As for :func:`~nlsdesign.observer.design_observer`.
 
     Raises
     ------

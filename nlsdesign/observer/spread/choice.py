@@ -64,10 +64,12 @@ def choose_observer(
 
     Parameters
     ----------
-    model, estimate, measured, sample_time, grid
+    model, estimate, measured, sample_time
         As for :func:`design_observer`.
     settings
         What is known, what the actuator does, and how far the equations are trusted.
+    grid
+        As for :func:`design_observer`.
 
     Raises
     ------
