@@ -41,7 +41,7 @@ class BoughtBy(NamedTuple):
     torque
         Standard deviation of the torque of the resting spring at each angle, N·m.
     errors
-        Other errors, by name.
+        Other errors in N·m, by name.
     """
 
     titles: tuple[str, ...]
@@ -99,6 +99,22 @@ class CalibrationPlan:
     ranked_by: str = ""
     left_out: Mapping[str, str] = field(default_factory=dict)
     reach: Mapping[str, float] = field(default_factory=dict)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return a table: calibration, torque of the resting spring and further errors in mN·m, spreads."""
+        names = tuple(self.now.errors)
+        rows = []
+        for each in (self.now, *self.ranked):
+            narrowed = list(each.narrowed(self.now.known).items())[:4]
+            spreads = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in narrowed)
+            sizes = (each.torque_rms, *(each.errors[name] for name in names))
+            rows.append((each.title, *(f"{1e3 * size:.3g}" for size in sizes), spreads))
+        return rows
+
+    def __str__(self) -> str:
+        further = (f"{name}, mN·m" for name in self.now.errors)
+        heads = ("calibration", "spring torque at rest, mN·m", *further, "spreads")
+        return "\n".join("  ".join(row) for row in (heads, *self.rows()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for ``plan.json``: errors before and after, and spreads by number."""

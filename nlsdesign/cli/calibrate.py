@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,8 @@ from .output import deck_option, json_option, out_option, show_json, show_table
 
 if TYPE_CHECKING:
     from ..calibration import CalibrationPlan, CalibrationRecords, CalibrationTest
+    from ..components import Assembly
+    from ..simulation import Prior
 
 KINDS = ("hung_weight", "load_cell", "free_run")
 _file = click.Path(path_type=Path, dir_okay=False)
@@ -61,7 +63,7 @@ def calibrate(
     if plan:
         chosen = [_kind(kind) for kind in kinds or KINDS]
         with steps.step("plan"):
-            ranked = what_calibration_buys(actuator, chosen, prior=prior)
+            ranked = what_calibration_buys(actuator, chosen, prior=prior, errors=_while_running(actuator))
         file = out / "plan.json"
         write_text(file, json.dumps(ranked.to_dict(), indent=2, ensure_ascii=False) + "\n")
         _show_plan(ranked, as_json)
@@ -102,6 +104,20 @@ def _kind(name: str) -> CalibrationTest:
     return kinds[name]
 
 
+def _while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
+    """Return the least error of the torque that any observer could have, where there is one to observe."""
+    from ..errors import ArrangementError, ValueRangeError
+    from ..model import flatten
+    from ..observer import bench_trial, least_torque_error
+
+    try:
+        least = least_torque_error(bench_trial(flatten(actuator)))
+    except (ArrangementError, ValueRangeError):
+        # A drive without a spring, or without an encoder: the plan then speaks of the resting spring alone.
+        return {}
+    return {"torque while running, best estimate": least}
+
+
 def _remarks(tests: Sequence[CalibrationRecords]) -> list[str]:
     """Return what was found in the files."""
     suspect = [f"suspect: {finding}" for test in tests for finding in test.records.findings]
@@ -112,11 +128,8 @@ def _show_plan(ranked: CalibrationPlan, as_json: bool) -> None:
     if as_json:
         show_json(ranked.to_dict())
         return
-    rows = [("nothing", f"{1e3 * ranked.now.torque_rms:.3g}", "")]
-    for each in ranked.ranked:
-        best = list(each.narrowed(ranked.now.known).items())[:4]
-        spreads = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in best)
-        rows.append((each.title, f"{1e3 * each.torque_rms:.3g}", spreads))
-    show_table("What a calibration buys", ("calibration", "spring torque, mN·m", "spreads, best four"), rows)
+    further = [f"{name}, mN·m" for name in ranked.now.errors]
+    heads = ("calibration", "spring torque at rest, mN·m", *further, "spreads, best four")
+    show_table("What a calibration buys", heads, ranked.rows())
     for title, reason in ranked.left_out.items():
         click.echo(f"{title} is left out: {reason}")

@@ -11,6 +11,7 @@ from .before_after import (
     gap_bars,
     held_out_series,
 )
+from .beside_points import PointPanel, curves_beside_points
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
@@ -26,6 +27,7 @@ from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .ranked import ranked_intervals
+from .spread_of_errors import errors_over_spread
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
@@ -41,6 +43,7 @@ __all__ = [
     "Figure",
     "HeldOut",
     "InspectionRow",
+    "PointPanel",
     "RecordError",
     "TitleBlock",
     "alternative_text",
@@ -56,8 +59,10 @@ __all__ = [
     "coupled_stability_map",
     "curve_of_task",
     "curves",
+    "curves_beside_points",
     "described",
     "design_picture",
+    "errors_over_spread",
     "gap_bars",
     "held_out_series",
     "impedance_over_frequency",

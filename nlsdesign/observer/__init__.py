@@ -9,9 +9,15 @@ from .certificates import (
     Assumptions,
     Certificate,
     CertifiedGain,
+    CodeToCompare,
+    ContinuousCertificate,
+    HeldEstimateCertificate,
     TorqueErrorBound,
     Verification,
+    certified_design,
     certify,
+    certify_continuous,
+    certify_held_estimate,
     clamped_estimate_bound,
     declared_assumptions,
     read_certificate,
@@ -34,6 +40,7 @@ from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
 from .spread.bench_trial import Trial, bench_trial
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer
+from .spread.least_error import least_torque_error
 from .spread.spread_errors import SpreadErrors, observer_errors
 
 __all__ = [
@@ -43,7 +50,9 @@ __all__ = [
     "CascadeGain",
     "Certificate",
     "CertifiedGain",
+    "CodeToCompare",
     "ConstantGain",
+    "ContinuousCertificate",
     "Duty",
     "ErrorStability",
     "EstimatorBound",
@@ -52,6 +61,7 @@ __all__ = [
     "GainRule",
     "Grid",
     "GridByTolerance",
+    "HeldEstimateCertificate",
     "Minimal",
     "ObserverDesign",
     "ObserverOfChoice",
@@ -67,7 +77,10 @@ __all__ = [
     "UncertainDirections",
     "Verification",
     "bench_trial",
+    "certified_design",
     "certify",
+    "certify_continuous",
+    "certify_held_estimate",
     "check_stability",
     "choose_observer",
     "clamped_estimate_bound",
@@ -76,6 +89,7 @@ __all__ = [
     "design_observer",
     "design_observer_with_details",
     "estimator_bound",
+    "least_torque_error",
     "observe",
     "observer_errors",
     "read_certificate",

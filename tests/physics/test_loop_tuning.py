@@ -28,7 +28,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.errors import InfeasibleError, UnknownNameError
 from nlsdesign.export import natively
 from nlsdesign.model import flatten
-from nlsdesign.observer import design_observer
+from nlsdesign.observer import CascadeGain, design_observer
 
 GAIN = "controller.proportional"
 SPRINGS = {
@@ -42,7 +42,7 @@ def moved(deck: str) -> ClosedLoop:
     actuator, outputs = declare(load_deck(deck)), ["motor.angle", "spring.torque"]
     bench, plant = flatten(actuator, outputs=outputs), flatten(with_moved_load(actuator), outputs=outputs)
     controller = torque_controller(bench, gains=TorqueGains(integral=20.0))
-    return encoder_loop(plant, observer=design_observer(bench), controller=controller)
+    return encoder_loop(plant, observer=design_observer(bench, gain=CascadeGain()), controller=controller)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
 from .fine_counts import with_fine_counts
 from .linear_loop import Complex, LinearLoop, assembled, linear_loop, plant_of
-from .linear_parts import LinearPlant, PlantMode, SlidingPlant, SlopedTables, TableSlope
+from .linear_parts import LinearMode, LinearPlant, SlidingPlant, SlopedTables, TableSlope
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def output_impedance(
     *,
     frequencies: Sequence[float] | Array | None = None,
     load: str | None = None,
-    mode: PlantMode | None = None,
+    mode: LinearMode | None = None,
     tables: TableSlope | None = None,
 ) -> OutputImpedance:
     """Return the impedance that a load feels at many angles of the spring.
@@ -158,7 +158,7 @@ def coupled_stability(
     stiffnesses: Sequence[float] | Array,
     damping: float = 0.0,
     load: str | None = None,
-    mode: PlantMode | None = None,
+    mode: LinearMode | None = None,
 ) -> CoupledStability:
     """Return whether the loop is stable on each load of a range, at rest at one angle of the spring.
 

@@ -25,8 +25,8 @@ from ..loop.closed_loop import ClosedLoop
 from .fine_counts import with_fine_counts
 from .linear_parts import (
     LinearBlock,
+    LinearMode,
     LinearPlant,
-    PlantMode,
     SlidingPlant,
     SlopedTables,
     TableSlope,
@@ -75,7 +75,7 @@ class LinearLoop:
     b_next: Array
     c: Array
     d: Array
-    mode: PlantMode
+    mode: LinearMode
 
     def poles(self) -> Complex:
         """Return the closed-loop poles s = ln(z)/T in 1/s, the slowest first, shape (n, states).
@@ -150,7 +150,7 @@ def linear_loop(
     angles: Sequence[float] | Array,
     *,
     opened: Sequence[str] = (),
-    mode: PlantMode | None = None,
+    mode: LinearMode | None = None,
     tables: TableSlope | None = None,
 ) -> LinearLoop:
     """Linearise a closed loop at rest at many angles of its spring.
@@ -193,7 +193,7 @@ def linear_loop(
                      mode=mode or SlidingPlant())  # fmt: skip
 
 
-def plant_of(system: SampledSystem, angles: Array, mode: PlantMode) -> LinearPlant:
+def plant_of(system: SampledSystem, angles: Array, mode: LinearMode) -> LinearPlant:
     """Return the plant of a system, linearised with all signals that are wired.
 
     Parameters
@@ -220,7 +220,7 @@ def assembled(
     *,
     cut: tuple[str, ...],
     tables: TableSlope,
-    mode: PlantMode,
+    mode: LinearMode,
 ) -> LinearLoop:
     """Return the whole loop of a linearised plant and the blocks of a system, at rest.
 
@@ -368,7 +368,7 @@ class _Assembler:
         """Return the value of an input at rest: a cut loop rests where the closed one does."""
         return values[self.system.sources[name]]
 
-    def loop(self, angles: Array, mode: PlantMode) -> LinearLoop:
+    def loop(self, angles: Array, mode: LinearMode) -> LinearLoop:
         """Return the whole."""
         step, states, n = self.system.sample_time, len(self.plant.states), self.n
         _, rows, following = self.evaluated(at_rest=False)

@@ -22,7 +22,7 @@ from ...model.transform import named
 Array = NDArray[np.float64]
 
 
-class PlantMode(ABC):
+class LinearMode(ABC):
     """In which mode of its dry friction the plant is linearised."""
 
     @property
@@ -32,7 +32,7 @@ class PlantMode(ABC):
 
 
 @dataclass(frozen=True)
-class SlidingPlant(PlantMode):
+class SlidingPlant(LinearMode):
     """The plant moves: dry friction is constant and adds no slope.
 
     Parameters
@@ -53,7 +53,7 @@ class SlidingPlant(PlantMode):
 
 
 @dataclass(frozen=True)
-class StuckPlant(PlantMode):
+class StuckPlant(LinearMode):
     """The plant rests: smooth dry friction acts as a dashpot, its limit over its creep speed."""
 
     @property
@@ -160,7 +160,7 @@ class LinearPlant:
 
 
 def linear_plant(
-    plant: FlatModel, angles: Array, *, driven: str, signals: tuple[str, ...], mode: PlantMode
+    plant: FlatModel, angles: Array, *, driven: str, signals: tuple[str, ...], mode: LinearMode
 ) -> LinearPlant:
     """Linearise a plant at rest at many angles of its driven body.
 

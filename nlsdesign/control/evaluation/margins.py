@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...simulation.sampled_batch import PLANT
 from ..loop.closed_loop import ClosedLoop
 from .linear_loop import Complex, LinearLoop, linear_loop
-from .linear_parts import PlantMode, TableSlope
+from .linear_parts import LinearMode, TableSlope
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def loop_margins(
     angles: Sequence[float] | Array,
     *,
     opening: str | None = None,
-    mode: PlantMode | None = None,
+    mode: LinearMode | None = None,
     tables: TableSlope | None = None,
 ) -> LoopMargins:
     """Return gain, phase and delay margins at rest at many angles.
@@ -105,6 +105,9 @@ def loop_margins(
 
 
 def _margins(gain: Complex, frequencies: Array) -> tuple[float, float, float, float, float]:
+    if not np.all(np.isfinite(gain)):
+        # Nothing rests at that angle, so there is no loop to be cut.
+        return math.nan, math.nan, math.nan, math.nan, math.nan
     size, phase = np.abs(gain), np.unwrap(np.angle(gain))
     up, down = math.inf, -math.inf
     # Where the phase passes −180° (mod 360°): the loop gain crosses the negative real axis.

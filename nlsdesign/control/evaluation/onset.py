@@ -12,7 +12,7 @@ from ...errors import ValueRangeError, unknown_name
 from ...simulation.buffered import Translate, as_it_is
 from ..loop.closed_loop import CONTROLLER, ClosedLoop
 from .linear_loop import linear_loop
-from .linear_parts import PlantMode
+from .linear_parts import LinearMode
 from .loop_verdict import DIVERGED, LIMIT_CYCLE, LoopJudge, LoopVerdict
 from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 from .responses import held_drive, sine_drive
@@ -20,6 +20,8 @@ from .responses import held_drive, sine_drive
 Array = NDArray[np.float64]
 
 _BATCH = 9
+MOST_ROUNDS = 40
+"""Rounds of the search; each makes the bracket several times narrower, so fewer are enough."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +75,34 @@ class LimitCycleOnset:
         )
 
 
+def checked_gains(loop: ClosedLoop, gain: str, between: tuple[float, float]) -> tuple[float, float]:
+    """Return the range of a gain after a look at its name and ends.
+
+    Parameters
+    ----------
+    loop
+        Closed loop.
+    gain
+        Name of a parameter of the controller.
+    between
+        Smallest and largest gain.
+
+    Raises
+    ------
+    UnknownNameError
+        If the controller has no such parameter.
+    ValueRangeError
+        If the range is empty.
+    """
+    names = [v.name for v in loop.controller.parameters]
+    if gain not in names:
+        raise unknown_name("parameter of the controller", gain, names)
+    low, high = between
+    if not 0.0 < low < high:
+        raise ValueRangeError(f"gains {low:g} to {high:g}", "must be positive and ascending")
+    return low, high
+
+
 def onset_of_limit_cycling(
     loop: ClosedLoop,
     gain: str,
@@ -112,15 +142,12 @@ def onset_of_limit_cycling(
     ValueRangeError
         If the range is empty.
     """
-    names = [v.name for v in loop.controller.parameters]
-    if gain not in names:
-        raise unknown_name("parameter of the controller", gain, names)
-    low, high = between
-    if not 0.0 < low < high or not 0.0 < accuracy < 1.0:
-        raise ValueRangeError(f"gains {low:g} to {high:g}", "must be positive and ascending")
+    low, high = checked_gains(loop, gain, between)
+    if not 0.0 < accuracy < 1.0:
+        raise ValueRangeError(f"accuracy {accuracy:g}", "must lie between 0 and 1")
     first, last, verdict = 0.0, math.inf, None
     visited: PeriodicRun | None = None
-    while True:
+    for _ in range(MOST_ROUNDS):
         gains = np.geomspace(low, high, _BATCH)
         runs = run_periodic(loop, _drive(loop, gain, gains, amplitude, frequency), translate=translate)
         lost = [run.verdict.state in (LIMIT_CYCLE, DIVERGED) for run in runs]
@@ -153,7 +180,7 @@ def linear_onset(
     *,
     between: tuple[float, float],
     largest: float,
-    mode: PlantMode | None = None,
+    mode: LinearMode | None = None,
 ) -> tuple[float, float]:
     """Return the gain at which the linearised loop becomes unstable at some angle, and the frequency in Hz.
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InfeasibleError, ValueRangeError, unknown_name
+from ...errors import InfeasibleError
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import declared_prior
 from ..evaluation.margins import loop_margins
+from ..evaluation.onset import checked_gains
 from ..evaluation.responses import sine_response
 from ..loop.closed_loop import ClosedLoop
 
@@ -110,30 +111,18 @@ def largest_gain(
     InfeasibleError
         If each gain that was tried breaks a limit; it is named.
     """
-    names = [v.name for v in loop.controller.parameters]
-    if gain not in names:
-        raise unknown_name("parameter of the controller", gain, names)
-    low, high = between
-    if not 0.0 < low < high:
-        raise ValueRangeError(f"gains {low:g} to {high:g}", "must be positive and ascending")
+    low, high = checked_gains(loop, gain, between)
     limits, at = limits or LoopLimits(), np.asarray(angles, dtype=float)
-    plants = [loop]
-    if draws:
-        drawn = declared_prior(loop.plant).draws(draws, 1)
-        plants += [
-            replace(loop, plant=loop.plant.with_values({n: float(v[k]) for n, v in drawn.items()}))
-            for k in range(draws)
-        ]
+    plants = [loop, *_drawn(loop, draws)]
 
     def broken(value: float) -> str:
         return _broken([_with_gain(each, gain, value) for each in plants], at, limits, translate)
 
     # From above: a small gain may break a limit too, beside an integrator that is then too strong.
-    words = broken(high)
-    if not words:
+    reasons = [broken(high)]
+    if not reasons[0]:
         return TunedLoop(_with_gain(loop, gain, high), gain, high, "")
     tried = [float(value) for value in np.geomspace(low, high, _TRIED)]
-    reasons = [words]
     for smaller, larger in zip(tried[-2::-1], tried[:0:-1], strict=True):
         reasons.append(broken(smaller))
         if not reasons[-1]:
@@ -151,6 +140,17 @@ def largest_gain(
         breaks = broken(middle)
         low, high, words = (low, middle, breaks) if breaks else (middle, high, words)
     return TunedLoop(_with_gain(loop, gain, low), gain, low, words)
+
+
+def _drawn(loop: ClosedLoop, draws: int) -> list[ClosedLoop]:
+    """Return the loop with plants drawn from the spread of the deck."""
+    if not draws:
+        return []
+    drawn = declared_prior(loop.plant).draws(draws, 1)
+    return [
+        replace(loop, plant=loop.plant.with_values({n: float(v[k]) for n, v in drawn.items()}))
+        for k in range(draws)
+    ]
 
 
 def _with_gain(loop: ClosedLoop, gain: str, value: float) -> ClosedLoop:

@@ -9,7 +9,7 @@ trajectory
 with the slopes from the variational equations of the model, which shares nothing with any observer. The
 rounding of an encoder is not Gaussian: at standstill it says less, over a long motion it can say more.
 
-Source: Tichavský et al. 1998.
+Source: Van Trees 1968, sec. 2.4; Tichavský et al. 1998.
 """
 
 from __future__ import annotations

@@ -221,7 +221,7 @@ class FilterEquations:
         forget = moving * (1.0 - math.exp(-2.0 * self.step.nominal.sample_time / self.trust.drift_time))
         fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
         onward = ca.mtimes(ca.diag(fading), onward)
-        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest)
+        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest, u)
         row = self._matrix("estimate", 1, n + 1, free)
         wanted = ca.mtimes(row, ca.vertcat(s, 1))
         slopes_of_estimate = self._slopes(wanted, s, free)
@@ -249,20 +249,22 @@ class FilterEquations:
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
 
-    def _process_noise(self, forget: Expression, unrest: Expression) -> Expression:
+    def _process_noise(self, forget: Expression, unrest: Expression, u: Expression) -> Expression:
         """Return what one sample adds to the covariance.
 
         A torque that stays the same over the correlation time is, to a filter that takes it as white, one of
-        2·correlation/sample times the variance.
+        2·correlation/sample times the variance. Of an input beyond what the drive surely gives, all that is
+        beyond may be missing.
         """
         time = self.step.nominal.sample_time
         density = _white(self.noise.acceleration, self.trust, time)
         push = np.zeros(self.n)
-        push[self.angle], push[self.speed] = density * time**2 / 2.0, density * time
+        push[self.angle], push[self.speed] = time**2 / 2.0, time
         push /= self.units
         size = self.n + self.slow
         noise = ca.SX.zeros(size, size)
-        noise[: self.n, : self.n] = unrest * ca.DM(np.outer(push, push))
+        missing = _missing(self.step, self.noise.safe_inputs, u) ** 2
+        noise[: self.n, : self.n] = (unrest * density**2 + missing) * ca.DM(np.outer(push, push))
         for i in range(self.n):
             # Rounding of a small number beside large ones; without it single precision may lose its sign.
             noise[i, i] += 1e-6 if i in (self.angle, self.speed) else 1e-12
@@ -274,6 +276,27 @@ class FilterEquations:
 def _white(deviation: float, trust: Trust, time: float) -> float:
     """Return what stays the same over the correlation time, to a filter that takes it as white."""
     return deviation * math.sqrt(max(2.0 * trust.correlation_time / time, 1.0))
+
+
+def _missing(step: AdaptiveStep, safe: Mapping[str, float], u: Expression) -> Expression:
+    """Return the acceleration that a limited drive may not give of what its inputs ask for."""
+    missing = ca.SX(0)
+    for i, v in enumerate(step.nominal.plant.inputs):
+        if v.name in safe:
+            missing += abs(_slope_of_drive(step, i)) * ca.fmax(ca.fabs(u[i]) - safe[v.name], 0.0)
+    return missing
+
+
+def _slope_of_drive(step: AdaptiveStep, place: int) -> float:
+    """Return the acceleration per unit of an input, at its start value; zero where it gives none."""
+    plant = step.nominal.plant
+    rows = list(plant.rows)
+    _, speed = plant.moving
+    if speed not in rows:
+        return 0.0
+    u = ca.SX.sym("u", len(plant.inputs))
+    slopes = ca.Function("slopes", [u], [ca.densify(ca.jacobian(step.driven(u)[0], u))])
+    return float(slopes([v.start for v in plant.inputs])[rows.index(speed), place])
 
 
 def within_a_count(off: Expression, variance: Expression) -> tuple[Expression, Expression]:

@@ -10,13 +10,14 @@ import numpy as np
 from ...errors import ArrangementError, ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
+from ...quantity import typeset_unit
 from ...simulation.sampled_batch import run_batch
 from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
 from ..adaptive.adaptive_settings import AdaptiveSettings
 from ..adaptive.adaptive_variables import SPREAD
 from ..scheduling.forms import StateForm
 from ..scheduling.gains import FittedGain, GainRule
-from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
+from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
 from ..scheduling.table import Grid
 from .bench_trial import bench_trial
 
@@ -78,16 +79,18 @@ def choose_observer(
     ArrangementError
         If the equations cannot be scheduled over one angle.
     ValueRangeError
-        If the estimate is far from linear in the inner states, or a setting is out of range.
+        If the model is discrete, the estimate is far from linear in the inner states, or a setting is out of
+        range.
     ConvergenceError
         If a table does not keep its error bound.
     """
+    check_sampling(model, sample_time)
     settings = settings or AdaptiveSettings()
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
-    unit = model.variable(estimate).unit
+    unit = typeset_unit(model.variable(estimate).unit)
     try:
         adaptive = design_adaptive_observer(
             model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
