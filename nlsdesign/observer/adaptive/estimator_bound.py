@@ -112,8 +112,8 @@ def estimator_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: Sense
     covariance, noise = np.eye(xi), sensed.quantum**2 / 12.0
     for k in range(count):
         # J⁻¹ with one more reading, by Sherman and Morrison.
-        said = covariance @ h[k]
-        covariance -= np.outer(said, said) / (noise + h[k] @ said)
+        gained = covariance @ h[k]
+        covariance -= np.outer(gained, gained) / (noise + h[k] @ gained)
         variance[k] = g[k] @ covariance @ g[k]
     time: Array = sensed.sample_time * np.arange(float(count))
     return EstimatorBound(time, np.sqrt(np.maximum(variance, 0.0)), np.sqrt(before))

@@ -75,7 +75,7 @@ class FilterEquations:
         # Units in which all covariances are near one: counts, counts per sample, sizes of inner states.
         self.units = self.plant.sizes.copy()
         self.units[self.angle], self.units[self.speed] = noise.angle, noise.angle / time
-        self.blur = _speed_deviation(noise.angle, self._acceleration_density(), time)
+        self.blur = _speed_deviation(noise.angle, _white(noise.acceleration, trust, time), time)
         self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]), self.blur)
 
     # --- reading the table ------------------------------------------------------------------------------
@@ -233,8 +233,7 @@ class FilterEquations:
         excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
         restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)
         restless = ca.fmin(ca.fmax(restless, 1.0), MOST_UNREST)
-        follows = 1.0 - math.exp(-self.step.nominal.sample_time / FOLLOWING_TIME)
-        behind = followed + follows * (angle - followed)
+        behind = angle + math.exp(-self.step.nominal.sample_time / FOLLOWING_TIME) * (followed - angle)
         states = [following, slow_after * fading[n:], restless, behind, _packed(next_covariance)]
         arguments = [
             ca.SX.sym("time"),
@@ -250,10 +249,6 @@ class FilterEquations:
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
 
-    def _acceleration_density(self) -> float:
-        time = self.step.nominal.sample_time
-        return self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
-
     def _process_noise(self, forget: Expression, unrest: Expression, u: Expression) -> Expression:
         """Return what one sample adds to the covariance.
 
@@ -261,7 +256,8 @@ class FilterEquations:
         2·correlation/sample times the variance. Of an input beyond what the drive surely gives, all that is
         beyond may be missing.
         """
-        time, density = self.step.nominal.sample_time, self._acceleration_density()
+        time = self.step.nominal.sample_time
+        density = _white(self.noise.acceleration, self.trust, time)
         push = np.zeros(self.n)
         push[self.angle], push[self.speed] = time**2 / 2.0, time
         push /= self.units
@@ -275,6 +271,11 @@ class FilterEquations:
         for d in range(self.slow):
             noise[self.n + d, self.n + d] += forget
         return noise
+
+
+def _white(deviation: float, trust: Trust, time: float) -> float:
+    """Return what stays the same over the correlation time, to a filter that takes it as white."""
+    return deviation * math.sqrt(max(2.0 * trust.correlation_time / time, 1.0))
 
 
 def _missing(step: AdaptiveStep, safe: Mapping[str, float], u: Expression) -> Expression:

@@ -112,14 +112,14 @@ def choose_observer(
 def _expected(model: FlatModel, design: AdaptiveDesign, settings: AdaptiveSettings) -> float:
     """Return the deviation that the filter expects along the bench with the numbers of the deck."""
     plant = design.step.nominal.plant
-    trial = bench_trial(
+    bench = bench_trial(
         model, duty=settings.duty, estimate=plant.estimate.name, measured=plant.angle,
         sample_time=design.step.nominal.sample_time,
     )  # fmt: skip
     name = f"observer.{plant.estimate.name}.{SPREAD}"
-    batch = run_batch(trial.system({"observer": design.model}), trial.stop, inputs=trial.inputs, keep=[name])
+    batch = run_batch(bench.system({"observer": design.model}), bench.stop, inputs=bench.inputs, keep=[name])
     counted = np.zeros(len(batch.time), dtype=bool)
-    for _, first, last in trial.stretches:
+    for _, first, last in bench.stretches:
         counted |= (batch.time >= first) & (batch.time < last)
     deviation = batch[name][0, counted]
     if not np.all(np.isfinite(deviation)):

@@ -134,7 +134,7 @@ class SpreadErrors:
 
 def observer_errors(
     observers: Mapping[str, FlatModel],
-    trial: Trial,
+    bench: Trial,
     *,
     prior: Prior | None = None,
     draws: int = 64,
@@ -148,7 +148,7 @@ def observer_errors(
     ----------
     observers
         By name; designed with the numbers of the deck, which they keep in every run.
-    trial
+    bench
         The bench.
     prior
         What is known of the numbers of the machine; the spreads of the deck by default.
@@ -166,7 +166,7 @@ def observer_errors(
     ConvergenceError
         If the machine as declared does not run, or fewer than half of those drawn do.
     """
-    known = relevant(prior or declared_prior(trial.model), trial)
+    known = relevant(prior or declared_prior(bench.model), bench)
     shifts = _shifts(known)
     values = {name: [v, v] for name, v in zip(known.names, known.values.tolist(), strict=True)}
     for _, factors in shifts:
@@ -175,48 +175,46 @@ def observer_errors(
     drawn = known.draws(draws, seed)
     rows = {f"{PLANT}.{name}": np.concatenate([values[name], drawn[name]]) for name in known.names}
     runs = 2 + len(shifts) + draws
-    quantum = _quantum_name(trial)
+    quantum = _quantum_name(bench)
     if quantum is not None:
-        counts = np.full(runs, trial.model.values[quantum])
-        counts[1] *= FINE
-        rows[f"{PLANT}.{quantum}"] = counts
-    estimates = {name: f"{name}.{trial.estimate}" for name in observers}
-    system = trial.system(observers)
-    torque, driven = f"{PLANT}.{trial.estimate}", f"{PLANT}.{system.driven}"
+        rows[f"{PLANT}.{quantum}"] = bench.model.values[quantum] * np.where(np.arange(runs) == 1, FINE, 1.0)
+    estimates = {name: f"{name}.{bench.estimate}" for name in observers}
+    system = bench.system(observers)
+    torque, driven = f"{PLANT}.{bench.estimate}", f"{PLANT}.{system.driven}"
     batch = run_batch(
-        system, trial.stop, inputs=trial.inputs, parameters=rows,
+        system, bench.stop, inputs=bench.inputs, parameters=rows,
         keep=[torque, driven, *estimates.values()], translate=translate,
     )  # fmt: skip
-    errors = _errors(batch, torque, estimates, trial)
+    errors = _errors(batch, torque, estimates, bench)
     whole = batch.finite & np.all(np.isfinite(errors), axis=(0, 2))
     first = 2 + len(shifts)
     if not whole[0] or np.mean(whole[first:]) < 0.5:
         raise ConvergenceError(
-            f"bench of {trial.model.name}",
+            f"bench of {bench.model.name}",
             f"{int(np.sum(~whole[first:]))} of {draws} drawn machines do not run",
             next_step="look at the spreads of the deck, or use more substeps per sample",
         )
     kept = [i for i in range(first, runs) if whole[i]]
-    bound = _bound(trial, known, rows, batch[driven], kept[:bounded]) if bounded else np.zeros(0)
-    unit = trial.model.variable(trial.estimate).unit
+    bound = _bound(bench, known, rows, batch[driven], kept[:bounded]) if bounded else np.zeros(0)
+    unit = bench.model.variable(bench.estimate).unit
     return SpreadErrors(
-        tuple(observers), tuple(f for f, _, _ in trial.stretches), unit, trial.torque, errors[:, 0],
+        tuple(observers), tuple(f for f, _, _ in bench.stretches), unit, bench.torque, errors[:, 0],
         errors[:, kept], _causes(errors, shifts, quantum is not None), bound,
         draws - len(kept),
     )  # fmt: skip
 
 
-def relevant(prior: Prior, trial: Trial) -> Prior:
+def relevant(prior: Prior, bench: Trial) -> Prior:
     """Return what is known of the numbers that the bench notices at all.
 
     Parameters
     ----------
     prior
         Of all numbers.
-    trial
+    bench
         The bench.
     """
-    model = trial.model
+    model = bench.model
     s = model.symbols()
     everything = ca.vertcat(s.derivative, s.output, s.signal)
     depends = ca.which_depends(everything, s.parameter, 1, False)
@@ -243,23 +241,23 @@ def _shifts(prior: Prior) -> list[tuple[str, Array]]:
     return shifts
 
 
-def _quantum_name(trial: Trial) -> str | None:
+def _quantum_name(bench: Trial) -> str | None:
     try:
-        encoder_quantum(trial.model, trial.measured)
+        encoder_quantum(bench.model, bench.measured)
     except ArrangementError:
         # Without a declared encoder the angle is read exactly; then there are no counts to leave out.
         return None
-    reading = next(r for r in trial.model.readings if r.measured == trial.measured)
-    return next(f"{s}.quantum" for s in reading.sensors if f"{s}.quantum" in trial.model.values)
+    reading = next(r for r in bench.model.readings if r.measured == bench.measured)
+    return next(f"{s}.quantum" for s in reading.sensors if f"{s}.quantum" in bench.model.values)
 
 
-def _errors(batch: BatchTrace, torque: str, estimates: Mapping[str, str], trial: Trial) -> Array:
+def _errors(batch: BatchTrace, torque: str, estimates: Mapping[str, str], bench: Trial) -> Array:
     """Return root mean square errors, shape (observers, runs, frequencies)."""
     result = []
     for name in estimates.values():
         wrong = batch[name] - batch[torque]
         columns = []
-        for _, first, last in trial.stretches:
+        for _, first, last in bench.stretches:
             counted = (batch.time >= first) & (batch.time < last)
             columns.append(np.sqrt(np.mean(wrong[:, counted] ** 2, axis=1)))
         result.append(np.stack(columns, axis=1))
@@ -278,14 +276,14 @@ def _causes(errors: Array, shifts: list[tuple[str, Array]], counted: bool) -> di
     return {name: np.sqrt(square) for name, square in squares.items()}
 
 
-def _bound(trial: Trial, known: Prior, rows: Mapping[str, Array], driven: Array, chosen: list[int]) -> Array:
+def _bound(bench: Trial, known: Prior, rows: Mapping[str, Array], driven: Array, chosen: list[int]) -> Array:
     sensed = SensedTorque(
-        trial.estimate, trial.measured, encoder_quantum(trial.model, trial.measured),
-        float(trial.servo.sample_time or 1e-3),
+        bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured),
+        float(bench.servo.sample_time or 1e-3),
     )  # fmt: skip
     bounds = []
     for i in chosen:
         values = {name: float(rows[f"{PLANT}.{name}"][i]) for name in known.names}
         # One sample passes before a computed input acts.
-        bounds.append(estimator_bound(trial.model.with_values(values), known, driven[i][None, :], sensed))
-    return np.array([rms_over(bounds, first, last) for _, first, last in trial.stretches])
+        bounds.append(estimator_bound(bench.model.with_values(values), known, driven[i][None, :], sensed))
+    return np.array([rms_over(bounds, first, last) for _, first, last in bench.stretches])
