@@ -30,7 +30,7 @@ from nlsdesign.control import (
 from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import design_observer
+from nlsdesign.observer import CascadeGain, design_observer
 from nlsdesign.simulation.sampled_batch import run_batch
 from tests.physics.test_control_torque import linear_actuator, sampled_response
 from tests.renamed import SCHEMES, renamed
@@ -46,7 +46,7 @@ def plants(deck: str) -> tuple[FlatModel, FlatModel]:
 
 def loops(deck: str, sample_time: float = 1e-3, **gains: float) -> tuple[ClosedLoop, ClosedLoop]:
     fixed, moved = plants(deck)
-    observer = design_observer(fixed, sample_time=sample_time)
+    observer = design_observer(fixed, sample_time=sample_time, gain=CascadeGain())
     controller = torque_controller(fixed, gains=TorqueGains(**gains), sample_time=sample_time)
     return tuple(
         encoder_loop(p, observer=observer, controller=controller, substeps=round(1e4 * sample_time))
@@ -67,7 +67,9 @@ def test_response_of_a_linear_loop_is_its_z_transform(gains: TorqueGains) -> Non
     """The z-transform is typed by hand with perfect torque feedback; one sample of delay."""
     plant = linear_actuator(1.7, moved=False)
     loop = encoder_loop(
-        plant, observer=design_observer(plant), controller=torque_controller(plant, gains=gains)
+        plant,
+        observer=design_observer(plant, gain=CascadeGain()),
+        controller=torque_controller(plant, gains=gains),
     )
     frequencies = [0.5, 3.0, 12.5, 80.0]
     found = linear_loop(loop, [0.2]).response(loop.torque, loop.desired, frequencies)[0]
@@ -216,7 +218,8 @@ def test_names_decide_nothing(scheme: object) -> None:
     bench = flatten(machine.assembly, outputs=outputs)
     other = encoder_loop(
         flatten(with_moved_load(machine.assembly), outputs=outputs),
-        observer=design_observer(bench), controller=torque_controller(bench, gains=TorqueGains()),
+        observer=design_observer(bench, gain=CascadeGain()),
+        controller=torque_controller(bench, gains=TorqueGains()),
     )  # fmt: skip
     at = [0.3]
     assert output_impedance(other, at).impedance == pytest.approx(output_impedance(moved, at).impedance)

@@ -20,7 +20,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.errors import UnknownNameError, ValueRangeError
 from nlsdesign.export import natively
 from nlsdesign.model import flatten
-from nlsdesign.observer import design_observer
+from nlsdesign.observer import CascadeGain, design_observer
 from nlsdesign.simulation.sampled_batch import run_batch
 
 GAIN = "controller.proportional"
@@ -32,7 +32,7 @@ def loop() -> ClosedLoop:
         declare(load_deck("austin2015_figure_consistent")), outputs=["motor.angle", "spring.torque"]
     )
     controller = torque_controller(plant, gains=TorqueGains())
-    return encoder_loop(plant, observer=design_observer(plant), controller=controller)
+    return encoder_loop(plant, observer=design_observer(plant, gain=CascadeGain()), controller=controller)
 
 
 def swings(loop: ClosedLoop, gains: np.ndarray, amplitude: float) -> np.ndarray:
