@@ -306,7 +306,7 @@ class _Assembler:
                 raise ConvergenceError(
                     f"linear loop with {' and '.join(m.name for m in self.system.blocks.values())}",
                     "no rest is found",
-                    next_step="linearise with a scheduled observer: design_observer(model, gain=CascadeGain())",
+                    next_step="take a scheduled observer: design_observer(model, gain=CascadeGain())",
                 ) from error
             for k, column in enumerate(columns):
                 self._moved(column, step[:, k])
