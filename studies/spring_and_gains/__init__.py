@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import loss_of, material
-from nlsdesign.control import LoopChoice
+from nlsdesign.control import LoopChoice, best_choices
 from nlsdesign.design import CamDesign
 from nlsdesign.errors import NlsError
+from nlsdesign.quantity import three_digits
 from nlsdesign.report import FigureSection, TableSection
 
 from ..alternative_rubber.bench import Bench, Rubber
@@ -115,7 +116,7 @@ class Results:
 
     def _under_margins(self) -> dict[str, float]:
         """Return the numbers of the linear half."""
-        found = {}
+        found: dict[str, float] = {}
         for line in self.lines:
             if line.spring in DECKS:
                 found |= line.numbers | {f"{line.spring}_reach_Hz": line.reach}
@@ -237,30 +238,33 @@ def _linear_sections(results: Results) -> tuple[FigureSection, TableSection]:
     }  # fmt: skip
     for law in dict.fromkeys(line.law.title for line in results.lines):
         own = [line.last for line in results.lines if line.law.title == law and line.spring not in DECKS]
-        found = sorted((c for c in own if c is not None), key=stiffness_felt)
+        found = best_choices([c for c in own if c is not None])
         if found:
-            curves[f"designed, {law}"] = _points(found)
+            curves[f"best designed, {law}"] = _points(found)
     curves["no other is better in both"] = _points(best)
     up = f"bandwidth up to {HIGH:g} N·m, Hz"
     across = f"impedance at {MOVED_AT:g} Hz, N·m/rad"
     kept = f"{LIMITS.gain_margin:g} dB and {LIMITS.phase_margin:g}°"
     rows = tuple(
-        (line.spring, line.law.title, line.largest, line.law.unit, *_last(line), line.limited_by,
-         "yes" if any(c in best for c in line.choices) else "")
+        (
+            line.label,
+            f"{three_digits(line.largest)} {line.law.unit}" if line.choices else line.limited_by,
+            *_last(line),
+            "yes" if any(c in best for c in line.choices) else "",
+        )
         for line in results.lines
-    )  # fmt: skip
+    )
     figure = FigureSection(
-        "The three published springs and the designed ones, with margins over angle and spread",
+        "Published and designed springs under margins",
         nls.figures.curves(
             curves,
             across=across,
             up=up,
-            logarithmic=True,
             words=f"Bandwidth over impedance of {len(curves) - 1} lines of springs and laws under margins.",
         ),
         caption=f"Along each line of a published spring the gain rises from a quarter to the largest that "
         f"keeps {kept} at three torques, for the declared machine and for {DRAWS} drawn from its spread; of "
-        "the designed springs that gain only.",
+        "the designed springs that gain only, of those that no other designed one betters.",
         means="A soft spring bears the most gain and has the least impedance, but the motor has furthest to "
         f"go: it makes a sine of {HIGH:g} N·m only up to the lowest frequency. A PID gain is bounded where "
         "the spring is stiffest and is slow where it is soft; scheduled over the stiffness a stiffening "
@@ -271,11 +275,10 @@ def _linear_sections(results: Results) -> tuple[FigureSection, TableSection]:
         "these counts. Bandwidth is the lower of that of small motions and the frequency up to which speed "
         f"limit and current allow a sine of {HIGH:g} N·m. Nothing is fed forward.",
     )
-    heads = (
-        "spring", "law", "largest gain", "unit", "small motions, Hz", f"reach at {HIGH:g} N·m, Hz", across,
-        "more would break", "on the front",
-    )  # fmt: skip
-    return figure, TableSection("Largest gains under margins", heads, rows, caption=f"Margins of {kept}.")
+    heads = ("spring, law", "largest gain", "small motions, Hz", "reach, Hz", across, "on the front")
+    return figure, TableSection(
+        "Largest gains under margins", heads, rows, caption=f"Margins of {kept}; reach at {HIGH:g} N·m."
+    )
 
 
 def _points(choices: Sequence[LoopChoice]) -> tuple[Array, Array]:
