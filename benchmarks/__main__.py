@@ -5,8 +5,14 @@ from __future__ import annotations
 import importlib
 
 NAMES = (
-    "observer_step", "bench_simulation", "bench_events", "fit", "cam_design", "analysis_over_angle", "observers",
-)  # fmt: skip
+    "observer_step",
+    "bench_simulation",
+    "bench_events",
+    "fit",
+    "cam_design",
+    "analysis_over_angle",
+    "observers",
+)
 
 
 def main() -> None:
