@@ -29,7 +29,7 @@ from nlsdesign.control import (
 from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
 from nlsdesign.model import flatten
-from nlsdesign.observer import design_observer
+from nlsdesign.observer import CascadeGain, design_observer
 
 AMPLITUDE, FREQUENCIES = 0.8, np.geomspace(0.1, 11.0, 20)
 PEER_SAMPLES = 1500
@@ -42,7 +42,7 @@ def published_loop() -> ClosedLoop:
         declare(load_deck("austin2015_figure_consistent")), outputs=["motor.angle", "spring.torque"]
     )
     controller = torque_controller(plant, gains=TorqueGains())
-    return encoder_loop(plant, observer=design_observer(plant), controller=controller)
+    return encoder_loop(plant, observer=design_observer(plant, gain=CascadeGain()), controller=controller)
 
 
 def peer(loop: ClosedLoop) -> tuple[control.NonlinearIOSystem, np.ndarray]:

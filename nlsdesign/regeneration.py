@@ -28,7 +28,15 @@ from .model import FlatModel
 from .model.readings import reading_of
 from .model.roles import measured_motion, series_spring
 from .model.structure import SpringNames
-from .observer import FixedGrid, Grid, ObserverDesign, design_observer_with_details, observe
+from .observer import (
+    AdaptiveDesign,
+    FixedGrid,
+    Grid,
+    ObserverDesign,
+    design_adaptive_observer,
+    design_observer_with_details,
+    observe,
+)
 from .observer.scheduling.scheduled import whole_contour
 from .processes import parallel_map
 from .quantity import three_digits, with_unit
@@ -93,13 +101,19 @@ class Regeneration:
     plant
         The better model.
     observer
-        Of the better model; ``None`` where none can be designed.
+        Of the better model, cascade or adaptive, whichever errs less on these records; ``None`` where none
+        can be designed.
     reasons
         Why there is no observer, or no comparison; empty if nothing is lacking.
     quantity, unit
         What is estimated.
     errors
-        By record, with the nominal numbers.
+        Of the cascade by record, with the nominal numbers.
+    adaptive
+        Of the adaptive observer by record, begun at the declared numbers; empty where it cannot be designed
+        for both models or a record lacks an input of it.
+    chosen
+        Which observer was taken, and why.
     spread_before, spread_after
         Root mean square error over these records for each draw of the numbers, where an observer could be
         designed.
@@ -113,6 +127,8 @@ class Regeneration:
     quantity: str = ""
     unit: str = "N*m"
     errors: tuple[ObserverTorqueError, ...] = ()
+    adaptive: tuple[ObserverTorqueError, ...] = ()
+    chosen: str = ""
     spread_before: tuple[float, ...] = ()
     spread_after: tuple[float, ...] = ()
     course: tuple[Array, Array, Array, Array] | None = None
@@ -120,8 +136,12 @@ class Regeneration:
     @property
     def nominal(self) -> tuple[float, float]:
         """Error over all records, before and after, with the nominal numbers."""
-        before, after = (_rms([getattr(e, which) for e in self.errors]) for which in ("before", "after"))
-        return before, after
+        return _over_records(self.errors)
+
+    @property
+    def learning(self) -> tuple[float, float]:
+        """Error of the adaptive observer over all records, before and after."""
+        return _over_records(self.adaptive)
 
     @property
     def over_spread(self) -> tuple[float, float]:
@@ -132,13 +152,17 @@ class Regeneration:
         """Return the torque error before and after in sentences; none where nothing was compared."""
         if not self.errors:
             return ()
-        pairs = {"with the nominal numbers": self.nominal, "over the spread": self.over_spread}
+        pairs = {
+            "with the nominal numbers": self.nominal,
+            "over the spread": self.over_spread,
+            "that learns": self.learning,
+        }
         return tuple(
             f"Error of the observer of `{self.quantity}` {how}, before → after: "
             f"{three_digits(pair[0])} → {with_unit(three_digits(pair[1]), self.unit)}."
             for how, pair in pairs.items()
             if all(map(math.isfinite, pair))
-        )
+        ) + ((f"Generated is the {self.chosen}.",) if self.adaptive else ())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``regeneration.json``."""
@@ -149,9 +173,17 @@ class Regeneration:
             "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
             "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
             "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
+            "adaptive": dict(zip(keys, map(_finite, self.learning), strict=True)),
             "records": [each._asdict() for each in self.errors],
+            "adaptive_records": [each._asdict() for each in self.adaptive],
+            "chosen": self.chosen,
             "reasons": list(self.reasons),
         }
+
+
+def _over_records(errors: Sequence[ObserverTorqueError]) -> tuple[float, float]:
+    """Return the error over all records, before and after."""
+    return _rms([e.before for e in errors]), _rms([e.after for e in errors])
 
 
 def _rms(values: Sequence[float]) -> float:
@@ -208,20 +240,26 @@ def regenerate(
         runs = [_Watched.of(better, spring, r, choice) for r in records.of("held_out") or records.records]
     except NlsError as error:
         return Regeneration(better, after.model, (f"the observers are not compared: {error}",), **known)
+    progress("designing the observers that learn")
+    learned = [_learning(model, choice) for model in (declared, better)]
+    adaptive, lacking = _compared(learned, runs)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
         ObserverTorqueError(run.record.name, run.record.role, run.error(a), run.error(b), run.size)
         for run, (a, b) in zip(runs, pairs, strict=True)
     )
+    generated, chosen = _generated(after, learned[1], errors, adaptive)
     progress("designing observers over the spread of the numbers")
     draws = [*_draws(declared, ()), *_draws(better, fits)]
     models = [*[declared] * DRAWS, *[better] * DRAWS]
     spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
     return Regeneration(
         better,
-        after.model,
-        _failures(spread),
+        generated.model,
+        (*lacking, *_failures(spread)),
         errors=errors,
+        adaptive=adaptive,
+        chosen=chosen,
         spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
         spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
         course=(runs[0].trace.time, runs[0].torque, *pairs[0]),
@@ -239,6 +277,55 @@ def _designed(model: FlatModel, choice: ObserverChoice, grid: Grid | None = None
     )
 
 
+def _learning(model: FlatModel, choice: ObserverChoice) -> AdaptiveDesign | str:
+    """Return the adaptive observer of a model, or why there is none."""
+    try:
+        return design_adaptive_observer(
+            model,
+            estimate=series_spring(model, choice.spring).effort,
+            measured=measured_motion(model, choice.measured),
+            sample_time=choice.sample_time,
+        )
+    except NlsError as error:
+        # The cascade stands already; that nothing learns, and why, is one of the reasons.
+        return str(error)
+
+
+def _compared(
+    learned: Sequence[AdaptiveDesign | str], runs: Sequence[_Watched]
+) -> tuple[tuple[ObserverTorqueError, ...], tuple[str, ...]]:
+    """Return the errors of the adaptive observers, before and after, or why there are none."""
+    words = "the adaptive observer is not compared: "
+    designs = []
+    for which, each in zip(("declared", "better"), learned, strict=True):
+        if isinstance(each, str):
+            return (), (f"{words}none can be designed for the {which} model: {each}",)
+        designs.append(each)
+    lacking = sorted({name for run in runs for design in designs for name in run.lacks(design)})
+    if lacking:
+        return (), (f"{words}a record does not measure {', '.join(lacking)}",)
+    pairs = [[run.error(run.estimate(design)) for design in designs] for run in runs]
+    errors = tuple(
+        ObserverTorqueError(run.record.name, run.record.role, before, after, run.size)
+        for run, (before, after) in zip(runs, pairs, strict=True)
+    )
+    return errors, ()
+
+
+def _generated(
+    cascade: ObserverDesign,
+    learning: AdaptiveDesign | str,
+    errors: Sequence[ObserverTorqueError],
+    adaptive: Sequence[ObserverTorqueError],
+) -> tuple[ObserverDesign | AdaptiveDesign, str]:
+    """Return the observer of the better model that errs less on the records, and why in words."""
+    if isinstance(learning, str) or not adaptive:
+        return cascade, "cascade"
+    if _over_records(adaptive)[1] < _over_records(errors)[1]:
+        return learning, "adaptive observer: it errs less on these records than the cascade"
+    return cascade, "cascade: it errs less on these records than the adaptive observer"
+
+
 @dataclass(frozen=True, eq=False)
 class _Watched:
     """A record at the sample time of the observers, with the torque that it shows."""
@@ -248,6 +335,7 @@ class _Watched:
     torque: Array
     readings: Mapping[str, str]
     motion: str
+    silent: tuple[str, ...]
 
     @classmethod
     def of(cls, model: FlatModel, spring: SpringNames, record: Record, choice: ObserverChoice) -> _Watched:
@@ -261,20 +349,27 @@ class _Watched:
         silent = {v.name: np.full(len(record.trace), v.start) for v in model.inputs if v.name not in shown}
         trace = record.trace.with_signals({**silent, _TORQUE: torque}, dict.fromkeys([*silent, _TORQUE], "1"))
         even = trace.at(time)
-        return cls(record, even, even[_TORQUE], {n: s for n, s in shown.items() if n != s}, motion)
+        return cls(
+            record, even, even[_TORQUE], {n: s for n, s in shown.items() if n != s}, motion, (*silent,)
+        )
 
     @property
     def size(self) -> float:
         """Root mean square of the torque."""
         return float(np.sqrt(np.mean(self.torque**2)))
 
-    def estimate(self, design: ObserverDesign) -> Array:
+    def lacks(self, design: ObserverDesign | AdaptiveDesign) -> list[str]:
+        """Return inputs of an observer that the record does not measure."""
+        return [v.name for v in design.model.inputs if v.name in self.silent]
+
+    def estimate(self, design: ObserverDesign | AdaptiveDesign) -> Array:
         """Return what an observer makes of the record, begun at rest at its first angle."""
         inputs = {v.name for v in design.model.inputs}
         wires = {name: signal for name, signal in self.readings.items() if name in inputs}
         first = float(self.trace[self.readings.get(self.motion, self.motion)][0])
         run = observe(design.model, self.trace, readings=wires, start=design.start(first))
-        return run[design.step.plant.estimate.name]
+        step = design.step.nominal if isinstance(design, AdaptiveDesign) else design.step
+        return run[step.plant.estimate.name]
 
     def error(self, estimate: Array) -> float:
         """Return the root mean square error of an estimate."""

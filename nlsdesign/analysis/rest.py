@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -82,24 +83,65 @@ def rest_states(
     ArrangementError
         If no angle is named and the structure does not say which body is driven.
     """
-    angle = measured_motion(model, angle)
-    names = [v.name for v in model.states]
-    tied = dict(consistent or {})
-    held = {angle, rate_state(model, angle), *tied}
-    x = np.tile(model.start(model.states), (len(angles), 1))
-    x[:, names.index(angle)] = angles
-    x[:, names.index(rate_state(model, angle))] = 0.0
-    s = model.symbols()
-    known = named(model, s)
-    p, u = model.start(model.parameters), model.start(model.inputs)
-    for name, signal in tied.items():
-        follow = ca.Function("follow", [s.time, s.state, s.input, s.parameter], [known[signal]])
-        x[:, names.index(name)] = evaluate_rows(follow, x, u, p)[0][:, 0]
-    free = [i for i, name in enumerate(names) if name not in held]
-    rate = ca.vertcat(*[s.derivative[i] for i in free])
-    slope = ca.jacobian(rate, ca.vertcat(*[s.state[i] for i in free])) if free else ca.SX(0, 0)
-    newton = ca.Function("rate", [s.time, s.state, s.input, s.parameter], [rate, ca.densify(slope)])
-    return _newton(newton, x, (u, p), free, (tolerance, model.name))
+    return RestSolver(model, angle=angle, consistent=consistent)(model, angles, tolerance)
+
+
+class RestSolver:
+    """Finds rest states of one model with many sets of numbers; its functions are built once.
+
+    Parameters
+    ----------
+    model
+        Continuous; inputs are at their start values.
+    angle, consistent
+        As for :func:`rest_states`.
+
+    Raises
+    ------
+    ArrangementError
+        If no angle is named and the structure does not say which body is driven.
+    """
+
+    def __init__(
+        self, model: FlatModel, *, angle: str | None = None, consistent: Mapping[str, str] | None = None
+    ) -> None:
+        angle = measured_motion(model, angle)
+        names, tied = [v.name for v in model.states], dict(consistent or {})
+        self._angle, self._rate = names.index(angle), names.index(rate_state(model, angle))
+        held = {self._angle, self._rate, *(names.index(name) for name in tied)}
+        s = model.symbols()
+        known, arguments = named(model, s), [s.time, s.state, s.input, s.parameter]
+        self._tied = [
+            (names.index(name), ca.Function("follow", arguments, [known[signal]]))
+            for name, signal in tied.items()
+        ]
+        self._free = free = [i for i in range(len(names)) if i not in held]
+        rate = ca.vertcat(*[s.derivative[i] for i in free])
+        slope = ca.jacobian(rate, ca.vertcat(*[s.state[i] for i in free])) if free else ca.SX(0, 0)
+        self._newton = ca.Function("rate", arguments, [rate, ca.densify(slope)])
+
+    def __call__(self, model: FlatModel, angles: Array, tolerance: float = 1e-9) -> Array:
+        """Return rest states, shape (n, states).
+
+        Parameters
+        ----------
+        model
+            The same with any numbers.
+        angles, tolerance
+            As for :func:`rest_states`.
+
+        Raises
+        ------
+        ConvergenceError
+            If a state does not come to rest.
+        """
+        x = np.tile(model.start(model.states), (len(angles), 1))
+        x[:, self._angle] = angles
+        x[:, self._rate] = 0.0
+        p, u = model.start(model.parameters), model.start(model.inputs)
+        for place, follow in self._tied:
+            x[:, place] = evaluate_rows(follow, x, u, p)[0][:, 0]
+        return _newton(self._newton, x, (u, p), self._free, (tolerance, model.name))
 
 
 def typical_sizes(model: FlatModel, angles: Array, *, angle: str | None = None) -> dict[str, float]:
@@ -170,14 +212,22 @@ def evaluate_rows(function: ca.Function, x: Array, u: Array, p: Array) -> list[A
         One per result, with one row per state: a matrix result is laid out row by row.
     """
     count = len(x)
-    inputs = u.T if u.ndim == 2 else np.tile(u[:, None], (1, count))
-    results = function.map(count).call([np.zeros((1, count)), x.T, inputs, np.tile(p[:, None], (1, count))])
+    if u.ndim == 2:
+        results = _mapped(function, count, (0, 3)).call([0.0, x.T, u.T, p])
+    else:
+        results = _mapped(function, count, (0, 2, 3)).call([0.0, x.T, u, p])
     rows = []
     for i, result in enumerate(results):
         wide = function.size2_out(i)
         dense = np.array(result).reshape(function.size1_out(i), count, wide)
         rows.append(np.ascontiguousarray(dense.transpose(1, 0, 2).reshape(count, -1)))
     return rows
+
+
+@lru_cache(maxsize=128)
+def _mapped(function: ca.Function, count: int, shared: tuple[int, ...]) -> ca.Function:
+    """Return a function of many columns; arguments that are shared are not copied for each."""
+    return function.map("rows", "serial", count, list(shared), [])
 
 
 def _newton(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from ..control.evaluation.responses import HeldTorque, ZeroTorque
     from ..control.evaluation.saturation import SaturationLine
 
-GAIN = "controller.proportional"
+GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
+"""Number of the controller whose onset of limit cycling is looked for, by law."""
 _GAINS = ("proportional", "integral", "derivative")
 _FREQUENCIES = (0.1, 11.0, 20)
 
@@ -32,6 +33,7 @@ class _Asked:
     last: float
     inertias: tuple[float, ...]
     load_amplitude: float
+    gain: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,10 @@ class _Evaluation:
 
 @click.command()
 @deck_option
+@click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
+              help="A PID, or speed by tangent stiffness.")  # fmt: skip
+@click.option("--bandwidth", type=Number("Hz"), default=None,
+              help="Of the scheduled law; by default 12 Hz at 1 kHz.")  # fmt: skip
 @click.option("--proportional", type=Number("rad/s/N/m"), default=None, help="Gain Kp of the torque loop.")
 @click.option("--integral", type=Number("rad/s^2/N/m"), default=None, help="Gain Ki of the torque loop.")
 @click.option("--derivative", type=Number("rad/N/m"), default=None, help="Gain Kd of the torque loop.")
@@ -104,11 +110,12 @@ def loop(
     """Evaluate the closed torque loop: responses, margins, impedance, coupled stability, limit cycles.
 
     The load is fixed for responses, moved for the impedance. Exit status 1 if the loop limit-cycles or is
-    unstable anywhere in the range that is looked at; the gain where that begins is printed.
+    unstable anywhere in the range that is looked at; the gain where that begins is printed. The observer is
+    the cascade, with the numbers of the deck for the machine as well.
     """
-    gains = {name: options[name] for name in _GAINS if options[name] is not None}
-    fixed, moved = _loops(deck_name, gains, options["delay"], options["sample_time"])
-    asked = _Asked(*(options[name] for name in ("amplitudes", "last", "inertias", "load_amplitude")))
+    fixed, moved = _loops(deck_name, _law(options), options["delay"], options["sample_time"])
+    names = ("amplitudes", "last", "inertias", "load_amplitude")
+    asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
     result = _evaluated(fixed, moved, asked)
     files = _written(result, out)
     if as_json:
@@ -120,28 +127,42 @@ def loop(
     ctx.exit(1 if result.findings else 0)
 
 
+def _law(options: dict[str, Any]) -> dict[str, Any]:
+    """Return what the controller is made of, as arguments of its function."""
+    from ..control import ScheduledTorque, TorqueGains
+
+    gains = {name: options[name] for name in _GAINS if options[name] is not None}
+    if options["law"] == "scheduled":
+        if gains:
+            raise click.BadParameter(f"the scheduled law has a --bandwidth and no --{next(iter(gains))}")
+        return {"law": ScheduledTorque(bandwidth=options["bandwidth"])}
+    if options["bandwidth"] is not None:
+        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
+    # Without gains the controller picks a velocity loop that the sample time carries.
+    return {"gains": TorqueGains(**gains) if gains else None}
+
+
 def _loops(
-    deck_name: str, gains: dict[str, float], delay: int, sample_time: float
+    deck_name: str, law: dict[str, Any], delay: int, sample_time: float
 ) -> tuple[ClosedLoop, ClosedLoop]:
     """Return the loop with the load fixed, and with the load moved; one observer and controller for both."""
     from ..components.assembly.deck_writer import declare
     from ..components.assembly.moved_load import with_moved_load
-    from ..control import TorqueGains, encoder_loop, torque_controller
+    from ..control import encoder_loop, torque_controller
     from ..deck import load_deck
     from ..model import flatten
     from ..model.roles import measured_motion, series_spring
     from ..model.transform import with_outputs
-    from ..observer import design_observer
+    from ..observer import CascadeGain, design_observer
 
     assembly = declare(load_deck(deck_name))
     plants = []
     for each in (assembly, with_moved_load(assembly)):
         whole = flatten(each)
         plants.append(with_outputs(whole, [measured_motion(whole), series_spring(whole).effort]))
-    observer = design_observer(plants[0], sample_time=sample_time)
-    # Without gains the controller picks a velocity loop that the sample time carries.
-    chosen = TorqueGains(**gains) if gains else None
-    controller = torque_controller(plants[0], gains=chosen, sample_time=sample_time)
+    # What an adaptive observer has learned depends on what went before, so a loop with it has no one figure.
+    observer = design_observer(plants[0], sample_time=sample_time, gain=CascadeGain())
+    controller = torque_controller(plants[0], sample_time=sample_time, **law)
     substeps = max(1, round(10 * sample_time / 1e-3))
     fixed, moved = (
         encoder_loop(plant, observer=observer, controller=controller, delay=delay, substeps=substeps)
@@ -156,7 +177,7 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
     from .. import control as ctl
     from ..model.roles import motor_of
 
-    translate = _translate()
+    translate = compiled()
     reach = ctl.largest_torque(fixed.plant)
     amplitudes = asked.amplitudes or tuple(float(f"{share * reach:.2g}") for share in (0.2, 0.6))
     inertia = fixed.plant.values[motor_of(fixed.plant)[1].inertia]
@@ -168,10 +189,10 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
         for a in amplitudes
     )
     held = ctl.held_torque(fixed, amplitudes, translate=translate)
-    gain = fixed.controller.values[GAIN]
+    gain = fixed.controller.values[asked.gain]
     onsets = tuple(
         ctl.onset_of_limit_cycling(
-            fixed, GAIN, between=(0.1 * gain, 5.0 * gain), amplitude=a, translate=translate
+            fixed, asked.gain, between=(0.1 * gain, 5.0 * gain), amplitude=a, translate=translate
         )
         for a in (amplitudes if gain > 0.0 else ())
     )
@@ -185,13 +206,13 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
     zero = ctl.zero_torque(moved, amplitude=asked.load_amplitude, frequencies=(0.5, 1.0, 2.0, 5.0, 9.0),
                            translate=translate)  # fmt: skip
     return _Evaluation(
-        _Asked(amplitudes, asked.last, tuple(inertias), asked.load_amplitude), responses, held, onsets, line,
+        replace(asked, amplitudes=amplitudes, inertias=tuple(inertias)), responses, held, onsets, line,
         margins, ctl.output_impedance(moved, angles[::5]), coupled, zero,
         ctl.torque_resolution(fixed, angles),
     )  # fmt: skip
 
 
-def _translate() -> Any:
+def compiled() -> Any:
     """Return what compiles the loop; without a compiler it is interpreted, about eight times slower."""
     import casadi as ca
 

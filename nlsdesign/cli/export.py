@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from .controller import export_controller
-from .observer import observer_of, real_option, sample_time_option
+from .observer import real_option, sample_time_option
+from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
 
 
@@ -21,25 +22,28 @@ export.add_command(export_controller)
 
 @export.command("c")
 @deck_option
+@kind_option
 @sample_time_option
 @spring_option
 @measured_option
 @out_option("out/c")
 @real_option
-def export_observer(deck_name: str, sample_time: float, out: Path, real: str, **roles: str | None) -> None:
-    """Write the torque observer as C99."""
+def export_observer(deck_name: str, sample_time: float, out: Path, real: str, **chosen: str | None) -> None:
+    """Write the torque observer as C99; by default the one that is best over the spread of the deck."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..export import export_c
     from ..model import flatten
 
-    model = observer_of(flatten(declare(load_deck(deck_name))), sample_time, **roles)
+    model = observer_of(flatten(declare(load_deck(deck_name))), sample_time, **chosen)
     source = export_c(model, out, real=real, name="observer")
+    click.echo(model.description)
     click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
 
 
 @export.command("fmu")
 @deck_option
+@kind_option
 @sample_time_option
 @spring_option
 @measured_option
@@ -61,7 +65,7 @@ def export_fmus(
     version: str,
     platforms: tuple[str, ...],
     plant_only: bool,
-    **roles: str | None,
+    **chosen: str | None,
 ) -> None:
     """Write plant and, for an actuator, its observer as co-simulation FMUs."""
     from ..components.assembly.deck_writer import declare
@@ -74,10 +78,10 @@ def export_fmus(
     models = {"plant": plant}
     if is_actuator(plant) and not plant_only:
         # Before anything is written: not every system has an observer.
-        models["observer"] = observer_of(plant, sample_time, **roles)
-    chosen = list(platforms) or None
+        models["observer"] = observer_of(plant, sample_time, **chosen)
+    systems = list(platforms) or None
     written = [
-        export_fmu(model, out / f"{name}.fmu", version=version, platforms=chosen)
+        export_fmu(model, out / f"{name}.fmu", version=version, platforms=systems)
         for name, model in models.items()
     ]
     click.echo(f"written: {', '.join(str(path) for path in written)}")

@@ -10,6 +10,7 @@ from ..errors import NlsError
 from ..locations import version
 from .analyse import analyse
 from .analyse_angle import analyse_angle
+from .analyse_loop import loop
 from .calibrate import calibrate
 from .cosimulate import cosimulation
 from .decks import deck
@@ -20,6 +21,7 @@ from .fit import fit
 from .materials import materials
 from .observer import observer
 from .observer_certificate import verify_certificate
+from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
 from .parts import parts
 from .studies import study
 
@@ -30,14 +32,14 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-for part in (calibrate, verify_certificate):
+for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, verify_certificate):
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
     *(cosimulation, simulate, fit, diagnose, study),
 ):
     program.add_command(command)
-for analysis in (analyse_angle,):  # the first is the default
+for analysis in (analyse_angle, loop):  # the first is the default
     analyse.add_command(analysis)
 
 

@@ -7,49 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ArrangementError
-from .output import DECK_HELP, measured_option, out_option, spring_option
+from .observer_certificate import range_options
+from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
+from .output import DECK_HELP, json_option, measured_option, out_option, show_json, spring_option
 from .units import Number
 
 if TYPE_CHECKING:
-    from ..model import FlatModel
+    from .observer_certificate import ToProve
 
 sample_time_option = click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
 real_option = click.option(
     "--real", type=click.Choice(["double", "float"]), default="double", show_default=True
 )
-
-
-def observer_of(
-    plant: FlatModel, sample_time: float, *, spring: str | None = None, measured: str | None = None
-) -> FlatModel:
-    """Return the observer of the torque of a series spring.
-
-    Parameters
-    ----------
-    plant
-        Flat model of an actuator.
-    sample_time
-        In s.
-    spring
-        Path of the spring; decided from the structure if it is left out.
-    measured
-        State that is measured; decided from the structure if it is left out.
-
-    Raises
-    ------
-    ArrangementError
-        If the model has no spring or no driven body, or the structure leaves open which is meant.
-    """
-    from ..model.roles import measured_motion, series_spring
-    from ..observer import design_observer
-
-    try:
-        torque, measured = series_spring(plant, spring).effort, measured_motion(plant, measured)
-    except ArrangementError as error:
-        alone = "nlsdesign export fmu --plant-only writes the plant alone, with its C sources inside"
-        raise ArrangementError(error.thing, error.rule, next_step=f"{error.next_step}; {alone}") from None
-    return design_observer(plant, estimate=torque, measured=measured, sample_time=sample_time)
 
 
 @click.group(invoke_without_command=True)
@@ -58,22 +27,31 @@ def observer_of(
 @sample_time_option
 @spring_option
 @measured_option
+@kind_option
 @out_option("out/observer")
 @real_option
+@click.option("--errors", "with_errors", is_flag=True, help="Also compare torque errors on a simulated "
+              "bench: with exact numbers, over the spread, by cause.")  # fmt: skip
+@click.option("--draws", type=click.IntRange(min=4), default=16, show_default=True,
+              help="Machines drawn for --errors.")  # fmt: skip
+@json_option
 @click.option("--certificate", "certified", is_flag=True, help="Also write what is proved of it.")
 @click.option("--decay", type=float, metavar="PER_SECOND", help="Design one certified gain with this decay.")
 @click.option("--with-spread", is_flag=True, help="Certify for all parameters within their spread.")
+@range_options
 def observer(
     context: click.Context,
     /,
     deck_name: str | None,
-    sample_time: float,
     out: Path,
-    real: str,
-    decay: float | None,
+    as_json: bool,
     **options: Any,
 ) -> None:
-    """Design the torque observer and write it as C with a self-test."""
+    """Design the torque observer and write it as C with a self-test.
+
+    Without --kind it is the observer with the least expected error over the spread of the deck; the same that
+    `export c` and `export fmu` write. The reason is printed.
+    """
     if context.invoked_subcommand is not None:
         _refuse_misplaced(context)
         return
@@ -83,22 +61,69 @@ def observer(
     from ..deck import load_deck
     from ..export import export_c
     from ..model import flatten
+    from ..observer import certified_design
+    from .observer_certificate import prove, with_statement, write_proved
+    from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
+    kind, wanted = _what_is_asked(context, options)
     deck = load_deck(deck_name)
     plant = flatten(declare(deck))
-    certified, with_spread = options.pop("certified"), options.pop("with_spread")
-    if not certified:
-        if decay is not None or with_spread:
-            raise click.UsageError("--decay and --with-spread belong to --certificate", ctx=context)
-        model = observer_of(plant, sample_time, **options)
-        source = export_c(model, out, real=real, name="observer")
-        click.echo(str(model))
-        click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
+    roles = {name: options[name] for name in ("spring", "measured")}
+    sample_time, real = options["sample_time"], options["real"]
+    chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
+    proved = None if wanted is None else prove(plant, deck, chosen, wanted)
+    errors = (
+        spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
+        if options["with_errors"]
+        else None
+    )
+    model = chosen.model if proved is None else with_statement(certified_design(proved, plant).model, proved)
+    source = export_c(model, out, real=real, name="observer")
+    files = [source.header, source.source, source.selftest]
+    if proved is not None:
+        files.insert(0, write_proved(proved, out, source))
+    if errors is not None:
+        files += write_errors(errors, out)
+    statement = () if proved is None else proved.statement
+    if as_json:
+        content = {
+            "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),
+            "description": model.description, "statement": list(statement),
+            "certified": proved is not None, "files": files,
+        }  # fmt: skip
+        show_json(content | ({} if errors is None else {"errors": content_of(errors)}))
         return
-    from .observer_certificate import ToProve, write_certified
+    for sentence in (str(chosen.design), *filter(None, [chosen.reason]), *statement):
+        click.echo(sentence)
+    if proved is None:
+        click.echo("not certified; --kind certified or --certificate proves what can be proved")
+    if errors is not None:
+        show_errors(errors, chosen.kind, deck_name)
+    else:
+        click.echo("errors over the spread, and their causes: add --errors")
+    click.echo(f"written: {', '.join(map(str, files))}")
 
-    wanted = ToProve(decay, with_spread, real)
-    write_certified(plant, deck, out, sample_time=sample_time, wanted=wanted, **options)
+
+def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str | None, ToProve | None]:
+    """Return the kind of observer, and what is to be proved of it; nothing by default."""
+    from .observer_certificate import ToProve, given_ranges
+
+    ranges = given_ranges(options)
+    kind, decay, with_spread = options["kind"], options["decay"], options["with_spread"]
+    if not (options["certified"] or kind == CERTIFIED):
+        if decay is not None or with_spread or ranges:
+            words = "--decay, --with-spread, --angles, --speed and --angle-error belong to --certificate"
+            raise click.UsageError(words, ctx=context)
+        return kind, None
+    if kind not in (None, CASCADE, CERTIFIED):
+        raise click.UsageError(
+            f"an observer of kind '{kind}' cannot be certified; take --kind {CERTIFIED} or {CASCADE}",
+            ctx=context,
+        )
+    if decay is not None and kind == CASCADE:
+        raise click.UsageError(f"--decay belongs to --kind {CERTIFIED}", ctx=context)
+    kind = kind or (CASCADE if decay is None else CERTIFIED)
+    return kind, ToProve(decay, with_spread, options["real"], ranges)
 
 
 def _refuse_misplaced(context: click.Context) -> None:

@@ -26,6 +26,7 @@ from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .ranked import ranked_intervals
+from .spread_of_errors import errors_over_spread
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
 from .task_figures import curve_of_task, motor_over_task
@@ -58,6 +59,7 @@ __all__ = [
     "curves",
     "described",
     "design_picture",
+    "errors_over_spread",
     "gap_bars",
     "held_out_series",
     "impedance_over_frequency",

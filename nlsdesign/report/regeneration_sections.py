@@ -60,6 +60,10 @@ def _numbers(result: Regeneration) -> NumbersSection:
         counts = f"{len(result.spread_before)} and {len(result.spread_after)} draws"
         note = f"declared spreads → covariance of the fit, {counts}"
         numbers.append(KeyNumber("torque error over the spread", f"{before} → {after} {unit}", note))
+    if result.adaptive:
+        before, after = (three_digits(each) for each in result.learning)
+        note = "learns on each record, begun at the numbers of its model"
+        numbers.append(KeyNumber("adaptive observer", f"{before} → {after} {unit}", note))
     return NumbersSection("Torque error", tuple(numbers))
 
 
@@ -67,14 +71,20 @@ def _table(result: Regeneration) -> TableSection:
     unit = typeset_unit(result.unit)
     rows = tuple(
         (
+            kind,
             e.record,
             e.role.replace("_", " "),
             three_digits(e.before),
             three_digits(e.after),
             three_digits(e.torque),
         )
-        for e in result.errors
+        for kind, errors in (("cascade", result.errors), ("adaptive", result.adaptive))
+        for e in errors
     )
-    columns = ("record", "used", f"before in {unit}", f"after in {unit}", f"torque in {unit}")
-    caption = "Root mean square error of the estimated torque with nominal numbers, and the torque itself."
+    columns = ("observer", "record", "used", f"before in {unit}", f"after in {unit}", f"torque in {unit}")
+    caption = (
+        "Root mean square error of the estimated torque, and the torque itself; the cascade with nominal "
+        "numbers, the adaptive observer begun with them."
+        + (f" Generated is the {result.chosen}." if result.chosen else "")
+    )
     return TableSection("Torque error of each record", columns, rows, caption=caption)

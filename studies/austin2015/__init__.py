@@ -14,10 +14,12 @@ import nlsdesign as nls
 from .._published import declared_actuator
 from .design import design_spring
 from .diagnosis import diagnose_bench
+from .evaluation import evaluate_loop
 from .figures import compare_with_figures
 from .observer import compare_observers, sweep_angle
 from .report import write_page
 from .results import ActuatorResults, Results
+from .spread import over_spread
 from .torque_loop import export_and_cosimulate
 from .tracking import follow_sines
 
@@ -40,8 +42,8 @@ def main(out: Path, fast: bool = False) -> Results:
         cam = design_spring(actuator, out, 200 if fast else 1000)
     with steps.step("model against the figures of the paper"):
         figures = compare_with_figures(actuator)
-    published = work_up(actuator, "published", out, steps=steps, fast=fast)
-    designed = work_up(cam.design.actuator, "designed", out, steps=steps, fast=fast)
+    published = work_up(actuator, out / "actuator.toml", out / "published", steps=steps, fast=fast)
+    designed = work_up(cam.design.actuator, out / "designed.toml", out / "designed", steps=steps, fast=fast)
     with steps.step("diagnosis of the bench records"):
         verdict = diagnose_bench(actuator, out, steps)
     results = Results(published, designed, cam, figures, verdict)
@@ -51,16 +53,20 @@ def main(out: Path, fast: bool = False) -> Results:
 
 
 def work_up(
-    actuator: nls.Assembly, name: str, out: Path, *, steps: nls.progress.Steps, fast: bool
+    actuator: nls.Assembly, deck: Path, out: Path, *, steps: nls.progress.Steps, fast: bool
 ) -> ActuatorResults:
     """Take one actuator through analysis, observer, torque loop and export."""
+    name = out.name
     model = nls.flatten(actuator, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
     with steps.step(f"observability over the cam angle, {name}"):
         chart = sweep_angle(model, 19 if fast else 61)
     with steps.step(f"observers, on the bench and with the load free, {name}"):
         observers = compare_observers(actuator, model, 2.0 if fast else 5.0)
+    with steps.step(f"observers over the spread, and what is proved, {name}"):
+        spread = over_spread(model, observers, deck, out, 4 if fast else 16)
     with steps.step(f"torque loop, {name}"):
         following = follow_sines(model, observers.minimal)
+        evaluation = evaluate_loop(actuator, model, observers.minimal, 6 if fast else 12)
     with steps.step(f"C code, FMUs and their co-simulation, {name}"):
-        loop = export_and_cosimulate(model, observers.minimal, out / name, 1.0 if fast else 3.0)
-    return ActuatorResults(actuator, model, chart, observers, following, loop)
+        loop = export_and_cosimulate(model, spread.chosen.model, out, 1.0 if fast else 3.0)
+    return ActuatorResults(actuator, model, chart, observers, following, loop, spread, evaluation)

@@ -22,8 +22,8 @@ class ObserverComparison:
 
     Parameters
     ----------
-    minimal
-        Design of the minimal form.
+    minimal, published
+        Designs of the cascade in minimal form, and of the published form.
     bench
         Simulated run with the load side fixed: 6 A at 2 Hz.
     minimal_estimate, published_estimate
@@ -36,6 +36,7 @@ class ObserverComparison:
     """
 
     minimal: ObserverDesign
+    published: ObserverDesign
     bench: nls.Trace
     minimal_estimate: nls.Trace
     published_estimate: nls.Trace
@@ -101,6 +102,7 @@ def compare_observers(actuator: nls.Assembly, model: nls.FlatModel, stop: float)
     wrong = {"spring.rubber.relaxing.dashpot.strain.memory": 0.05}
     return ObserverComparison(
         minimal,
+        published,
         bench,
         nls.observe(minimal.model, bench, readings=READINGS, start=wrong),
         nls.observe(published.model, bench, readings=READINGS),

@@ -11,8 +11,10 @@ from nlsdesign.analysis import Chart
 from nlsdesign.discrepancy import Verdict
 
 from .._designed import MadeCam
+from .evaluation import LoopEvaluation
 from .figures import FigureComparison
 from .observer import ObserverComparison
+from .spread import ObserverOverSpread
 from .torque_loop import TorqueLoop
 from .tracking import Following, tracking_numbers
 
@@ -33,6 +35,10 @@ class ActuatorResults:
         Closed torque loop on sines of the wanted torque.
     loop
         Generated code and the co-simulated torque loop.
+    spread
+        Errors of the observers over the spread of the deck, and what is proved.
+    evaluation
+        Verdicts, margins, impedance and onset of limit cycling of the torque loop.
     """
 
     actuator: nls.Assembly
@@ -41,6 +47,8 @@ class ActuatorResults:
     observers: ObserverComparison
     following: tuple[Following, ...]
     loop: TorqueLoop
+    spread: ObserverOverSpread
+    evaluation: LoopEvaluation
 
     @property
     def rank_at_zero(self) -> float:
@@ -101,6 +109,11 @@ class Results:
                 f"{name}_cosimulation_difference_Nm": difference,
                 f"{name}_nominal_error_minimal_form_mNm_rms": 1e3 * each.observers.minimal_error,
                 f"{name}_nominal_error_published_form_mNm_rms": 1e3 * each.observers.published_error,
+                f"{name}_expected_over_spread_cascade_mNm_rms": 1e3 * each.spread.chosen.expected[0],
+                f"{name}_expected_over_spread_best_mNm_rms": 1e3 * min(each.spread.chosen.expected),
+                f"{name}_certified_decay_per_s": each.spread.certificate.decay,
+                f"{name}_certified_condition": each.spread.certificate.condition,
+                f"{name}_onset_of_limit_cycling_Kp": each.evaluation.onset.value,
                 f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
             }
         return numbers | tracking_numbers({name: each.following for name, each in self.both.items()})

@@ -9,7 +9,6 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.export import CSource
-from nlsdesign.observer import ObserverDesign
 
 from .._published import Array
 
@@ -52,16 +51,16 @@ class TorqueLoop:
 
 
 def export_and_cosimulate(
-    model: nls.FlatModel, observer: ObserverDesign, out: Path, stop: float
+    model: nls.FlatModel, observer: nls.FlatModel, out: Path, stop: float
 ) -> TorqueLoop:
     """Write C and FMUs, co-simulate the closed loop, and simulate the same loop in one piece."""
     controller = nls.torque_controller(model)
-    parts = {"plant": model, "observer": observer.model, "controller": controller}
-    source = nls.export_c(observer.model, out / "c", name="observer")
+    parts = {"plant": model, "observer": observer, "controller": controller}
+    source = nls.export_c(observer, out / "c", name="observer")
     fmus = {name: nls.export_fmu(each, out / "fmu" / f"{name}.fmu") for name, each in parts.items()}
     second = nls.export_fmu(model, out / "fmu" / "plant_fmi2.fmu", version="2.0")
     desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
     order = ("observer", "controller", "plant")
     run = nls.cosimulate(fmus=fmus, wires=WIRES, order=order, stop=stop, inputs=desired)
-    loop = nls.ClosedLoop(plant=model, observer=observer.model, controller=controller, wires=FROM_ENCODER)
+    loop = nls.ClosedLoop(plant=model, observer=observer, controller=controller, wires=FROM_ENCODER)
     return TorqueLoop(source, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.control import TorqueGains, Tracking, tracking
+from nlsdesign.control import LoopVerdict, TorqueGains, sine_response
+from nlsdesign.export import natively
+from nlsdesign.identification import rmse
 from nlsdesign.observer import ObserverDesign
 
 from .torque_loop import FROM_ENCODER
@@ -29,8 +32,13 @@ class Following:
         Gain of the torque loop in rad/s per N·m.
     frequency
         In Hz.
-    error
-        Of torque and estimate, once settled.
+    relative_error
+        Root mean square torque error over that of the wanted torque, once settled; not a number where the
+        loop does not settle.
+    estimate_error
+        Root mean square of estimated minus actual torque in N·m, likewise.
+    verdict
+        On the loop with that sine; harmonics of the drive are no limit cycle.
     peak_current
         In A, once settled.
     run
@@ -39,7 +47,9 @@ class Following:
 
     proportional: float
     frequency: float
-    error: Tracking
+    relative_error: float
+    estimate_error: float
+    verdict: LoopVerdict
     peak_current: float
     run: nls.Trace
 
@@ -61,13 +71,20 @@ def _follow(model: nls.FlatModel, observer: ObserverDesign, kp: float, hertz: fl
     run = loop.run(STOP, inputs=nls.sine(loop.desired, AMPLITUDE, hertz))
     late = run.time >= SETTLED
     peak = float(np.max(np.abs(run["plant.motor.current"][late])))
-    return Following(kp, hertz, tracking(loop, run, settled=SETTLED), peak, run)
+    judged = sine_response(loop, amplitude=AMPLITUDE, frequencies=[hertz], translate=natively)
+    (verdict,) = judged.verdicts
+    wanted, torque, estimate = (run[n][late] for n in (loop.desired, loop.torque, loop.estimate))
+    errors = rmse(torque - wanted) / rmse(wanted), rmse(estimate - torque)
+    if not verdict.holds:
+        errors = math.nan, math.nan
+    return Following(kp, hertz, *errors, verdict, peak, run)
 
 
 def tracking_numbers(runs: Mapping[str, Sequence[Following]]) -> dict[str, float]:
     """Return tracking error over wanted torque by actuator, gain and frequency."""
     return {
-        f"{name}_tracking_error_Kp_{each.proportional:g}_at_{each.frequency:g}_Hz": each.error.relative_error
+        f"{name}_tracking_error_Kp_{each.proportional:g}_at_{each.frequency:g}_Hz": each.relative_error
         for name, followed in runs.items()
         for each in followed
+        if each.verdict.holds
     }

@@ -21,7 +21,7 @@ from nlsdesign.control import ClosedLoop, TorqueGains, encoder_loop, torque_cont
 from nlsdesign.deck import load_deck
 from nlsdesign.export import natively
 from nlsdesign.model import flatten
-from nlsdesign.observer import design_observer
+from nlsdesign.observer import CascadeGain, design_observer
 
 FREQUENCIES = [0.5, 1.0, 2.0]
 PUBLISHED = {
@@ -47,7 +47,7 @@ def moved(deck: str, gains: TorqueGains, changes: dict[str, float] | None = None
     bench = flatten(actuator, outputs=outputs)
     plant = flatten(with_moved_load(actuator), outputs=outputs).with_values(changes or {})
     controller = torque_controller(bench, gains=gains)
-    return encoder_loop(plant, observer=design_observer(bench), controller=controller)
+    return encoder_loop(plant, observer=design_observer(bench, gain=CascadeGain()), controller=controller)
 
 
 def felt(loop: ClosedLoop, degrees: float) -> np.ndarray:

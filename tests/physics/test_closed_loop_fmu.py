@@ -25,7 +25,7 @@ WIRES = {
 def test_co_simulated_loop_is_that_of_one_piece(tmp_path: Path) -> None:
     actuator = nls.declare(nls.load_deck("austin2015_figure_consistent"))
     plant = nls.flatten(actuator, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
-    parts = {"plant": plant, "observer": nls.design_observer(plant)}
+    parts = {"plant": plant, "observer": nls.design_observer(plant, gain=nls.observer.CascadeGain())}
     fmus = {name: nls.export_fmu(model, tmp_path / f"{name}.fmu") for name, model in parts.items()}
     desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
     order = ("observer", "controller", "plant")

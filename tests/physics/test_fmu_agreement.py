@@ -20,7 +20,7 @@ from nlsdesign.export.compilation.cross_compiler import compile_library
 from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel, Variable
-from nlsdesign.observer import design_observer
+from nlsdesign.observer import CascadeGain, design_observer
 from nlsdesign.simulation import simulate
 from tests.fmu_unit import opened
 from tests.hand_built import plant
@@ -156,10 +156,11 @@ def test_the_published_actuator_agrees_with_the_packages_own_simulation_to_1e_6(
         assert np.abs(found[name] - expected[name]).max() < 1e-6 * size, name
 
 
-def test_the_observer_in_c_agrees_with_the_observer_in_python_to_1e_12(tmp_path):
+@pytest.mark.parametrize("gain", [CascadeGain(), None], ids=["cascade", "default"])
+def test_the_observer_in_c_agrees_with_the_observer_in_python_to_1e_12(tmp_path, gain):
     deck = load_deck("austin2015_figure_consistent")
     model = flatten(cam_rubber_actuator(deck), inputs=["motor.current"], outputs=["motor.angle"])
-    estimator = design_observer(model)
+    estimator = design_observer(model, gain=gain)
     times = STEP * np.arange(801)
     current = 3.0 * np.sin(2 * math.pi * 3.0 * times)
     angle = simulate(model, times, inputs={"motor.current": current}, hold=True)["motor.angle"]

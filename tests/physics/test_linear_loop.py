@@ -17,6 +17,7 @@ from nlsdesign.control import (
     TorqueGains,
     coupled_stability,
     encoder_loop,
+    largest_torque,
     linear_loop,
     loop_margins,
     output_impedance,
@@ -28,6 +29,7 @@ from nlsdesign.control import (
     zero_torque,
 )
 from nlsdesign.deck import load_deck
+from nlsdesign.design import equilibrium_torque
 from nlsdesign.export import natively
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import CascadeGain, design_observer
@@ -225,3 +227,16 @@ def test_names_decide_nothing(scheme: object) -> None:
     assert output_impedance(other, at).impedance == pytest.approx(output_impedance(moved, at).impedance)
     held = encoder_loop(bench, observer=other.observer, controller=other.controller)
     assert loop_margins(held, at).gain == pytest.approx(loop_margins(fixed, at).gain)
+
+
+def test_beyond_the_current_there_is_no_margin_and_elsewhere_there_is() -> None:
+    """At 58° the spring of the published deck asks for more torque than its current limit can hold."""
+    plant = flatten(declare(load_deck(NLS)), outputs=OUTPUTS)
+    observer = design_observer(plant, gain=CascadeGain())
+    loop = encoder_loop(plant, observer=observer, controller=torque_controller(plant))
+    margins = loop_margins(loop, np.radians([20.0, 58.0]))
+    assert margins.linear.torque[0] < largest_torque(plant)
+    assert equilibrium_torque(plant, "spring", [np.radians(58.0)])[0] > largest_torque(plant)
+    assert margins.linear.reached.tolist() == [True, False]
+    assert np.isfinite([margins.gain[0], margins.phase[0]]).all()
+    assert np.isnan([margins.gain[1], margins.phase[1], margins.delay[1]]).all()

@@ -35,7 +35,7 @@ from nlsdesign.components.assembly.named_parts import Assembly, assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.locations import folder
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import FixedGrid, design_observer
+from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.observer.scheduling.check import error_matrices
 
 J, K, BRANCH, ETA, VISCOUS, LEVEL, CREEP = 2e-3, 5.0, 3.0, 0.04, 1e-3, 0.02, 0.02
@@ -104,7 +104,7 @@ def test_poles_of_a_sampled_system_are_those_that_it_samples() -> None:
 def test_the_error_of_an_observer_has_its_poles_over_the_angle() -> None:
     """The cascade leaves the memory of the rubber to its own decay, −k/η."""
     model = flatten(declare(load_deck("austin2015_figure_consistent")))
-    observer = design_observer(model, grid=FixedGrid(-0.9, 0.9, points=61))
+    observer = design_observer(model, gain=CascadeGain(), grid=FixedGrid(-0.9, 0.9, points=61))
     matrices = error_matrices(observer, np.radians([-40.0, 0.0, 5.0, 40.0]))
     _, (decay, _, _) = sampled_poles(matrices, 1e-3)
     assert decay == pytest.approx(np.full(4, -1.479e6 / 21e3), rel=1e-6)

@@ -24,6 +24,7 @@ from nlsdesign.control import (
 )
 from nlsdesign.export import CompiledStep, export_c, natively
 from nlsdesign.model import FlatModel, flatten
+from nlsdesign.observer import CascadeGain
 from nlsdesign.simulation import Sine, simulate
 from nlsdesign.simulation.prior import declared_prior
 from nlsdesign.simulation.sampled_batch import BatchTrace, SampledSystem, run_batch
@@ -42,7 +43,7 @@ def machine(deck: str) -> FlatModel:
 
 
 def loop_of(plant: FlatModel, *, sample_time: float = 1e-3, **parts: object) -> ClosedLoop:
-    observer = nls.design_observer(plant, sample_time=sample_time)
+    observer = nls.design_observer(plant, sample_time=sample_time, gain=CascadeGain())
     law = parts.pop("law", None) or ScheduledTorque()
     controller = torque_controller(plant, law=law, sample_time=sample_time, **parts)
     return ClosedLoop(plant=plant, observer=observer, controller=controller, wires=WIRES)
@@ -145,7 +146,11 @@ def test_the_loop_typed_by_hand_is_the_loop_of_the_controller() -> None:
     plant = linear_plant(stiffness)
     law = ScheduledTorque(stiffness_floor=floor)
     controller = torque_controller(plant, law=law, velocity=VelocityLoop(friction=None))
-    found = ClosedLoop(plant=plant, observer=nls.design_observer(plant), controller=controller)
+    found = ClosedLoop(
+        plant=plant,
+        observer=nls.design_observer(plant, gain=CascadeGain()),
+        controller=controller,
+    )
     response = sine_response(found, amplitude=0.3, frequencies=frequencies, cycles=4)
     f = np.array(frequencies)
     z = np.exp(2j * np.pi * f * time)
@@ -287,7 +292,8 @@ def test_a_moved_load_feels_what_the_bandwidth_lets_through() -> None:
     bench, plant = linear_plant(stiffness), linear_plant(stiffness, moved=True)
     law = ScheduledTorque(stiffness_floor=0.0)
     found = ClosedLoop(
-        plant=plant, observer=nls.design_observer(bench), controller=torque_controller(plant, law=law),
+        plant=plant, observer=nls.design_observer(bench, gain=CascadeGain()),
+        controller=torque_controller(plant, law=law),
         wires={
             "observer.motor.angle": "plant.spring.angle", "controller.motor.angle": "plant.motor.angle",
             "controller.spring.angle": "plant.spring.angle",

@@ -18,7 +18,7 @@ from nlsdesign.design import design_cam
 from nlsdesign.discrepancy import ALL, diagnose, predict, refit, write_refit, write_verdict
 from nlsdesign.identification import load_records
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import FixedGrid, check_stability, design_observer
+from nlsdesign.observer import CascadeGain, FixedGrid, check_stability, design_observer
 from nlsdesign.report import verdict_sections, write_report
 from nlsdesign.simulation import Sine, simulate
 from tests.cam_cases import KEEP, TARGET
@@ -107,7 +107,8 @@ def test_analyse(run: Run, tmp_path: Path, scheme: Scheme) -> None:
 def test_observer_and_controller(scheme: Scheme) -> None:
     machine = renamed(published(), scheme)
     plants = [flatten(published()), flatten(machine.assembly)]
-    observers = [design_observer(plant, grid=FixedGrid(-1.0, 1.0, points=41)) for plant in plants]
+    grid = FixedGrid(-1.0, 1.0, points=41)
+    observers = [design_observer(plant, gain=CascadeGain(), grid=grid) for plant in plants]
     controllers = [torque_controller(plant) for plant in plants]
     for one, other in (observers, controllers):
         assert [[machine.name(name) for name in group] for group in names(one)] == names(other)

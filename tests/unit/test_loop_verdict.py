@@ -25,7 +25,7 @@ from nlsdesign.control.evaluation.loop_verdict import COUNTS, sustained, without
 from nlsdesign.errors import ArrangementError, ValueRangeError
 from nlsdesign.export import natively
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.observer import FixedGrid, design_observer
+from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
 from tests import observed as ob
 
 STEP = 1e-3
@@ -34,7 +34,9 @@ TIME = STEP * np.arange(2000)
 
 def stiffening(gains: TorqueGains, plant: FlatModel | None = None, sample_time: float = STEP) -> ClosedLoop:
     plant = plant or ob.bench(ob.SLOW, friction=0.02)
-    observer = design_observer(plant, grid=FixedGrid(-1.2, 1.2, points=241), sample_time=sample_time)
+    observer = design_observer(
+        plant, gain=CascadeGain(), grid=FixedGrid(-1.2, 1.2, points=241), sample_time=sample_time
+    )
     controller = torque_controller(plant, gains=gains, sample_time=sample_time)
     return encoder_loop(plant, observer=observer, controller=controller)
 
@@ -179,7 +181,7 @@ def test_unstable_draws_are_counted() -> None:
         declare(load_deck("austin2015_figure_consistent")), outputs=["motor.angle", "spring.torque"]
     )
     loop = encoder_loop(
-        plant, observer=design_observer(plant),
+        plant, observer=design_observer(plant, gain=CascadeGain()),
         controller=torque_controller(plant, gains=TorqueGains(proportional=40.0)),
     )  # fmt: skip
     spread = loop_over_spread(loop, amplitude=2.8, frequency=2.0, draws=40, seed=3, translate=natively)

@@ -205,7 +205,7 @@ def test_two_branches_are_carried_and_proved() -> None:
     cam = actuator["spring.cam"]
     parts = dict(actuator.parts) | {"spring": tie(through(cam, rubber=rubber), "motor", "load")}
     model = flatten(assembly("two", **parts), outputs=["motor.angle", "spring.torque"])
-    observer = design_observer(model, grid=GRID)
+    observer = design_observer(model, gain=CascadeGain(), grid=GRID)
     assert len(observer.states) == 4
     assert check_stability(observer).proved
     record = simulate(

@@ -85,10 +85,14 @@ def test_over_the_spread_the_declared_numbers_scatter_and_the_fitted_hardly(resu
 
 
 def test_what_is_said_is_what_was_worked_out(result: Regeneration, tmp_path: Path) -> None:
-    nominal, spread = result.words()
+    nominal, spread, learning, generated = result.words()
     assert nominal.startswith("Error of the observer of `spring.torque` with the nominal numbers")
     assert nominal.endswith(" N·m.")
     assert "over the spread" in spread
+    assert "that learns" in learning
+    least = min((result.nominal[1], "cascade"), (result.learning[1], "adaptive"))
+    assert generated.startswith(f"Generated is the {least[1]}")
+    assert (len(result.observer.states) > 20) == (least[1] == "adaptive")
     written = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert written["nominal"]["before"] == result.nominal[0]
     page = report.write_report(tmp_path / "r.html", *report.regeneration_sections(result, {}), title="t")

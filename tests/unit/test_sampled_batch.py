@@ -9,7 +9,7 @@ from nlsdesign.control import ClosedLoop, torque_controller
 from nlsdesign.errors import UnknownNameError, ValueRangeError
 from nlsdesign.export import natively
 from nlsdesign.model import FlatModel
-from nlsdesign.observer import FixedGrid, design_observer
+from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.simulation.sampled_batch import SampledSystem, run_batch
 from tests import observed as ob
 
@@ -28,7 +28,7 @@ def plant() -> FlatModel:
 
 @pytest.fixture(scope="module")
 def loop(plant: FlatModel) -> ClosedLoop:
-    observer = design_observer(plant, grid=FixedGrid(-1.2, 1.2, points=241))
+    observer = design_observer(plant, gain=CascadeGain(), grid=FixedGrid(-1.2, 1.2, points=241))
     return ClosedLoop(plant=plant, observer=observer, controller=torque_controller(plant), wires=WIRES)
 
 

@@ -121,6 +121,9 @@ def _compared_only(loop: ClosedLoop) -> ClosedLoop:
 
 
 def _margins(gain: Complex, frequencies: Array) -> tuple[float, float, float, float, float]:
+    if not np.all(np.isfinite(gain)):
+        # Nothing rests at that angle, so there is no loop to be cut.
+        return math.nan, math.nan, math.nan, math.nan, math.nan
     size, phase = np.abs(gain), np.unwrap(np.angle(gain))
     up, down = math.inf, -math.inf
     # Where the phase passes −180° (mod 360°): the loop gain crosses the negative real axis.

@@ -110,10 +110,12 @@ def uncertain_directions(
         If no number of the model is uncertain enough to matter.
     """
     known = prior.only([name for name in prior.names if name in form.model.values])
-    root = _root_of(known.covariance)
-    features, own = _features(form, operating_points(form, duty), known, root)
-    left, singular, right = np.linalg.svd(features, full_matrices=False)
-    count = min(int(np.sum(singular > resolution)), most)
+    count = 0
+    if np.any(known.deviations):
+        root = _root_of(known.covariance)
+        features, own = _features(form, operating_points(form, duty), known, root)
+        left, singular, right = np.linalg.svd(features, full_matrices=False)
+        count = min(int(np.sum(singular > resolution)), most)
     if count == 0:
         raise ArrangementError(
             f"model '{form.model.name}'",
@@ -135,11 +137,11 @@ def uncertain_directions(
 
 
 def _root_of(covariance: Array) -> Array:
-    values, vectors = np.linalg.eigh(covariance)
-    kept = values > 1e-12 * max(float(values[-1]), 1e-300)
     if np.array_equal(covariance, np.diag(np.diag(covariance))):
         # Independent numbers keep their own directions.
         return np.diag(np.sqrt(np.diag(covariance)))
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > 1e-12 * float(values[-1])
     root: Array = vectors[:, kept] * np.sqrt(values[kept])
     return root
 

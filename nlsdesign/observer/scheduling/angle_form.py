@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from ...analysis.rest import evaluate_rows, rest_states
+from ...analysis.rest import RestSolver, evaluate_rows
 from ...errors import ArrangementError
 from ...model import FlatModel
 from .plant import Coefficients
@@ -87,6 +87,8 @@ class AngleForm:
         )
         follow = slopes(rate[: self.inner], x[self.speed]) if self.inner else ca.SX(0, 1)
         self._follow = ca.Function("follow", arguments, [follow])
+        self._rest = RestSolver(model, angle=layout.angle, consistent=layout.consistent)
+        self._rested: tuple[Array, Array] | None = None
         self._sum = self._summed()
 
     def with_values(self, values: Mapping[str, float]) -> AngleForm:
@@ -100,6 +102,7 @@ class AngleForm:
         other = copy.copy(self)
         other.model = self.model.with_values(values)
         other.p = other.model.start(other.model.parameters)
+        other._rested = None
         other._sum = other._summed()
         return other
 
@@ -241,7 +244,9 @@ class AngleForm:
         angles
             Shape (N,).
         """
-        return rest_states(self.model, angles, angle=self.layout.angle, consistent=self.layout.consistent)
+        if self._rested is None or not np.array_equal(self._rested[0], angles):
+            self._rested = angles.copy(), self._rest(self.model, angles)
+        return self._rested[1].copy()
 
     def _followed(self, angles: Array) -> Array:
         """Return ∂ż/∂ω of the inner states, shape (N, inner); it may depend on the angle only."""

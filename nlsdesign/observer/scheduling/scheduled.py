@@ -118,10 +118,7 @@ def design_observer_with_details(
     ConvergenceError
         If a gain cannot be found, or the table does not keep its error bound.
     """
-    if not 0.0 < sample_time < 1.0:
-        raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
-    if model.sample_time is not None:
-        raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
+    check_sampling(model, sample_time)
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     if model.variable(measured).unit != "rad":
         raise ArrangementError(
@@ -138,6 +135,27 @@ def design_observer_with_details(
     observed = tuple(body for body in model.bodies if body.motion == measured)
     design = ObserverDesign(replace(_Writer(step, compact).model(), bodies=observed), step, compact)
     return replace(design, model=design.model.with_values(design.start(0.0)))
+
+
+def check_sampling(model: FlatModel, sample_time: float) -> None:
+    """Refuse a model or a sample time that no observer can be designed for.
+
+    Parameters
+    ----------
+    model
+        Continuous.
+    sample_time
+        In s.
+
+    Raises
+    ------
+    ValueRangeError
+        If the sample time is not between 0 and 1 s, or the model is discrete.
+    """
+    if not 0.0 < sample_time < 1.0:
+        raise ValueRangeError(f"sample_time {sample_time:g} s", "must lie between 0 and 1 s")
+    if model.sample_time is not None:
+        raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
 
 
 def whole_contour(model: FlatModel) -> GridByTolerance:

@@ -10,13 +10,14 @@ import numpy as np
 from ...errors import ArrangementError, ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
+from ...quantity import typeset_unit
 from ...simulation.sampled_batch import run_batch
 from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
 from ..adaptive.adaptive_settings import AdaptiveSettings
 from ..adaptive.adaptive_variables import SPREAD
 from ..scheduling.forms import StateForm
 from ..scheduling.gains import FittedGain, GainRule
-from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
+from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
 from ..scheduling.table import Grid
 from .bench_trial import bench_trial
 
@@ -64,10 +65,12 @@ def choose_observer(
 
     Parameters
     ----------
-    model, estimate, measured, sample_time, grid
+    model, estimate, measured, sample_time
         As for :func:`design_observer`.
     settings
         What is known, what the actuator does, and how far the equations are trusted.
+    grid
+        As for :func:`design_observer`.
 
     Raises
     ------
@@ -76,16 +79,18 @@ def choose_observer(
     ArrangementError
         If the equations cannot be scheduled over one angle.
     ValueRangeError
-        If the estimate is far from linear in the inner states, or a setting is out of range.
+        If the model is discrete, the estimate is far from linear in the inner states, or a setting is out of
+        range.
     ConvergenceError
         If a table does not keep its error bound.
     """
+    check_sampling(model, sample_time)
     settings = settings or AdaptiveSettings()
-    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
-    unit = model.variable(estimate).unit
+    estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
+    unit = typeset_unit(model.variable(estimate).unit)
     try:
         adaptive = design_adaptive_observer(
             model, estimate=estimate, measured=measured, sample_time=sample_time, settings=settings, grid=grid
@@ -138,8 +143,8 @@ def design_observer(
     """Design an observer that estimates a torque from a measured angle and the known inputs.
 
     Without ``gain`` and ``form`` it is the one that errs least over the spread of the deck, as
-    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled observer
-    of that kind, designed at the declared numbers.
+    :func:`choose_observer` says; its description gives the reason. With one of them it is a scheduled
+    observer of that kind, designed at the declared numbers.
 
     Its inputs are the measured angle and the inputs of the model, held over the coming sample; its outputs
     the estimate, the states, and the innovation. A name is that of the plant; what the plant does not have

@@ -1,0 +1,90 @@
+"""Sections on the torque loop as it is judged: verdicts, margins, impedance, onset of limit cycling."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import nlsdesign as nls
+from nlsdesign.figures.loop_evaluation import passivity_words
+from nlsdesign.report import Chapter, FigureSection, Section, TableSection
+
+from .evaluation import AMPLITUDES, KP
+from .results import ActuatorResults, Results
+
+
+def evaluation_sections(results: Results) -> list[Section]:
+    """Show where the loop holds, and where it stops doing so, for both actuators."""
+    sections: list[Section] = [
+        Chapter(
+            "Torque loop: margins and limits",
+            f"PID with Kp {KP:g} rad/s per N·m behind the cascade observer, exact numbers. Every simulated "
+            "figure has a verdict; what does not settle has no number.",
+        ),
+        _table(results),
+    ]
+    for name, each in results.both.items():
+        sections += _of_one(name, each)
+    return sections
+
+
+def _of_one(name: str, results: ActuatorResults) -> list[Section]:
+    judged = results.evaluation
+    lost = [
+        f"{response.amplitude:g} N·m at {f:.2g} Hz: {verdict}"
+        for response in judged.responses
+        for f, verdict in zip(response.frequency, response.verdicts, strict=True)
+        if not verdict.holds
+    ]
+    return [
+        FigureSection(
+            f"Desired to actual torque, {name}",
+            nls.figures.torque_responses(judged.responses),
+            caption="Simulated with counts, friction, delay and limits, at two amplitudes. "
+            + (f"Not settled: {'; '.join(lost)}." if lost else "Settled at every frequency."),
+        ),
+        FigureSection(
+            f"Margins over the angle, {name}",
+            nls.figures.margins_over_angle([judged.margins]),
+            caption="Of the linearised sampled loop, cut at the current, while the machine slides; nothing "
+            "where it is unstable or the drive cannot hold the angle.",
+            means=f"{str(judged.onset).capitalize()}.",
+        ),
+        FigureSection(
+            f"Output impedance, {name}",
+            nls.figures.impedance_over_frequency(judged.impedance),
+            caption="Torque that a moved load feels. "
+            + "; ".join(
+                f"{np.degrees(angle):.0f}°: {passivity_words(float(first))}"
+                for angle, first in zip(
+                    judged.impedance.linear.angles, judged.impedance.first_active(), strict=True
+                )
+            )
+            + ".",
+        ),
+    ]
+
+
+def _table(results: Results) -> TableSection:
+    rows = []
+    for name, each in results.both.items():
+        judged = each.evaluation
+        margin, linear = judged.least_gain_margin, judged.margins.linear
+        unstable = int(np.sum(linear.reached & ~linear.stable()))
+        rows.append(
+            (
+                name,
+                f"{margin:.2f}" if np.isfinite(margin) else "none: unstable",
+                f"{unstable} of {int(np.sum(linear.reached))}",
+                *(f"{sum(v.holds for v in r.verdicts)} of {len(r.verdicts)}" for r in judged.responses),
+                f"{judged.onset.value:.1f}" if np.isfinite(judged.onset.value) else "not found",
+                f"{judged.onset.linear:.1f}" if np.isfinite(judged.onset.linear) else "not found",
+            )
+        )
+    settled = tuple(f"settled at {a:g} N·m" for a in AMPLITUDES)
+    return TableSection(
+        "Where the loop holds",
+        ("actuator", "least gain margin in dB", "unstable angles", *settled, "onset Kp, simulated", "linear"),
+        tuple(rows),
+        caption="Onset: gain from which the loop limit-cycles while it holds the larger torque, by "
+        "simulation and by linearisation.",
+    )

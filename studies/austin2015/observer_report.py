@@ -1,0 +1,147 @@
+"""Sections on the torque observers: what is seen, exact numbers, the spread, and what is proved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import nlsdesign as nls
+from nlsdesign.quantity import three_digits
+from nlsdesign.report import Chapter, FigureSection, Section, TableSection, TextSection
+
+from .observer import STIFFER, WIDER
+from .results import ActuatorResults, Results
+
+
+def observer_sections(results: Results) -> list[Section]:
+    """Show observability, and the errors of the observers on the bench, for both actuators."""
+    charts = {name: each.chart for name, each in results.both.items()}
+    drops = {name: each.spread.drops for name, each in results.both.items()}
+    sections: list[Section] = [
+        Chapter("Observer", "The torque is not measured: it is estimated from the encoder and the current."),
+        FigureSection(
+            "Observability over the cam angle",
+            nls.figures.observability_over_angle(charts, drops=drops),
+            caption="Rank and condition of angle, speed and rubber memory, observed through the encoder; "
+            "angles of lost rank are exact. "
+            + " ".join(f"{name.capitalize()}: {'; '.join(each.lines())}." for name, each in drops.items()),
+            means="At zero angle the lever arm vanishes: the rubber's memory is not observable, nor needed.",
+        ),
+        FigureSection(
+            "Stability over the cam angle",
+            nls.figures.stability_over_angle(charts),
+            caption="Poles of the plant while it slides and while dry friction holds it; stiffness at rest. "
+            "With pretension the designed spring is stiff at zero too.",
+        ),
+    ]
+    for name, each in results.both.items():
+        sections += _bench_sections(name, each)
+    sections.append(_errors_with_known_numbers(results))
+    for name, each in results.both.items():
+        sections += _spread_sections(name, each)
+    return [*sections, _bounds(results), *(_proved(name, each) for name, each in results.both.items())]
+
+
+def _errors_with_known_numbers(results: Results) -> TableSection:
+    rows = tuple(
+        (
+            name,
+            1e3 * each.observers.minimal_error,
+            1e3 * each.observers.published_error,
+            1e3 * each.observers.stiffer_error,
+        )
+        for name, each in results.both.items()
+    )
+    return TableSection(
+        "Errors with exact numbers, and with one other rubber",
+        ("actuator", "cascade", "published form", "cascade, stiffer rubber"),
+        rows,
+        caption="mN·m rms after 1 s. Exact numbers: the observer knows every number of the actuator, so only "
+        f"encoder and sampling are left. Stiffer rubber: all moduli {_more(STIFFER)} and the section "
+        f"{_more(WIDER)} larger than the observer knows, one declared spread each; the cascade trusts its "
+        "rubber and does not correct it by the current.",
+    )
+
+
+def _more(factor: float) -> str:
+    return f"{100 * (factor - 1):.0f} %"
+
+
+def _bench_sections(name: str, results: ActuatorResults) -> list[Section]:
+    observers = results.observers
+    bench, free = observers.bench, observers.free
+    estimates = {"cascade": observers.minimal_estimate, "published form": observers.published_estimate}
+    first = bench.time <= 1.0
+    shown = {label: estimate["spring.torque"][first] for label, estimate in estimates.items()}
+    angles = {body: np.degrees(free[f"{body}.angle"]) for body in ("motor", "load")}
+    return [
+        FigureSection(
+            f"Estimated torque on the bench, exact numbers, {name}",
+            nls.figures.observer_error(bench.time[first], bench["spring.torque"][first], shown),
+            caption="Current 6 A at 2 Hz, 8192 counts per turn; the cascade starts wrong.",
+            means=f"With exact numbers, after 1 s: {1e3 * observers.minimal_error:.2f} mN·m rms of the "
+            f"cascade, {1e3 * observers.published_error:.2f} in the paper's form. What the spread of the "
+            "deck makes of this stands below.",
+            assumed="The observer knows every number of the actuator exactly.",
+        ),
+        FigureSection(
+            f"Motor and free load, {name}",
+            nls.figures.over_time(free.time, angles, quantity="angle", unit="deg"),
+            caption="The load is let go: a link of 2e-3 kg·m² behind the spring, current 0.5 A at 2 Hz.",
+        ),
+    ]
+
+
+def _spread_sections(name: str, results: ActuatorResults) -> list[Section]:
+    errors, chosen = results.spread.errors, results.spread.chosen
+    draws = errors.drawn.shape[1]
+    middle, paper = (float(np.max(errors.quantile(each, 0.5))) for each in ("best", "published form"))
+    ranked = errors.ranked_causes("best")[:3]
+    causes = ", ".join(f"{cause} ({1e3 * size:.0f})" for cause, size in ranked)
+    rows = tuple(tuple(row) for row in errors.rows())
+    return [
+        FigureSection(
+            f"Torque errors over the spread, {name}",
+            nls.figures.errors_over_spread(errors),
+            caption=f"Sines of {errors.torque:.2f} N·m, one run for all; {draws} machines drawn from the "
+            "spreads of the deck. Dashed: bound of Cramér and Rao on the rms over all machines, for any "
+            "estimator with encoder and current.",
+            means=f"Median over the spread at the worse frequency: {1e3 * middle:.0f} mN·m of the observer "
+            f"that is generated, {1e3 * paper:.0f} of the published form. Most costs what rubber and drive "
+            f"are not known: {causes} mN·m.",
+            assumed=f"{draws} draws scatter; numbers of the deck are independent.",
+        ),
+        TableSection(
+            f"Torque errors in numbers, {name}",
+            ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on the rms"),
+            rows,
+            caption="mN·m rms. `best` is the observer that is generated, by the error that is expected over "
+            "the spread before anything is drawn.",
+        ),
+        TextSection(
+            f"The observer that is generated, {name}",
+            f"Taken was {chosen.reason}. It is not certified.",
+            drawing=str(chosen.design),
+        ),
+    ]  # fmt: skip
+
+
+def _bounds(results: Results) -> TableSection:
+    rows = []
+    for name, each in results.both.items():
+        bound = each.spread.certificate.torque
+        proved = "none" if isinstance(bound, str) else f"{1e3 * bound.total:.1f}"
+        decay, condition = each.spread.certificate.decay, each.spread.certificate.condition
+        rows.append((name, f"{decay:.1f}", three_digits(condition), proved))
+    return TableSection(
+        "What is proved of one constant gain",
+        ("actuator", "decay in 1/s", "condition of P at most", "torque within, mN·m, exact numbers"),
+        tuple(rows),
+        caption="A second observer with one certified gain lies beside the generated one, with its C code "
+        "and certificate.json; `nlsdesign observer verify` checks it again without the solver.",
+    )
+
+
+def _proved(name: str, results: ActuatorResults) -> TextSection:
+    certificate = results.spread.certificate
+    hashes = "\n".join(f"{file}: SHA-256 {digest}" for file, digest in sorted(results.spread.hashes.items()))
+    return TextSection(f"The certificate, {name}", " ".join(certificate.statement), drawing=hashes)

@@ -1,0 +1,83 @@
+"""What the spread of the deck does to the torque observers, and what is proved of one of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import nlsdesign as nls
+from nlsdesign.analysis import RankDrops, rank_drops
+from nlsdesign.export import CSource, natively
+from nlsdesign.observer import (
+    Certificate,
+    CertifiedGain,
+    ObserverOfChoice,
+    SpreadErrors,
+    bench_trial,
+    certify,
+    choose_observer,
+    declared_assumptions,
+    observer_errors,
+    write_certificate,
+)
+from nlsdesign.observer.certificates.certificate import hashes_of_code
+
+from .observer import ObserverComparison
+
+
+@dataclass(frozen=True, eq=False)
+class ObserverOverSpread:
+    """The observer that is generated, its errors over the spread, and the certified one beside it.
+
+    Parameters
+    ----------
+    chosen
+        Least expected error over the spread.
+    errors
+        Of ``best``, ``cascade`` and ``published form`` on one bench.
+    drops
+        Angles at which a state is not seen.
+    certificate
+        Of one gain for all angles, written with its C code.
+    code, file
+        That code, and the certificate.
+    """
+
+    chosen: ObserverOfChoice
+    errors: SpreadErrors
+    drops: RankDrops
+    certificate: Certificate
+    code: CSource
+    file: Path
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of the certified C files by name, as the certificate has them."""
+        digests = hashes_of_code(self.code.source.parent)
+        return {path.name: digests[path.name] for path in (self.code.header, self.code.source)}
+
+
+def over_spread(
+    model: nls.FlatModel, observers: ObserverComparison, deck: Path, out: Path, draws: int
+) -> ObserverOverSpread:
+    """Compare the observers over the spread of a deck, and certify one gain."""
+    chosen = choose_observer(model)
+    compared = {
+        "best": chosen.model, "cascade": observers.minimal.model, "published form": observers.published.model,
+    }  # fmt: skip
+    errors = observer_errors(
+        compared, bench_trial(model), draws=draws, bounded=1 if draws < 8 else 2, translate=natively
+    )
+    angles = np.radians(np.linspace(-50.0, 50.0, 101))
+    drops = rank_drops(model, angles=angles, angle="motor.angle", measured=("motor.angle",))
+    design = nls.observer.design_observer_with_details(model, gain=CertifiedGain())
+    text = deck.read_text(encoding="utf-8")
+    proved = certify(model, design, assumptions=declared_assumptions(model, design), deck=(deck.stem, text))
+    words = f"{design.model.description}; certified, see certificate.json: {' '.join(proved.statement)}"
+    code = nls.export_c(replace(design.model, description=words), out / "certified", name="observer")
+    hashes = hashes_of_code(out / "certified")
+    named = {path.name: hashes[path.name] for path in (code.header, code.source)}
+    file = write_certificate(replace(proved, code=named), out / "certified" / "certificate.json")
+    return ObserverOverSpread(chosen, errors, drops, proved, code, file)
