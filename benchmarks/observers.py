@@ -7,7 +7,7 @@ inequalities; where it does not, no ratio is printed.
 
 The draws of ``observer_errors`` are also run one by one with ``solve_ivp`` on the same plant between the
 samples and the same observer and servo, evaluated sample by sample. The peer takes a part of one run and is
-scaled by the number of samples and runs, which it takes at an even pace. CPU seconds, the compiler's included.
+scaled by the number of samples and runs, which it takes at an even pace. CPU seconds, with those of the compiler.
 Printed, not asserted: ``python -m benchmarks.observers``.
 """
 
@@ -90,10 +90,8 @@ def peer_program(cost: np.ndarray, inequalities: list[Inequality]) -> tuple[floa
 
     keep = {"type": "ineq", "fun": lambda x: least_eigenvalues(x, inequalities), "jac": slopes}
     # P = 10·1, Y = 0.
-    start = np.linalg.lstsq(
-        inequalities[0].factors.reshape(len(cost), -1).T, (10.0 * np.eye(len(inequalities[0].constant))).ravel(),
-        rcond=None,
-    )[0]  # fmt: skip
+    ten = 10.0 * np.eye(len(inequalities[0].constant))
+    start = np.linalg.lstsq(inequalities[0].factors.reshape(len(cost), -1).T, ten.ravel(), rcond=None)[0]
     found = minimize(
         lambda x: float(cost @ x), start, jac=lambda _: cost, constraints=[keep], method="SLSQP",
         options={"maxiter": 500, "ftol": 1e-9},
@@ -105,7 +103,7 @@ def co_designs(deck: str, model: nls.FlatModel) -> None:
     """Print times of co-design, certificate and check, and those of the peer on one program."""
     design, designing = timed(lambda: design_observer_with_details(model, gain=CertifiedGain()))
     certificate, certifying = timed(lambda: certify(model, design))
-    verdict, checking = timed(lambda: verify(certificate))
+    verdict, checking = timed(lambda: verify(certificate, model=model))
     print(
         f"{deck}: co-design {designing:.2f} s, certify {certifying:.2f} s, verify {checking:.2f} s "
         f"({'holds' if verdict.holds else 'DOES NOT HOLD'}); goal {GOAL:g} s each",
@@ -120,9 +118,8 @@ def co_designs(deck: str, model: nls.FlatModel) -> None:
         outcome = f"stopped with an eigenvalue of {np.min(least):.1g}, so it found no gain; no ratio"
     else:
         outcome = f"cost {theirs / float(cost @ ours):.4g} times ours, ratio {taken / alone:.1f}"
-    print(
-        f"  its last program ({size}) {1e3 * alone:.1f} ms; SLSQP on eigenvalues {1e3 * taken:.1f} ms: {outcome}"
-    )
+    times = f"{1e3 * alone:.1f} ms; SLSQP on eigenvalues {1e3 * taken:.1f} ms"
+    print(f"  its last program ({size}) {times}: {outcome}", flush=True)
 
 
 def stepwise(trial: Trial, observer: nls.FlatModel) -> tuple[float, int]:
@@ -164,9 +161,9 @@ def errors(deck: str, model: nls.FlatModel) -> None:
     runs = DRAWS - found.lost
     theirs = each * samples * runs
     print(
-        f"{deck}: errors of the cascade over {DRAWS} draws, and each cause, compiled with compilation {ours:.1f} s; "
-        f"the {runs} draws alone by solve_ivp sample by sample {theirs:.0f} s (extrapolated from {PEER_SAMPLES} "
-        f"of {samples} samples of one run), ratio {theirs / ours:.0f}",
+        f"{deck}: errors of the cascade over {DRAWS} draws and for each cause {ours:.1f} s with compilation; "
+        f"the {runs} draws alone by solve_ivp sample by sample {theirs:.0f} s (extrapolated from "
+        f"{PEER_SAMPLES} of {samples} samples of one run), ratio {theirs / ours:.0f}",
         flush=True,
     )
 
