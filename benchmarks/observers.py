@@ -7,7 +7,7 @@ inequalities; where it does not, no ratio is printed.
 
 The draws of ``observer_errors`` are also run one by one with ``solve_ivp`` on the same plant between the
 samples and the same observer and servo, evaluated sample by sample. The peer takes a part of one run and is
-scaled by the number of samples and runs, which it takes at an even pace. CPU seconds, with those of the compiler.
+scaled by the number of samples and runs, which it takes at an even pace. CPU seconds, compiler included.
 Printed, not asserted: ``python -m benchmarks.observers``.
 """
 

@@ -116,15 +116,15 @@ class Results:
 
     def _under_margins(self) -> dict[str, float]:
         """Return the numbers of the linear half."""
-        found: dict[str, float] = {}
+        numbers: dict[str, float] = {}
         for line in self.lines:
             if line.spring in DECKS:
-                found |= line.numbers | {f"{line.spring}_reach_Hz": line.reach}
+                numbers |= line.numbers | {f"{line.spring}_reach_Hz": line.reach}
         best = self.best_under_margins
         if len({line.spring for line in self.lines}) > len(DECKS):
-            found["best_under_margins"] = float(len(best))
-            found["designed_among_them"] = float(sum(c.name.split(",")[0] not in DECKS for c in best))
-        return found
+            numbers["best_under_margins"] = float(len(best))
+            numbers["designed_among_them"] = float(sum(c.name.split(",")[0] not in DECKS for c in best))
+        return numbers
 
     def _straight(self, k: int) -> dict[str, float]:
         """Return the numbers of the spring that is nearly a line to the same torque at the same angle."""
@@ -238,9 +238,9 @@ def _linear_sections(results: Results) -> tuple[FigureSection, TableSection]:
     }  # fmt: skip
     for law in dict.fromkeys(line.law.title for line in results.lines):
         own = [line.last for line in results.lines if line.law.title == law and line.spring not in DECKS]
-        found = best_choices([c for c in own if c is not None])
-        if found:
-            curves[f"best designed, {law}"] = _points(found)
+        kept_ones = best_choices([c for c in own if c is not None])
+        if kept_ones:
+            curves[f"best designed, {law}"] = _points(kept_ones)
     curves["no other is better in both"] = _points(best)
     up = f"bandwidth up to {HIGH:g} N·m, Hz"
     across = f"impedance at {MOVED_AT:g} Hz, N·m/rad"

@@ -386,7 +386,8 @@ class _Assembler:
         following = {}
         for b, model in self.system.blocks.items():
             sources = [self._source(f"{b}.{v.name}") for v in model.inputs]
-            resting = [self._resting(f"{b}.{v.name}", values) for v in model.inputs]
+            # A cut loop rests where the closed one does.
+            resting = [values[self.system.sources[f"{b}.{v.name}"]] for v in model.inputs]
             point = self.blocks[b].at(self.state[b], np.stack(resting, axis=1))
             given = np.stack([rows[name] for name in sources], axis=1)
             first, count = self.first[b], len(model.states)
@@ -400,10 +401,6 @@ class _Assembler:
 
     def _source(self, name: str) -> str:
         return name if name in self.cut else self.system.sources[name]
-
-    def _resting(self, name: str, values: dict[str, Array]) -> Array:
-        """Return the value of an input at rest: a cut loop rests where the closed one does."""
-        return values[self.system.sources[name]]
 
     def loop(self, angles: Array, mode: LinearMode) -> LinearLoop:
         """Return the whole."""
