@@ -269,7 +269,7 @@ def _linear_sections(results: Results) -> tuple[FigureSection, TableSection]:
         f"go: it makes a sine of {HIGH:g} N·m only up to the lowest frequency. A PID gain is bounded where "
         "the spring is stiffest and is slow where it is soft; scheduled over the stiffness a stiffening "
         "spring follows small motions as quickly as a straight one. Its impedance is no less for that, since "
-        "both laws have nearly the same gain at the stiffest place. In these two figures nothing is better than "
+        "both laws have nearly the same gain at the stiffest place. In these figures nothing is better than "
         "springs that are straight or nearly so, from soft to stiff.",
         assumed="Linear loops at rest at 0.3, 1.4 and 2.8 N·m, the plant sliding, no counts; the worst of "
         "these counts. Bandwidth is the lower of that of small motions and the frequency up to which speed "
