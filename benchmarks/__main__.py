@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import importlib
 
-NAMES = ("observer_step", "bench_simulation", "bench_events", "fit", "cam_design", "analysis_over_angle")
+NAMES = (
+    "observer_step",
+    "bench_simulation",
+    "bench_events",
+    "fit",
+    "cam_design",
+    "analysis_over_angle",
+    "observers",
+)
 
 
 def main() -> None:

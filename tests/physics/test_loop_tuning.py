@@ -14,7 +14,9 @@ from nlsdesign.control import (
     ClosedLoop,
     LoopChoice,
     LoopLimits,
+    ScheduledTorque,
     TorqueGains,
+    VelocityLoop,
     bandwidth_against_impedance,
     best_choices,
     encoder_loop,
@@ -25,7 +27,7 @@ from nlsdesign.control import (
     torque_controller,
 )
 from nlsdesign.deck import load_deck
-from nlsdesign.errors import InfeasibleError, UnknownNameError
+from nlsdesign.errors import ConvergenceError, InfeasibleError, UnknownNameError
 from nlsdesign.export import natively
 from nlsdesign.model import flatten
 from nlsdesign.observer import CascadeGain, design_observer
@@ -74,6 +76,46 @@ def test_draws_and_simulated_runs_take_gain_away(loops: dict[str, ClosedLoop]) -
     )
     assert "limit cycle" in ran.limited_by
     assert sine_response(ran.loop, amplitude=2.8, frequencies=[1.0], translate=natively).verdicts[0].holds
+
+
+def scheduled(loop: ClosedLoop, bandwidth: float) -> ClosedLoop:
+    controller = torque_controller(
+        loop.plant, law=ScheduledTorque(bandwidth=bandwidth), velocity=VelocityLoop(friction=None)
+    )
+    return replace(loop, controller=controller)
+
+
+@pytest.mark.parametrize("name", SPRINGS)
+def test_what_is_fed_forward_takes_no_part_in_the_margin(loops: dict[str, ClosedLoop], name: str) -> None:
+    """The margin is the factor by which the bandwidth of the scheduled law may grow until the loop is
+    unstable, with its whole feedforward."""
+    loop, at = scheduled(loops[name], 12.0), np.radians([20.0])
+    factor = 10.0 ** (loop_margins(loop, at, opening=loop.desired).gain[0] / 20.0)
+    for share, stable in ((0.99, True), (1.01, False)):
+        changed = {"controller.bandwidth": 12.0 * factor * share}
+        louder = linear_loop(replace(loop, controller=loop.controller.with_values(changed)), at)
+        assert louder.reached.all()
+        assert bool(louder.stable()[0]) is stable
+
+
+def test_a_quick_loop_of_a_linear_spring_is_the_same_at_every_angle(loops: dict[str, ClosedLoop]) -> None:
+    """Searched from far away the rest lay at a limit of the command, where nothing follows what is wanted."""
+    loop = scheduled(loops["soft"], 24.0)
+    margins = loop_margins(loop, np.radians([2.0, 20.0, 40.0]), opening=loop.desired)
+    assert margins.linear.reached.all()
+    assert margins.gain == pytest.approx(margins.gain[0], rel=1e-4)
+    assert margins.phase == pytest.approx(margins.phase[0], rel=1e-4)
+
+
+def test_a_loop_that_holds_no_angle_has_no_gain(loops: dict[str, ClosedLoop]) -> None:
+    with pytest.raises(InfeasibleError, match="the current limit lets the loop hold none of the angles"):
+        largest_gain(loops["stiff"], GAIN, between=(2.0, 8.0), angles=np.radians([120.0]))
+
+
+def test_an_observer_without_a_rest_is_refused(loops: dict[str, ClosedLoop]) -> None:
+    bench = flatten(declare(load_deck(SPRINGS["nonlinear"])), outputs=["motor.angle", "spring.torque"])
+    with pytest.raises(ConvergenceError, match=r"no rest is found.*gain=CascadeGain"):
+        loop_margins(replace(loops["nonlinear"], observer=design_observer(bench)), np.radians([20.0]))
 
 
 def test_what_cannot_be_had(loops: dict[str, ClosedLoop]) -> None:

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import schur
 
-from ...errors import ValueRangeError, unknown_name
+from ...errors import ConvergenceError, ValueRangeError, unknown_name
 from ...model.roles import series_spring
 from ...simulation.sampled_batch import PLANT, SampledSystem
+from ..laws.wired_names import DESIRED
 from ..loop.closed_loop import ClosedLoop
 from .fine_counts import with_fine_counts
 from .linear_parts import (
@@ -35,6 +36,9 @@ from .linear_parts import (
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+_WITHOUT_ERROR = 6
+"""Steps of the search for rest in which the torque that is estimated is the one that is wanted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +55,8 @@ class LinearLoop:
         That holds it, in A, shape (n,); where it is beyond the limit of the controller the loop cannot rest
         there, ``reached`` is false and poles and responses are not numbers.
     reached
-        Shape (n,).
+        Whether the loop rests there inside all limits, shape (n,); false also where the controller was only
+        found inside a limit of its own, so that it does not hear what is wanted.
     sample_time
         In s.
     states, inputs, outputs
@@ -175,7 +180,7 @@ def linear_loop(
     UnknownNameError
         If an opened input does not exist.
     ConvergenceError
-        If the plant does not come to rest.
+        If the plant, the observer or the controller does not come to rest.
     ValueRangeError
         If there are no angles.
     """
@@ -267,6 +272,7 @@ class _Assembler:
             self.state[b][:] = m.start(m.states)
         torque = list(plant.signals).index(series_spring(system.plant).effort)
         self.torque = plant.values[:, torque]
+        self.hears = np.ones(self.n, dtype=bool)
         self.open_values = {name: np.zeros(self.n) for name in self.inputs}
         for name in block_inputs:
             self.open_values[name] = self.torque.copy()
@@ -278,7 +284,9 @@ class _Assembler:
         for b, m in self.system.blocks.items():
             columns = [*range(self.first[b], self.first[b] + len(m.states)), *columns]
         last = list(self.system.blocks)[-1]
-        for _ in range(12):
+        for k in range(12):
+            if k < _WITHOUT_ERROR:
+                self._wanted_as_estimated(goals)
             values, rows, following = self.evaluated(at_rest=True)
             residuals, slopes = [], []
             for b, m in self.system.blocks.items():
@@ -291,11 +299,40 @@ class _Assembler:
             residuals.append((values[name] - self.plant.drive)[:, None])
             slopes.append(rows[name][:, None])
             residual, slope = np.concatenate(residuals, axis=1), np.concatenate(slopes, axis=1)[:, :, columns]
-            step = -(np.linalg.pinv(slope) @ residual[:, :, None])[:, :, 0]
+            try:
+                step = -(np.linalg.pinv(slope) @ residual[:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError as error:
+                # Values ran away; an adaptive observer, whose covariance is a state, has no rest like this.
+                raise ConvergenceError(
+                    f"linear loop with {' and '.join(m.name for m in self.system.blocks.values())}",
+                    "no rest is found",
+                    next_step="take a scheduled observer: design_observer(model, gain=CascadeGain())",
+                ) from error
             for k, column in enumerate(columns):
                 self._moved(column, step[:, k])
             if np.max(np.abs(step)) < 1e-9:
-                return
+                break
+        wanted = [column for column in columns if column >= len(self.states)]
+        if wanted:
+            _, rows, following = self.evaluated(at_rest=True)
+            self.hears = self._passes(following[last][1], rows[name], last, wanted)
+
+    def _wanted_as_estimated(self, goals: Sequence[str]) -> None:
+        """Begin the search without an error of the torque: from a limit of the command no slope leads out."""
+        values, _, _ = self.evaluated(at_rest=True)
+        for goal in goals:
+            compared = self.system.sources.get(goal.removesuffix(f".{DESIRED}"))
+            if compared is not None:
+                self.open_values[goal] = values[compared].copy()
+
+    def _passes(self, after: Array, out: Array, block: str, wanted: list[int]) -> NDArray[np.bool_]:
+        """Return where the command follows what is wanted at all; at a limit it has no slope, shape (n,)."""
+        own = slice(self.first[block], self.first[block] + after.shape[1])
+        moved = np.exp(0.1j) * np.eye(after.shape[1]) - after[:, :, own]
+        through = out[:, None, own] @ np.linalg.solve(moved, after[:, :, wanted]) + out[:, None, wanted]
+        size = np.max(np.abs(through), axis=(1, 2))
+        passes: NDArray[np.bool_] = size > 1e-9 * np.max(size, initial=0.0)
+        return passes
 
     def _moved(self, column: int, step: Array) -> None:
         if column >= len(self.states):
@@ -349,7 +386,8 @@ class _Assembler:
         following = {}
         for b, model in self.system.blocks.items():
             sources = [self._source(f"{b}.{v.name}") for v in model.inputs]
-            resting = [self._resting(f"{b}.{v.name}", values) for v in model.inputs]
+            # A cut loop rests where the closed one does.
+            resting = [values[self.system.sources[f"{b}.{v.name}"]] for v in model.inputs]
             point = self.blocks[b].at(self.state[b], np.stack(resting, axis=1))
             given = np.stack([rows[name] for name in sources], axis=1)
             first, count = self.first[b], len(model.states)
@@ -363,10 +401,6 @@ class _Assembler:
 
     def _source(self, name: str) -> str:
         return name if name in self.cut else self.system.sources[name]
-
-    def _resting(self, name: str, values: dict[str, Array]) -> Array:
-        """Return the value of an input at rest: a cut loop rests where the closed one does."""
-        return values[self.system.sources[name]]
 
     def loop(self, angles: Array, mode: LinearMode) -> LinearLoop:
         """Return the whole."""
@@ -392,9 +426,9 @@ class _Assembler:
         outputs = tuple(name for name in rows if name not in self.inputs)
         shown = np.stack([rows[name] for name in outputs], axis=1)
         limit = self.system.blocks[list(self.system.blocks)[-1]].outputs[0].maximum
+        reached = (np.abs(self.plant.drive) < limit) & self.hears
         return LinearLoop(
-            angles, self.torque, self.plant.drive, np.abs(self.plant.drive) < limit, step, self.states,
-            self.inputs, outputs,
+            angles, self.torque, self.plant.drive, reached, step, self.states, self.inputs, outputs,
             whole[:, :, : len(self.states)], whole[:, :, len(self.states) :], after,
             shown[:, :, : len(self.states)], shown[:, :, len(self.states) :], mode,
         )  # fmt: skip

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...simulation.sampled_batch import PLANT
+from ..laws.law_writer import GAIN
 from ..loop.closed_loop import ClosedLoop
 from .linear_loop import Complex, LinearLoop, linear_loop
 from .linear_parts import LinearMode, TableSlope
@@ -17,6 +18,9 @@ from .linear_parts import LinearMode, TableSlope
 Array = NDArray[np.float64]
 
 _POINTS = 600
+
+FEEDFORWARD = f"{GAIN}.feedforward"
+"""Setting of a law: share of what it feeds forward from the desired torque."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +74,8 @@ def loop_margins(
     opening
         Where the loop is cut: by default the current of the plant, which every loop passes.
         ``loop.desired`` cuts where desired and estimated torque are compared, so that the gain is that of the
-        whole torque controller while its compensation and velocity loop stay closed.
+        whole torque controller while its compensation and velocity loop stay closed. What a law feeds forward
+        from the desired torque passes beside that comparison and takes no part.
     mode
         Of the plant's dry friction; sliding by default.
     tables
@@ -86,7 +91,10 @@ def loop_margins(
     current = f"{PLANT}.{loop.names.current}"
     opening = opening or current
     if opening == loop.desired:
-        followed = closed.response(loop.estimate, loop.desired, frequencies)
+        compared = _compared_only(loop)
+        plain = closed if compared is loop else linear_loop(compared, angles, mode=mode, tables=tables)
+        followed = plain.response(loop.estimate, loop.desired, frequencies)
+        followed[~closed.stable()] = 0.0  # has no margins; neither has a loop that does not rest
         gain = followed / (1.0 - followed)
     else:
         opened = linear_loop(loop, angles, opened=(opening,), mode=mode, tables=tables)
@@ -99,9 +107,17 @@ def loop_margins(
         if opening == current:
             # The opening lies behind the samples in which a computed current waits.
             gain *= np.exp(-2j * math.pi * frequencies * loop.sample_time * loop.delay)
-    rows = np.array([_margins(each, frequencies) for each in gain])
-    rows[~closed.stable()] = math.nan
+    rows = np.full((len(gain), 5), math.nan)
+    for k in np.flatnonzero(closed.stable()):
+        rows[k] = _margins(gain[k], frequencies)
     return LoopMargins(opening, closed, *rows.T)
+
+
+def _compared_only(loop: ClosedLoop) -> ClosedLoop:
+    """Return the loop with nothing fed forward: T̂/T_d = L/(1 + L) holds only without."""
+    if not loop.controller.values.get(FEEDFORWARD, 0.0):
+        return loop
+    return replace(loop, controller=loop.controller.with_values({FEEDFORWARD: 0.0}))
 
 
 def _margins(gain: Complex, frequencies: Array) -> tuple[float, float, float, float, float]:

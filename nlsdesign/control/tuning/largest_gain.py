@@ -163,6 +163,12 @@ def _broken(loops: Sequence[ClosedLoop], angles: Array, limits: LoopLimits, tran
         which = f"draw {number}, " if number else ""
         margins = loop_margins(loop, angles, opening=loop.desired)
         reached = margins.linear.reached
+        held = np.abs(margins.linear.current) < loop.controller.outputs[0].maximum
+        if not np.any(held):
+            return f"{which}the current limit lets the loop hold none of the angles"
+        if not np.all(reached[held]):
+            lost = angles[held & ~reached][0]
+            return f"{which}no rest inside the limits of the controller at {np.degrees(lost):.3g}°"
         if not np.all(margins.linear.stable()[reached]):
             return f"{which}the linear loop is unstable at an angle"
         for name, unit, values, least in (

@@ -32,7 +32,7 @@ class LoopChoice:
         Value of the gain.
     bandwidth
         Lowest frequency in Hz at which the linear response of the torque is down by 3 dB, the worst angle;
-        not a number where a loop is unstable.
+        zero where it is down at 0.2 Hz already, not a number where a loop is unstable or holds none.
     impedance
         Size of the output impedance in N·m·s/rad at the frequency asked for, the worst angle.
     admissible
@@ -124,4 +124,6 @@ def best_choices(choices: Sequence[LoopChoice]) -> tuple[LoopChoice, ...]:
 
 def _first_below(size: Array) -> float:
     below = np.flatnonzero(size < math.sqrt(0.5))
-    return float(_FREQUENCIES[below[0]]) if len(below) else math.inf
+    if not len(below):
+        return math.inf
+    return float(_FREQUENCIES[below[0]]) if below[0] else 0.0

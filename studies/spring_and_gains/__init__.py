@@ -2,6 +2,10 @@
 
 More gain gives more bandwidth and less impedance until the loop limit-cycles; a softer spring bears more gain
 but has further to go. So the torque curve of the spring and the gain belong together: a front over both.
+
+Two halves. Simulated: the gain of each designed spring is half that at which its loop limit-cycles. Linear:
+the gain of each published and each designed spring is the largest that keeps its margins over the angle and
+over machines drawn from the spread, with a PID law and with the one that is scheduled over the stiffness.
 """
 
 from __future__ import annotations
@@ -15,12 +19,16 @@ from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import loss_of, material
+from nlsdesign.control import LoopChoice, best_choices
+from nlsdesign.design import CamDesign
 from nlsdesign.errors import NlsError
+from nlsdesign.quantity import three_digits
 from nlsdesign.report import FigureSection, TableSection
 
-from .alternative_rubber.bench import Bench, Rubber
-from .alternative_rubber.candidates import designed
-from .alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
+from ..alternative_rubber.bench import Bench, Rubber
+from ..alternative_rubber.candidates import designed
+from ..alternative_rubber.merits import HIGH, MOVED_AT, largest_gains, measured
+from .under_margins import DECKS, DRAWS, LIMITS, Line, front_of, lines_of, published, stiffness_felt
 
 Array = NDArray[np.float64]
 
@@ -30,6 +38,10 @@ ANGLES, SHAPES = (40.0, 53.0, 65.0), (0.2, 1.0, 2.5)
 PUBLISHED = (53.0, 1.0)
 MARGINS = (4.0, 2.8, 2.0)
 """Gain at which the loop limit-cycles over the gain that is taken."""
+
+
+def _label(angle: float, shape: float) -> str:
+    return f"{angle:g}° shape {shape:g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +67,21 @@ class Spring:
     @property
     def label(self) -> str:
         """Angle and shape."""
-        return f"{self.angle:g}°, shape {self.shape:g}"
+        return _label(self.angle, self.shape)
 
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """All springs, and the names of those that miss their target."""
+    """All springs, the names of those that miss their target, and the lines of the linear half."""
 
     springs: tuple[Spring, ...]
     missed: tuple[str, ...]
+    lines: tuple[Line, ...] = ()
+
+    @property
+    def best_under_margins(self) -> tuple[LoopChoice, ...]:
+        """Choices of the linear half that no other betters in bandwidth and impedance."""
+        return front_of(self.lines)
 
     @property
     def front(self) -> list[tuple[Spring, int]]:
@@ -93,11 +111,24 @@ class Results:
             "least_impedance_Nm_per_rad": float(gentle.impedance[k]),
             "least_impedance_angle_deg": gentle.angle,
             "springs_on_the_front": float(len({s.label for s, _ in self.front})),
+            **self._under_margins(),
         }
+
+    def _under_margins(self) -> dict[str, float]:
+        """Return the numbers of the linear half."""
+        numbers: dict[str, float] = {}
+        for line in self.lines:
+            if line.spring in DECKS:
+                numbers |= line.numbers | {f"{line.spring}_reach_Hz": line.reach}
+        best = self.best_under_margins
+        if len({line.spring for line in self.lines}) > len(DECKS):
+            numbers["best_under_margins"] = float(len(best))
+            numbers["designed_among_them"] = float(sum(c.name.split(",")[0] not in DECKS for c in best))
+        return numbers
 
     def _straight(self, k: int) -> dict[str, float]:
         """Return the numbers of the spring that is nearly a line to the same torque at the same angle."""
-        if all(s.label != f"{PUBLISHED[0]:g}°, shape {SHAPES[0]:g}" for s in self.springs):
+        if all(s.label != _label(PUBLISHED[0], SHAPES[0]) for s in self.springs):
             return {}
         straight = self.spring(PUBLISHED[0], SHAPES[0])
         return {
@@ -116,30 +147,32 @@ def _betters(one: tuple[Spring, int], other: tuple[Spring, int]) -> bool:
 def main(out: Path, fast: bool = False) -> Results:
     """Design all springs, sweep the gain of each, and write a report."""
     choices = [(a, c) for a in ANGLES for c in SHAPES] if not fast else [PUBLISHED]
-    springs, missed = [], []
-    for angle, shape in choices:
-        spring = spring_of(angle, shape)
-        if spring is None:
-            missed.append(f"{angle:g}°, shape {shape:g}")
-        else:
-            springs.append(spring)
-    results = Results(tuple(springs), tuple(missed))
+    designs = {choice: design_for(*choice) for choice in choices}
+    made = {choice: design for choice, design in designs.items() if design is not None}
+    springs = tuple(swept(design, *choice) for choice, design in made.items())
+    actuators = {s.label: d.actuator for s, d in zip(springs, made.values(), strict=True)} if not fast else {}
+    asked = {name: a for name, a in published().items() if name == "nonlinear" or not fast}
+    missed = tuple(_label(*choice) for choice, design in designs.items() if design is None)
+    results = Results(springs, missed, lines_of(asked | actuators))
     write(out, results)
     return results
 
 
-def spring_of(angle: float, shape: float, margins: Sequence[float] = MARGINS) -> Spring | None:
-    """Return a designed spring with its loop at several gains; none where the target is missed."""
+def design_for(angle: float, shape: float) -> CamDesign | None:
+    """Return a designed spring; none where the target is missed."""
     target = nls.ExponentialTorque(maximum=5.0, angle=nls.degrees(angle), shape=shape)
     rubber = material(RUBBER)
-    loss = loss_of(rubber).middle
     try:
-        design = designed(rubber, loss, target)
+        design = designed(rubber, loss_of(rubber).middle, target)
     except NlsError:
         # Limits in conflict: a miss, which the report names.
         return None
-    if not design.met:
-        return None
+    return design if design.met else None
+
+
+def swept(design: CamDesign, angle: float, shape: float, margins: Sequence[float] = MARGINS) -> Spring:
+    """Return what the simulated loop of a design does at several gains."""
+    loss = loss_of(material(RUBBER)).middle
     bench = Bench(design.actuator)
     gains = float(largest_gains(bench, [Rubber(loss)])[0]) / np.array(margins)
     columns = measured(bench, [Rubber(loss)] * len(gains), gains)
@@ -189,6 +222,72 @@ def write(out: Path, results: Results) -> None:
             rows,
             caption="Gain in rad/s per N·m.",
         ),
+        *_linear_sections(results),
         title="Spring and gains together",
         abstract="Bandwidth against output impedance over torque curve and gain.",
     )
+
+
+def _linear_sections(results: Results) -> tuple[FigureSection, TableSection]:
+    """Return figure and table of the linear half."""
+    best = results.best_under_margins
+    curves = {
+        line.label: _points(line.choices)
+        for line in results.lines
+        if line.choices and line.spring in DECKS
+    }  # fmt: skip
+    for law in dict.fromkeys(line.law.title for line in results.lines):
+        own = [line.last for line in results.lines if line.law.title == law and line.spring not in DECKS]
+        kept_ones = best_choices([c for c in own if c is not None])
+        if kept_ones:
+            curves[f"best designed, {law}"] = _points(kept_ones)
+    curves["no other is better in both"] = _points(best)
+    up = f"bandwidth up to {HIGH:g} N·m, Hz"
+    across = f"impedance at {MOVED_AT:g} Hz, N·m/rad"
+    kept = f"{LIMITS.gain_margin:g} dB and {LIMITS.phase_margin:g}°"
+    rows = tuple(
+        (
+            line.label,
+            f"{three_digits(line.largest)} {line.law.unit}" if line.choices else line.limited_by,
+            *_last(line),
+            "yes" if any(c in best for c in line.choices) else "",
+        )
+        for line in results.lines
+    )
+    figure = FigureSection(
+        "Published and designed springs under margins",
+        nls.figures.curves(
+            curves,
+            across=across,
+            up=up,
+            words=f"Bandwidth over impedance of {len(curves) - 1} lines of springs and laws under margins.",
+        ),
+        caption=f"Along each line of a published spring the gain rises from a quarter to the largest that "
+        f"keeps {kept} at three torques, for the declared machine and for {DRAWS} drawn from its spread; of "
+        "the designed springs that gain only, of those that no other designed one betters.",
+        means="A soft spring bears the most gain and has the least impedance, but the motor has furthest to "
+        f"go: it makes a sine of {HIGH:g} N·m only up to the lowest frequency. A PID gain is bounded where "
+        "the spring is stiffest and is slow where it is soft; scheduled over the stiffness a stiffening "
+        "spring follows small motions as quickly as a straight one. Its impedance is no less for that, since "
+        "both laws have nearly the same gain at the stiffest place. In these figures nothing is better than "
+        "springs that are straight or nearly so, from soft to stiff.",
+        assumed="Linear loops at rest at 0.3, 1.4 and 2.8 N·m, the plant sliding, no counts; the worst of "
+        "these counts. Bandwidth is the lower of that of small motions and the frequency up to which speed "
+        f"limit and current allow a sine of {HIGH:g} N·m. Nothing is fed forward.",
+    )
+    heads = ("spring, law", "largest gain", "small motions, Hz", "reach, Hz", across, "on the front")
+    return figure, TableSection(
+        "Largest gains under margins", heads, rows, caption=f"Margins of {kept}; reach at {HIGH:g} N·m."
+    )
+
+
+def _points(choices: Sequence[LoopChoice]) -> tuple[Array, Array]:
+    """Return impedance and bandwidth."""
+    return np.array([stiffness_felt(c) for c in choices]), np.array([c.bandwidth for c in choices])
+
+
+def _last(line: Line) -> tuple[float, float, float]:
+    """Return bandwidth of small motions, reach and impedance at the largest gain."""
+    if line.last is None:
+        return np.nan, line.reach, np.nan
+    return line.small[-1], line.reach, stiffness_felt(line.last)
