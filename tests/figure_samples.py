@@ -207,6 +207,7 @@ def made_springs() -> ToleranceResult:
     return tolerance_analysis(cam_cases.actuator(cam_cases.CONCAVE, pretension=2e-3), target=TARGET, draws=40)
 
 
+BESIDE = (np.array([1.0, 2.0, 5.0]), np.array([0.1, np.nan, 0.3]))
 FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "cam_positions": lambda: figures.cam_positions(motion()),
     "torque_curve": lambda: figures.torque_curve(motion(), at=30),
@@ -240,5 +241,10 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "impedance": lambda: figures.impedance_over_frequency(impedance()),
     "margins": lambda: figures.margins_over_angle([loop_margins()]),
     "coupled_stability": lambda: figures.coupled_stability_map(coupled()),
+    "beside_points": lambda: figures.curves_beside_points(
+        [figures.PointPanel("Torque", "torque in N·m", {"one": BESIDE, "two": BESIDE}, {"one": BESIDE})],
+        across="frequency in Hz",
+        words="Two curves, one of them with points, at 1 to 5 Hz; one value is missing.",
+    ),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
 }

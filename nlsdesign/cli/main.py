@@ -21,6 +21,7 @@ from .fit import fit
 from .materials import materials
 from .observer import observer
 from .observer_certificate import verify_certificate
+from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
 from .parts import parts
 from .studies import study
 
@@ -31,7 +32,7 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
-for part in (calibrate, verify_certificate):
+for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, verify_certificate):
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),

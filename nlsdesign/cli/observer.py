@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .observer_certificate import range_options
 from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
 from .output import DECK_HELP, json_option, measured_option, out_option, show_json, spring_option
 from .units import Number
@@ -37,6 +38,7 @@ real_option = click.option(
 @click.option("--certificate", "certified", is_flag=True, help="Also write what is proved of it.")
 @click.option("--decay", type=float, metavar="PER_SECOND", help="Design one certified gain with this decay.")
 @click.option("--with-spread", is_flag=True, help="Certify for all parameters within their spread.")
+@range_options
 def observer(
     context: click.Context,
     /,
@@ -59,6 +61,7 @@ def observer(
     from ..deck import load_deck
     from ..export import export_c
     from ..model import flatten
+    from ..observer import certified_design
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
@@ -74,7 +77,7 @@ def observer(
         if options["with_errors"]
         else None
     )
-    model = chosen.model if proved is None else with_statement(chosen.design.model, proved)
+    model = chosen.model if proved is None else with_statement(certified_design(proved, plant).model, proved)
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]
     if proved is not None:
@@ -103,12 +106,14 @@ def observer(
 
 def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str | None, ToProve | None]:
     """Return the kind of observer, and what is to be proved of it; nothing by default."""
-    from .observer_certificate import ToProve
+    from .observer_certificate import ToProve, given_ranges
 
+    ranges = given_ranges(options)
     kind, decay, with_spread = options["kind"], options["decay"], options["with_spread"]
     if not (options["certified"] or kind == CERTIFIED):
-        if decay is not None or with_spread:
-            raise click.UsageError("--decay and --with-spread belong to --certificate", ctx=context)
+        if decay is not None or with_spread or ranges:
+            words = "--decay, --with-spread, --angles, --speed and --angle-error belong to --certificate"
+            raise click.UsageError(words, ctx=context)
         return kind, None
     if kind not in (None, CASCADE, CERTIFIED):
         raise click.UsageError(
@@ -118,7 +123,7 @@ def _what_is_asked(context: click.Context, options: dict[str, Any]) -> tuple[str
     if decay is not None and kind == CASCADE:
         raise click.UsageError(f"--decay belongs to --kind {CERTIFIED}", ctx=context)
     kind = kind or (CASCADE if decay is None else CERTIFIED)
-    return kind, ToProve(decay, with_spread, options["real"])
+    return kind, ToProve(decay, with_spread, options["real"], ranges)
 
 
 def _refuse_misplaced(context: click.Context) -> None:

@@ -3,23 +3,58 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import ArrangementError
 from .output import json_option, show_json
+from .units import Number
 
 if TYPE_CHECKING:
     from ..deck import Deck
     from ..export import CSource
     from ..model import FlatModel
-    from ..observer import Certificate
+    from ..observer import Certificate, HeldEstimateCertificate
+    from ..observer.certificates import Proof
+    from ..observer.certificates.verification import WritesCode
     from .observer_kinds import DesignedObserver
 
 CERTIFICATE = "certificate.json"
+
+
+def range_options(command: Any) -> Any:
+    """Add the options for the ranges over which a bound on the torque is to hold.
+
+    Parameters
+    ----------
+    command
+        Gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
+    """
+    for option in (
+        click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
+                     "count of the deck's encoder by default."),
+        click.option("--speed", type=Number("rad/s"), help="Largest speed; 20 rad/s by default."),
+        click.option("--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="Range of the angle, "
+                     "such as --angles '-46 deg' '46 deg'; the whole table by default."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def given_ranges(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the ranges that were given.
+
+    Parameters
+    ----------
+    options
+        Of the command.
+    """
+    named = {name: options[name] for name in ("angles", "speed", "angle_error")}
+    return {name: value for name, value in named.items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -34,11 +69,14 @@ class ToProve:
         Whether parameters may be anywhere within their spread.
     real
         ``"double"`` or ``"float"``.
+    ranges
+        Angles, speed and error of the angle by name, where they are not those that the deck declares.
     """
 
     decay: float | None
     with_spread: bool
     real: str
+    ranges: Mapping[str, Any] = field(default_factory=dict)
 
 
 def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProve) -> Certificate:
@@ -66,12 +104,12 @@ def prove(plant: FlatModel, deck: Deck, chosen: DesignedObserver, wanted: ToProv
             f"observer of kind '{chosen.kind}'", "cannot be certified", next_step="take --kind certified"
         )
     spreads = {v.name: v.spread for v in plant.parameters if v.spread > 0.0} if wanted.with_spread else {}
-    assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real)
+    assumed = replace(declared_assumptions(plant, design), spreads=spreads, real=wanted.real, **wanted.ranges)
     text = deck.path.read_text(encoding="utf-8-sig")
     return certify(plant, design, assumptions=assumed, decay=wanted.decay, deck=(deck.name, text))
 
 
-def with_statement(observer: FlatModel, proved: Certificate) -> FlatModel:
+def with_statement(observer: FlatModel, proved: Proof) -> FlatModel:
     """Return an observer whose description, and so the head of its C code, ends with what is proved.
 
     Parameters
@@ -85,7 +123,7 @@ def with_statement(observer: FlatModel, proved: Certificate) -> FlatModel:
     return replace(observer, description=f"{observer.description}; certified, see {CERTIFICATE}: {words}")
 
 
-def write_proved(proved: Certificate, out: Path, source: CSource) -> Path:
+def write_proved(proved: Certificate | HeldEstimateCertificate, out: Path, source: CSource) -> Path:
     """Write the certificate beside the C code, with the hashes of both files.
 
     Parameters
@@ -110,11 +148,30 @@ def _hashes(*files: Path) -> dict[str, str]:
     return {file.name: result[file.name] for file in files}
 
 
+def written_anew(proved: Proof) -> WritesCode:
+    """Return what writes the C code of a certificate as the commands do, with its sentences in the head.
+
+    Parameters
+    ----------
+    proved
+        The certificate.
+    """
+    from ..export import export_c
+
+    def write(observer: FlatModel, folder: Path, /, *, real: str, name: str) -> object:
+        return export_c(with_statement(observer, proved), folder, real=real, name=name)
+
+    return write
+
+
 @click.command("verify")
 @click.argument("certificate", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--deck", "deck_name", metavar="DECK", help="Deck that should be the certified one.")
 @click.option(
-    "--c", "code", type=click.Path(path_type=Path, file_okay=False), help="Folder of the C files to compare."
+    "--c",
+    "code",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of the C files; they are written anew from the deck and compared.",
 )
 @json_option
 def verify_certificate(certificate: Path, deck_name: str | None, code: Path | None, as_json: bool) -> None:
@@ -122,13 +179,18 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck, read_deck
     from ..model import flatten
-    from ..observer import read_certificate, verify
+    from ..observer import CodeToCompare, read_certificate, verify
+    from .observer_proofs import learning_design
 
     proved, untouched = read_certificate(certificate)
     given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None
     name, text = proved.deck
     model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
-    result = verify(proved, untouched=untouched, model=model, deck=given, code=code)
+    result = verify(
+        proved, untouched=untouched, model=model, deck=given,
+        code=None if code is None else CodeToCompare(code, written_anew(proved)),
+        design=learning_design(proved, model),
+    )  # fmt: skip
     if as_json:
         checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]
         show_json({"holds": result.holds, "statement": list(proved.statement), "checks": checks})

@@ -11,6 +11,7 @@ from .before_after import (
     gap_bars,
     held_out_series,
 )
+from .beside_points import PointPanel, curves_beside_points
 from .cam_frames import CamPicture, cam_picture, torque_curve
 from .cam_motion import CamMotion, cam_motion, cam_motion_of, cam_positions
 from .curves import curves
@@ -42,6 +43,7 @@ __all__ = [
     "Figure",
     "HeldOut",
     "InspectionRow",
+    "PointPanel",
     "RecordError",
     "TitleBlock",
     "alternative_text",
@@ -57,6 +59,7 @@ __all__ = [
     "coupled_stability_map",
     "curve_of_task",
     "curves",
+    "curves_beside_points",
     "described",
     "design_picture",
     "errors_over_spread",

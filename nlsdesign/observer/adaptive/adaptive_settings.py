@@ -42,7 +42,7 @@ class Trust:
 
     unmodelled: float = 0.005
     correlation_time: float = 0.02
-    drift_time: float = 600.0
+    drift_time: float = 60.0
     counts: float = 1.0
     limit: float = 4.0
     surprise: float = 3.0

@@ -12,8 +12,11 @@ from .filter_equations import FilterEquations, pairs
 
 Array = NDArray[np.float64]
 
-DEVIATION, SPREAD = "deviation", "standard_deviation"
-"""Endings of the name of the estimate: slow states, and the deviation that the filter expects."""
+DEVIATION, SPREAD, UNREST = "deviation", "standard_deviation", "unrest"
+"""Endings of the name of the estimate: slow states, the deviation that the filter expects, and the factor on
+the noise that it reckons with."""
+FOLLOWED = "followed"
+"""Ending of the name of the angle: its measured value behind a filter."""
 
 
 def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> FlatModel:
@@ -73,6 +76,12 @@ class _Variables:
         for d, name in enumerate(self._slow_names()):
             text = f"distance from the deck in standard deviations; one is {self.directions.in_words(d)}"
             states.append(Variable(f"{name}.{MEMORY}", "1", text))
+        text = "factor on the variances of all noise, from innovations that were larger than expected"
+        states.append(Variable(f"{plant.estimate.name}.{UNREST}", "1", text, 1.0))
+        v = plant.states[self.angle]
+        size = float(plant.sizes[self.angle])
+        words = f"measured {v.name} behind a filter, which shows whether it moves"
+        states.append(Variable(f"{v.name}.{FOLLOWED}", v.unit, words, nominal=size))
         initial = np.concatenate([self._initial_variances(), np.ones(self.slow)])
         names = [*plant.names, *self._slow_names()]
         for i, j in pairs(len(names)):

@@ -109,16 +109,12 @@ def estimator_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: Sense
     seen, wanted = read.map(count)(course, inputs)
     h, g = seen.full().T, wanted.full().T
     variance, before = np.zeros(count), np.einsum("ti,ti->t", g, g)
-    information = np.eye(xi)
-    noise = sensed.quantum**2 / 12.0
+    covariance, noise = np.eye(xi), sensed.quantum**2 / 12.0
     for k in range(count):
-        information += np.outer(h[k], h[k]) / noise
-        if k % 5 == 0 or k == count - 1:
-            variance[k] = g[k] @ np.linalg.solve(information, g[k])
-        else:
-            variance[k] = np.nan
-    have = np.flatnonzero(np.isfinite(variance))
-    variance = np.interp(np.arange(count), have, variance[have])
+        # J⁻¹ with one more reading, by Sherman and Morrison.
+        said = covariance @ h[k]
+        covariance -= np.outer(said, said) / (noise + h[k] @ said)
+        variance[k] = g[k] @ covariance @ g[k]
     time: Array = sensed.sample_time * np.arange(float(count))
     return EstimatorBound(time, np.sqrt(np.maximum(variance, 0.0)), np.sqrt(before))
 

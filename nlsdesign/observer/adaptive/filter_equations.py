@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
 
 from ...symbolic import Expression
 from ..scheduling.table import Compact
@@ -17,6 +18,12 @@ from .adaptive_step import AdaptiveStep
 
 Array = NDArray[np.float64]
 
+FOLLOWING_TIME = 0.01
+"""Seconds by which an angle lags the measured one; their distance says whether the actuator moves at all."""
+UNREST_TIME = 1.0
+"""Seconds over which innovations that are larger than expected raise the noise that is reckoned with."""
+MOST_UNREST = 1e4
+"""Largest factor on the variances of that noise."""
 _WIDE = 5.0
 """Deviation of a prediction, in deviations of rounding, beyond which rounding is as good as normal noise."""
 
@@ -68,7 +75,8 @@ class FilterEquations:
         # Units in which all covariances are near one: counts, counts per sample, sizes of inner states.
         self.units = self.plant.sizes.copy()
         self.units[self.angle], self.units[self.speed] = noise.angle, noise.angle / time
-        self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]))
+        self.blur = _speed_deviation(noise.angle, self._acceleration_density(), time)
+        self.calm = _calm_speed(self.plant.friction, float(self.plant.sizes[self.speed]), self.blur)
 
     # --- reading the table ------------------------------------------------------------------------------
 
@@ -110,10 +118,16 @@ class FilterEquations:
             state += ca.mtimes(self._matrix("coupling", self.n, inner, slow), state[:inner])
         friction_of = self.step.friction
         speed = ca.SX.sym("speed")
-        given = friction_of(speed)
-        if given is None:
+        length = ca.sqrt(speed**2 + self.blur**2)
+        ahead, back = friction_of(length), friction_of(-length)
+        if ahead is None or back is None:
             return state
-        own, slopes = given
+
+        def blurred(forward: Expression, backward: Expression) -> Expression:
+            return (forward + backward) / 2.0 + (forward - backward) / 2.0 * speed / length
+
+        own = blurred(ahead[0], back[0])
+        slopes = [blurred(one, other) for one, other in zip(ahead[1], back[1], strict=True)]
         rate = self._lightness(slow) * (
             own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
         )
@@ -169,22 +183,28 @@ class FilterEquations:
         n, slow_count, plant = self.n, self.slow, self.plant
         size = n + slow_count
         memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", slow_count)
-        packed = ca.SX.sym("covariance", size * (size + 1) // 2)
+        packed, unrest = ca.SX.sym("covariance", size * (size + 1) // 2), ca.SX.sym("unrest")
         angle, u = ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
         slopes = self._carried(self._begin(memory, slow), memory, slow)
         before = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
         expected = self._begin(memory, slow)
         innovation = angle - expected[self.angle]
         off, variance_of_angle = innovation / self.noise.angle, before[self.angle, self.angle]
-        direction, moving = self._direction(before, expected[self.speed])
+        followed = ca.SX.sym("followed")
+        seen_speed = (angle - followed) / FOLLOWING_TIME
+        direction, moving = self._direction(
+            before, ca.fmin(ca.fabs(expected[self.speed]), ca.fabs(seen_speed))
+        )
         # A surprise beyond what noise gives teaches the less the larger it is: a drive at its limit or a
         # jump of the encoder is no news of the rubber.
-        surprise = ca.sqrt(off**2 / (variance_of_angle + 1.0) + 1e-12)
+        squared = off**2 / (variance_of_angle + unrest)
+        surprise = ca.sqrt(squared + 1e-12)
         direction[n:] *= ca.fmin(1.0, self.trust.surprise / surprise)
         for i, v in enumerate(plant.inputs):
             if v.name in self.noise.safe_inputs:
                 direction[n:] *= ca.fabs(u[i]) < self.noise.safe_inputs[v.name]
-        moved, kept = within_a_count(off, variance_of_angle)
+        moved, kept = within_a_count(off / ca.sqrt(unrest), variance_of_angle / unrest)
+        moved *= ca.sqrt(unrest)
         step, gain = direction * moved, direction * (1.0 - kept)
         state = expected + step[:n] * self.units
         slow_after = ca.fmin(ca.fmax(slow + step[n:], -self.trust.limit), self.trust.limit)
@@ -201,7 +221,7 @@ class FilterEquations:
         forget = moving * (1.0 - math.exp(-2.0 * self.step.nominal.sample_time / self.trust.drift_time))
         fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
         onward = ca.mtimes(ca.diag(fading), onward)
-        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget)
+        next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest, u)
         row = self._matrix("estimate", 1, n + 1, free)
         wanted = ca.mtimes(row, ca.vertcat(s, 1))
         slopes_of_estimate = self._slopes(wanted, s, free)
@@ -210,8 +230,18 @@ class FilterEquations:
         variance = ca.mtimes([row_at, after, row_at.T]) + self.noise.estimate**2
         shown = state + self._matrix("shift", n, 1, slow_after)
         outputs = [estimate, ca.sqrt(variance), shown, innovation, slow_after]
-        states = [following, slow_after * fading[n:], _packed(next_covariance)]
-        arguments = [ca.SX.sym("time"), ca.vertcat(memory, slow, packed), ca.vertcat(angle, u), ca.SX(0, 1)]
+        excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
+        restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)
+        restless = ca.fmin(ca.fmax(restless, 1.0), MOST_UNREST)
+        follows = 1.0 - math.exp(-self.step.nominal.sample_time / FOLLOWING_TIME)
+        behind = followed + follows * (angle - followed)
+        states = [following, slow_after * fading[n:], restless, behind, _packed(next_covariance)]
+        arguments = [
+            ca.SX.sym("time"),
+            ca.vertcat(memory, slow, unrest, followed, packed),
+            ca.vertcat(angle, u),
+            ca.SX(0, 1),
+        ]
         results = ca.cse([ca.densify(ca.vertcat(*states)), ca.densify(ca.vertcat(*outputs))])
         return ca.Function(
             "equations",
@@ -220,26 +250,52 @@ class FilterEquations:
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
 
-    def _process_noise(self, forget: Expression) -> Expression:
+    def _acceleration_density(self) -> float:
+        time = self.step.nominal.sample_time
+        return self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
+
+    def _process_noise(self, forget: Expression, unrest: Expression, u: Expression) -> Expression:
         """Return what one sample adds to the covariance.
 
         A torque that stays the same over the correlation time is, to a filter that takes it as white, one of
-        2·correlation/sample times the variance.
+        2·correlation/sample times the variance. Of an input beyond what the drive surely gives, all that is
+        beyond may be missing.
         """
-        time = self.step.nominal.sample_time
-        density = self.noise.acceleration * math.sqrt(max(2.0 * self.trust.correlation_time / time, 1.0))
+        time, density = self.step.nominal.sample_time, self._acceleration_density()
         push = np.zeros(self.n)
-        push[self.angle], push[self.speed] = density * time**2 / 2.0, density * time
+        push[self.angle], push[self.speed] = time**2 / 2.0, time
         push /= self.units
         size = self.n + self.slow
         noise = ca.SX.zeros(size, size)
-        noise[: self.n, : self.n] = ca.DM(np.outer(push, push))
+        missing = _missing(self.step, self.noise.safe_inputs, u) ** 2
+        noise[: self.n, : self.n] = (unrest * density**2 + missing) * ca.DM(np.outer(push, push))
         for i in range(self.n):
             # Rounding of a small number beside large ones; without it single precision may lose its sign.
             noise[i, i] += 1e-6 if i in (self.angle, self.speed) else 1e-12
         for d in range(self.slow):
             noise[self.n + d, self.n + d] += forget
         return noise
+
+
+def _missing(step: AdaptiveStep, safe: Mapping[str, float], u: Expression) -> Expression:
+    """Return the acceleration that a limited drive may not give of what its inputs ask for."""
+    missing = ca.SX(0)
+    for i, v in enumerate(step.nominal.plant.inputs):
+        if v.name in safe:
+            missing += abs(_slope_of_drive(step, i)) * ca.fmax(ca.fabs(u[i]) - safe[v.name], 0.0)
+    return missing
+
+
+def _slope_of_drive(step: AdaptiveStep, place: int) -> float:
+    """Return the acceleration per unit of an input, at its start value; zero where it gives none."""
+    plant = step.nominal.plant
+    rows = list(plant.rows)
+    _, speed = plant.moving
+    if speed not in rows:
+        return 0.0
+    u = ca.SX.sym("u", len(plant.inputs))
+    slopes = ca.Function("slopes", [u], [ca.densify(ca.jacobian(step.driven(u)[0], u))])
+    return float(slopes([v.start for v in plant.inputs])[rows.index(speed), place])
 
 
 def within_a_count(off: Expression, variance: Expression) -> tuple[Expression, Expression]:
@@ -276,19 +332,30 @@ def within_a_count(off: Expression, variance: Expression) -> tuple[Expression, E
     return ca.SX(ca.sign(off) * moved), ca.SX(kept)
 
 
-def _calm_speed(friction: ca.Function | None, size: float) -> float:
-    """Return a speed below which nothing is learned: twenty times that of 90 % of the friction; 0 for none.
+def _calm_speed(friction: ca.Function | None, size: float, blur: float) -> float:
+    """Return a speed below which dry friction is not at its level, as the filter sees it; 0 for none.
 
-    Within a sample in which the motion reverses, friction is known on average only. At twice that speed the
-    filter took what is left for a scale of the torque: 10 mN·m on the published actuator with exact numbers,
-    and 2 at twenty times.
+    That is twice the speed at which 90 % of it are reached.
     """
     if friction is None:
         return 0.0
     speeds = size * np.logspace(-7.0, 0.0, 400)
     level = np.abs(friction.map(len(speeds))(speeds[None, :]).full().ravel())
     reached = np.flatnonzero(level >= 0.9 * np.max(level))
-    return float(20.0 * speeds[reached[0]])
+    return 2.0 * max(float(speeds[reached[0]]), 2.0 * blur)
+
+
+def _speed_deviation(angle: float, acceleration: float, time: float) -> float:
+    """Return how well the speed of a free body is known from readings of its angle, before each reading.
+
+    The dry friction of a speed that is known no better is a mean over its deviation: taken at the estimate,
+    noise of the reading would be rectified, and learned as a torque of the spring.
+    """
+    carried = np.array([[1.0, time], [0.0, 1.0]])
+    push = acceleration * np.array([[time**2 / 2.0], [time]])
+    seen, tiny = np.array([[1.0, 0.0]]), 1e-12 * np.diag([angle, angle / time]) ** 2
+    covariance = solve_discrete_are(carried.T, seen.T, push @ push.T + tiny, np.array([[angle**2]]))
+    return math.sqrt(float(covariance[1, 1]))
 
 
 def pairs(size: int) -> list[tuple[int, int]]:

@@ -104,7 +104,7 @@ class GainProblem:
         cost = np.zeros(len(p))
         cost[-1] = 1.0
         ends = [np.eye(n), self.condition * np.eye(n)]
-        inequalities = [Inequality(-ends[0], p), Inequality(ends[1], -p), _noise(p, y)]
+        inequalities = [Inequality(-ends[0], p), Inequality(ends[1], -p), noise_inequality(p, y)]
         moving = list(self.moving)
         for a in self.corners:
             moved = p @ a - y @ self.output_matrix @ a
@@ -125,8 +125,14 @@ class GainProblem:
         return GainAndLyapunov(np.asarray(gain, dtype=np.float64), lyapunov) if holds else None
 
 
-def _noise(p: Array, y: Array) -> Inequality:
-    """Return [[s·1, Yᵀ], [Y, P]] ⪰ 0, that is MᵀPM ⪯ s, with s the last unknown."""
+def noise_inequality(p: Array, y: Array) -> Inequality:
+    """Return [[s·1, Yᵀ], [Y, P]] ⪰ 0, that is MᵀPM ⪯ s, with s the last unknown.
+
+    Parameters
+    ----------
+    p, y
+        P and Y = P·M by unknown, shapes (unknowns, n, n) and (unknowns, n, r).
+    """
     count, n, r = y.shape
     factors = np.zeros((count, r + n, r + n))
     factors[:, r:, r:], factors[:, r:, :r], factors[:, :r, r:] = p, y, y.transpose(0, 2, 1)

@@ -1,0 +1,125 @@
+"""``observer certify-continuous`` and ``observer certify-adaptive``: proofs beside those of sampled gains."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .observer_certificate import CERTIFICATE, given_ranges, range_options, with_statement, write_proved
+from .output import DECK_HELP, measured_option, out_option, spring_option
+from .units import Number
+
+if TYPE_CHECKING:
+    from ..deck import Deck
+    from ..model import FlatModel
+    from ..observer import AdaptiveDesign
+    from ..observer.certificates import Proof
+
+deck_option = click.option("--deck", "deck_name", metavar="DECK", required=True, help=DECK_HELP)
+
+
+def _plant(deck_name: str) -> tuple[Deck, tuple[str, str], FlatModel]:
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..model import flatten
+
+    deck = load_deck(deck_name)
+    return deck, (deck.name, deck.path.read_text(encoding="utf-8-sig")), flatten(declare(deck))
+
+
+def _roles(plant: FlatModel, options: dict[str, Any]) -> dict[str, str]:
+    from ..model.roles import measured_motion, series_spring
+
+    return {
+        "estimate": series_spring(plant, options["spring"]).effort,
+        "measured": measured_motion(plant, options["measured"]),
+    }
+
+
+@click.command("certify-continuous")
+@deck_option
+@spring_option
+@measured_option
+@out_option("out/observer")
+@click.option("--published", is_flag=True, help="States of Austin et al. 2015 instead of the minimal ones.")
+@click.option("--decay", type=float, metavar="PER_SECOND", help="As fast as can be proved by default.")
+@click.option("--condition", type=float, default=100.0, show_default=True, help="Largest condition of P.")
+@click.option(
+    "--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="The whole contour by default."
+)
+def certify_continuous_gain(
+    deck_name: str, out: Path, published: bool, angles: tuple[float, float] | None, **options: Any
+) -> None:
+    """Design one gain in continuous time with the proof that every error vanishes."""
+    from ..observer import Minimal, PaperForm, certify_continuous, write_certificate
+
+    _, text, plant = _plant(deck_name)
+    proved = certify_continuous(
+        plant, **_roles(plant, options), form=PaperForm() if published else Minimal(),
+        decay=options["decay"], condition=options["condition"], angles=angles, deck=text,
+    )  # fmt: skip
+    path = write_certificate(proved, out / CERTIFICATE)
+    for sentence in proved.statement:
+        click.echo(sentence)
+    for name, row in zip(proved.system.states, proved.gain, strict=True):
+        click.echo(f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}")
+    click.echo(f"written: {path}")
+
+
+@click.command("certify-adaptive")
+@deck_option
+@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
+@spring_option
+@measured_option
+@out_option("out/observer")
+@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
+@click.option("--limit", type=float, metavar="DEVIATIONS", help="Of the slow states; that of the adaptive "
+              "observer by default.")  # fmt: skip
+@range_options
+def certify_adaptive_estimate(
+    deck_name: str, sample_time: float, out: Path, real: str, limit: float | None, **options: Any
+) -> None:
+    """Write the adaptive observer as C, with a bound on how far its estimate can leave the deck's torque."""
+    from ..export import export_c
+    from ..observer import AdaptiveSettings, Trust, certify_held_estimate, design_adaptive_observer
+    from ..observer.certificates.held_estimate import held_assumptions
+
+    _, text, plant = _plant(deck_name)
+    trust = Trust() if limit is None else Trust(limit=limit)
+    roles = _roles(plant, options)
+    design = design_adaptive_observer(
+        plant, estimate=roles["estimate"], measured=roles["measured"], sample_time=sample_time,
+        settings=AdaptiveSettings(trust=trust),
+    )  # fmt: skip
+    assumed = replace(held_assumptions(plant, design), real=real, **given_ranges(options))
+    proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
+    source = export_c(with_statement(design.model, proved), out, real=real, name="observer")
+    path = write_proved(proved, out, source)
+    for sentence in proved.statement:
+        click.echo(sentence)
+    click.echo(f"written: {path}, {source.header}, {source.source}, {source.selftest}")
+
+
+def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | None:
+    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other.
+
+    Parameters
+    ----------
+    proved
+        The certificate.
+    model
+        Flat model of its deck.
+    """
+    from ..observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
+
+    if model is None or not isinstance(proved, HeldEstimateCertificate):
+        return None
+    numbers = dict(proved.settings)
+    trust = Trust(most=int(numbers.pop("most")), **numbers)
+    return design_adaptive_observer(
+        model.with_values(dict(proved.parameters)), estimate=proved.estimate, measured=proved.measured,
+        sample_time=proved.sample_time, settings=AdaptiveSettings(trust=trust),
+    )  # fmt: skip
