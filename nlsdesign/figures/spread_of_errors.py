@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ..observer import SpreadErrors
 from ..quantity import typeset_unit
 from .number_text import significant
-from .style import DASHES, INK, MUTED, described, legend, look, panels, styled
+from .style import DASHES, INK, MUTED, described, legend, log_axis, look, panels, styled
 
 _CAUSES = 7
 
@@ -23,7 +23,7 @@ def errors_over_spread(errors: SpreadErrors) -> Figure:
     errors
         Of at least one observer.
     """
-    figure, (left, right) = panels(1, 2, height=3.6)
+    figure, (left, right) = panels(2, height=5.4)
     places = np.arange(len(errors.frequencies), dtype=float)
     count = len(errors.observers)
     words = []
@@ -47,7 +47,7 @@ def errors_over_spread(errors: SpreadErrors) -> Figure:
             label="bound on the rms",
         )  # fmt: skip
         words.append(f"Bound on the rms of any estimator {_range(bound)} m{typeset_unit(errors.unit)} rms.")
-    left.set_yscale("log")
+    log_axis(left)
     left.set_xticks(places, [f"{f:g} Hz" for f in errors.frequencies])
     left.set_xlim(-0.6, len(places) - 0.4)
     left.set_ylabel(f"torque error in m{typeset_unit(errors.unit)} rms")
@@ -69,6 +69,7 @@ def _draw_causes(axes: Axes, errors: SpreadErrors) -> None:
         )
     axes.set_yticks(places, [_short(cause) for cause, _ in ranked])
     axes.tick_params(axis="y", labelsize=8)
+    axes.margins(x=0.05)
     axes.set_xlim(left=0.0)
     axes.set_xlabel(f"m{typeset_unit(errors.unit)} rms for one standard deviation")
     axes.set_title(f"Largest causes, {errors.observers[0]}")

@@ -96,8 +96,8 @@ def _one_run(results: Results) -> FigureSection:
         f"Motor current at Kp {_SHOWN[0]:g} and {_SHOWN[1]:g} Hz",
         nls.figures.over_time(wanted.time[shown], lines, quantity="current", unit="A"),
         caption=f"One cycle. Largest: {peaks}.",
-        means="The harder gain sets off a limit cycle with the published spring; with the designed one not at "
-        "this frequency. At this gain neither loop holds at all three.",
+        means="The harder gain sets off a limit cycle with the published spring; with the designed one not "
+        "at this frequency. At this gain neither loop holds at all three.",
     )
 
 

@@ -106,7 +106,7 @@ def test_a_deck_without_spread_gets_the_cascade_and_the_reason(run: Run, tmp_pat
     [
         (("--kind", "adaptive", "--certificate"), "an observer of kind 'adaptive' cannot be certified"),
         (("--kind", "cascade", "--certificate", "--decay", "5"), "--decay belongs to --kind certified"),
-        (("--decay", "5"), "--decay and --with-spread belong to --certificate"),
+        (("--decay", "5"), "belong to --certificate"),
         (("--kind", "cascades"), "'cascades' is not one of"),
     ],
 )
