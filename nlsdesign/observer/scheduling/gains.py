@@ -264,7 +264,7 @@ class PolePlacement:
         Raises
         ------
         ValueRangeError
-            If there is not one stable pole per state, one is faster than half the sample rate, or they cannot be
+            If there is not one stable pole per state, one is beyond half the sample rate, or they cannot be
             placed.
         """
         n = len(plant.a)
