@@ -264,7 +264,8 @@ class PolePlacement:
         Raises
         ------
         ValueRangeError
-            If there is not one stable pole per state, or they cannot be placed.
+            If there is not one stable pole per state, one is beyond half the sample rate, or they cannot be
+            placed.
         """
         n = len(plant.a)
         poles: Spectrum = np.array(self.poles, dtype=np.complex128)
@@ -272,6 +273,14 @@ class PolePlacement:
             raise ValueRangeError(
                 f"poles {self.poles}",
                 f"needs {n} poles with negative real part, one per state: {', '.join(plant.names)}",
+            )
+        fastest = math.pi / plant.sample_time
+        if np.max(np.abs(poles)) > fastest:
+            raise ValueRangeError(
+                f"poles {self.poles}",
+                f"are faster than the sample rate carries, {fastest:.4g} 1/s at one sample every "
+                f"{plant.sample_time:g} s",
+                next_step=f"ask for poles within {fastest:.3g} 1/s, or sample faster",
             )
         scale = plant.sizes
         a = plant.a * scale[None, :] / scale[:, None]
