@@ -313,7 +313,7 @@ def _without_answer(error: Array, desired: Array) -> Array:
     if frequency is None or frequency * len(error) < _PERIODS:
         return error
     turns = 2.0 * math.pi * frequency * np.arange(len(error))
-    orders = np.arange(1, min(HARMONICS, int(0.45 / frequency)) + 1)
+    orders = np.arange(1, min(4 * HARMONICS, int(0.45 / frequency), len(error) // 8) + 1)
     waves = np.concatenate([np.cos(np.outer(orders, turns)), np.sin(np.outer(orders, turns))]).T
     rest: Array = error - waves @ np.linalg.lstsq(waves, error, rcond=None)[0]
     return rest
