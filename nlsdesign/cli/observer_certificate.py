@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..deck import Deck
     from ..export import CSource
     from ..model import FlatModel
-    from ..observer import Certificate, HeldEstimateCertificate
+    from ..observer import AdaptiveDesign, Certificate, HeldEstimateCertificate
     from ..observer.certificates import Proof
     from ..observer.certificates.verification import WritesCode
     from .observer_kinds import DesignedObserver
@@ -164,6 +164,28 @@ def written_anew(proved: Proof) -> WritesCode:
     return write
 
 
+def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | None:
+    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other.
+
+    Parameters
+    ----------
+    proved
+        The certificate.
+    model
+        Flat model of its deck.
+    """
+    from ..observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
+
+    if model is None or not isinstance(proved, HeldEstimateCertificate):
+        return None
+    numbers = dict(proved.settings)
+    trust = Trust(most=int(numbers.pop("most")), **numbers)
+    return design_adaptive_observer(
+        model.with_values(dict(proved.parameters)), estimate=proved.estimate, measured=proved.measured,
+        sample_time=proved.sample_time, settings=AdaptiveSettings(trust=trust),
+    )  # fmt: skip
+
+
 @click.command("verify")
 @click.argument("certificate", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--deck", "deck_name", metavar="DECK", help="Deck that should be the certified one.")
@@ -180,7 +202,6 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     from ..deck import load_deck, read_deck
     from ..model import flatten
     from ..observer import CodeToCompare, read_certificate, verify
-    from .observer_proofs import learning_design
 
     proved, untouched = read_certificate(certificate)
     given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None

@@ -15,8 +15,6 @@ from .units import Number
 if TYPE_CHECKING:
     from ..deck import Deck
     from ..model import FlatModel
-    from ..observer import AdaptiveDesign
-    from ..observer.certificates import Proof
 
 deck_option = click.option("--deck", "deck_name", metavar="DECK", required=True, help=DECK_HELP)
 
@@ -59,8 +57,9 @@ def certify_continuous_gain(
     _, text, plant = _plant(deck_name)
     proved = certify_continuous(
         plant, **_roles(plant, options), form=PaperForm() if published else Minimal(),
-        decay=options["decay"], condition=options["condition"], angles=angles, deck=text,
+        decay=options["decay"], condition=options["condition"], angles=angles,
     )  # fmt: skip
+    proved = replace(proved, deck=text)
     path = write_certificate(proved, out / CERTIFICATE)
     for sentence in proved.statement:
         click.echo(sentence)
@@ -101,25 +100,3 @@ def certify_adaptive_estimate(
     for sentence in proved.statement:
         click.echo(sentence)
     click.echo(f"written: {path}, {source.header}, {source.source}, {source.selftest}")
-
-
-def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | None:
-    """Return the adaptive observer of a certificate, designed again from its deck; ``None`` for any other.
-
-    Parameters
-    ----------
-    proved
-        The certificate.
-    model
-        Flat model of its deck.
-    """
-    from ..observer import AdaptiveSettings, HeldEstimateCertificate, Trust, design_adaptive_observer
-
-    if model is None or not isinstance(proved, HeldEstimateCertificate):
-        return None
-    numbers = dict(proved.settings)
-    trust = Trust(most=int(numbers.pop("most")), **numbers)
-    return design_adaptive_observer(
-        model.with_values(dict(proved.parameters)), estimate=proved.estimate, measured=proved.measured,
-        sample_time=proved.sample_time, settings=AdaptiveSettings(trust=trust),
-    )  # fmt: skip

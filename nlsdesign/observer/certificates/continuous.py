@@ -93,7 +93,6 @@ def certify_continuous(
     decay: float | None = None,
     condition: float = 100.0,
     angles: tuple[float, float] | None = None,
-    deck: tuple[str, str] = ("", ""),
 ) -> ContinuousCertificate:
     """Design one gain in continuous time together with the proof that every error vanishes.
 
@@ -111,8 +110,6 @@ def certify_continuous(
         Largest condition of P in states over their typical sizes.
     angles
         Range of the angle in rad; the whole contour of the cam by default.
-    deck
-        Name and text.
 
     Raises
     ------
@@ -136,10 +133,10 @@ def certify_continuous(
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     form = form or Minimal()
     system = error_system(model, form, estimate=estimate, measured=measured, angles=over)
-    found, reached = _designed(system, decay, condition)
+    solution, reached = _designed(system, decay, condition)
     return ContinuousCertificate(
-        deck=deck, parameters=model.values, estimate=estimate, measured=measured, form=form,
-        gain=tuple(tuple(row) for row in found.gain.tolist()), system=system, lyapunov=found.lyapunov,
+        deck=("", ""), parameters=model.values, estimate=estimate, measured=measured, form=form,
+        gain=tuple(tuple(row) for row in solution.gain.tolist()), system=system, lyapunov=solution.lyapunov,
         decay=reached, condition=condition,
     )  # fmt: skip
 
@@ -156,9 +153,9 @@ def _designed(system: ErrorSystem, decay: float | None, condition: float) -> tup
             trials = [decay]
         for each in trials:
             rate = float(f"{each:.6g}")
-            found = _solved(system, matrices, rate, condition, corrected)
-            if found is not None and decays(system, found, rate):
-                return found, rate
+            solution = _solved(system, matrices, rate, condition, corrected)
+            if solution is not None and decays(system, solution, rate):
+                return solution, rate
     highest = 100.0 * max(most, decay or 0.0)
     best = fastest(lambda d: _solved(system, matrices, d, condition, rows[1]), highest)
     raise ValueRangeError(
@@ -215,36 +212,36 @@ def _solved(
         return None
     gain = np.linalg.solve(lyapunov, np.tensordot(result, y, 1))
     gain = gain * size[:, None] / size[list(system.seen)][None, :]
-    found = GainAndLyapunov(_digits(gain, 7), _digits(lyapunov, 10))
-    return found if _falls(corners, output, found, size, system.seen, decay) else None
+    solution = GainAndLyapunov(_digits(gain, 7), _digits(lyapunov, 10))
+    return solution if _falls(corners, output, solution, size, system.seen, decay) else None
 
 
 def _falls(
-    corners: Array, output: Array, found: GainAndLyapunov, size: Array, seen: Sequence[int], decay: float
+    corners: Array, output: Array, solution: GainAndLyapunov, size: Array, seen: Sequence[int], decay: float
 ) -> bool:
     """Return whether V falls at every corner, in floating-point numbers."""
-    gain = found.gain / size[:, None] * size[list(seen)][None, :]
-    moved = found.lyapunov @ (corners - gain @ output)
-    falling = -(moved + moved.transpose(0, 2, 1)) - 2.0 * decay * found.lyapunov
+    gain = solution.gain / size[:, None] * size[list(seen)][None, :]
+    moved = solution.lyapunov @ (corners - gain @ output)
+    falling = -(moved + moved.transpose(0, 2, 1)) - 2.0 * decay * solution.lyapunov
     return bool(np.min(np.linalg.eigvalsh(falling)) > 0.0)
 
 
-def decays(system: ErrorSystem, found: GainAndLyapunov, decay: float) -> bool:
+def decays(system: ErrorSystem, solution: GainAndLyapunov, decay: float) -> bool:
     """Return whether √(eᵀPe) falls with e^(−decay·t) at every corner, decided in fractions.
 
     Parameters
     ----------
     system
         All matrices A.
-    found
+    solution
         L in SI, shape (n, r), and P in scaled states, shape (n, n).
     decay
         In 1/s.
     """
-    p, rate = exact(found.lyapunov), Fraction(decay)
+    p, rate = exact(solution.lyapunov), Fraction(decay)
     if not is_positive_definite(p):
         return False
-    for a in system.exact_corners(tuple(tuple(row) for row in found.gain.tolist())):
+    for a in system.exact_corners(tuple(tuple(row) for row in solution.gain.tolist())):
         moved = times(p, a)
         rise = combined(moved, transposed(moved), first=Fraction(1), second=Fraction(1))
         if not is_positive_definite(combined(rise, p, first=Fraction(-1), second=-2 * rate)):

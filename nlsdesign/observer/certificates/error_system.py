@@ -139,25 +139,23 @@ def error_system(
     still, whole = (np.zeros(1), np.zeros(1)), (np.array([angles[0]]), np.array([angles[1]]))
 
     def by_angle(cells: Bounds) -> tuple[Array, Array, NDArray[np.bool_]]:
-        found = enclose(entries, [[cells], [still]])
-        return found.outputs[0].lower, found.outputs[0].upper, found.undecided
+        bounds = enclose(entries, [[cells], [still]])
+        return bounds.outputs[0].lower, bounds.outputs[0].upper, bounds.undecided
 
     def by_speed(cells: Bounds) -> tuple[Array, Array, NDArray[np.bool_]]:
-        found = enclose(friction, [[whole], [cells]])
-        return found.outputs[0].lower, found.outputs[0].upper, np.zeros(len(cells[0]), dtype=bool)
+        bounds = enclose(friction, [[whole], [cells]])
+        return bounds.outputs[0].lower, bounds.outputs[0].upper, np.zeros(len(cells[0]), dtype=bool)
 
-    edges = np.concatenate([[0.0], np.geomspace(1e-6, SPEED_LIMIT, 2000)])
     low, high = hull(by_angle, np.linspace(*angles, CELLS + 1))
-    least, greatest = hull(by_speed, np.concatenate([-edges[:0:-1], edges]))
+    least, greatest = hull(by_speed, _speeds())
     low, high = low.reshape(n, n), high.reshape(n, n)
     low[fast, fast], high[fast, fast] = least[0], greatest[0]
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
         i, j = np.argwhere(~np.isfinite(low + high))[0]
         raise ConvergenceError(
-            "certificate in continuous time",
-            f"the slope of the rate of '{plant.names[i]}' by '{plant.names[j]}' has no bound",
+            "certificate in continuous time", f"the slope of the rate of '{plant.names[i]}' by '{plant.names[j]}' has no bound",
             next_step="narrow the angles, or give dry friction a creep speed",
-        )
+        )  # fmt: skip
     low, high = _rounded(low, high)
     return ErrorSystem(
         states=plant.names, sizes=scaling(plant), moving=plant.moving,
@@ -165,6 +163,11 @@ def error_system(
         angles=(float(angles[0]), float(angles[1])),
         lower=tuple(map(tuple, low.tolist())), upper=tuple(map(tuple, high.tolist())),
     )  # fmt: skip
+
+
+def _speeds() -> Array:
+    edges = np.concatenate([[0.0], np.geomspace(1e-6, SPEED_LIMIT, 2000)])
+    return np.concatenate([-edges[:0:-1], edges])
 
 
 def _slopes(
@@ -237,11 +240,11 @@ def hull(
     return low, high
 
 
-def _decided(found: tuple[Array, Array, NDArray[np.bool_]]) -> tuple[Array, Array]:
-    kept = ~found[2]
+def _decided(bounds: tuple[Array, Array, NDArray[np.bool_]]) -> tuple[Array, Array]:
+    kept = ~bounds[2]
     return (
-        np.min(found[0][kept], axis=0, initial=np.inf),
-        np.max(found[1][kept], axis=0, initial=-np.inf),
+        np.min(bounds[0][kept], axis=0, initial=np.inf),
+        np.max(bounds[1][kept], axis=0, initial=-np.inf),
     )
 
 

@@ -235,16 +235,16 @@ class _Table:
             low, high = self._reached(k, ends, limit)
             return ends if low >= ends[0] and high <= ends[1] else None
 
-        size, found = 1.0 + 1e-6, None
-        while found is None and size <= LARGEST:
-            size, found = 1.5 * size, tried(size)
+        size, stays_in = 1.0 + 1e-6, None
+        while stays_in is None and size <= LARGEST:
+            size, stays_in = 1.5 * size, tried(size)
         least, most = size / 2.25, size / 1.5
-        for _ in range(NARROWINGS if found is not None else 0):
+        for _ in range(NARROWINGS if stays_in is not None else 0):
             between = (least + most) / 2.0
             narrower = tried(between)
             least, most = (between, most) if narrower is None else (least, between)
-            found = narrower or found
-        return found
+            stays_in = narrower or stays_in
+        return stays_in
 
     def _reached(self, k: int, box: tuple[float, float], limit: float) -> tuple[float, float]:
         """Return the range of the next state from a box, over all angles and slow states."""

@@ -162,9 +162,9 @@ def _contraction(certificate: Certificate) -> list[Check]:
 
 def _decay(certificate: ContinuousCertificate, model: FlatModel | None) -> list[Check]:
     p, system = certificate.lyapunov, certificate.system
-    found = GainAndLyapunov(np.array(certificate.gain), p)
+    solution = GainAndLyapunov(np.array(certificate.gain), p)
     holds = bool(np.all(np.isfinite(p)) and certificate.decay > 0.0)
-    holds = holds and decays(system, found, certificate.decay)
+    holds = holds and decays(system, solution, certificate.decay)
     condition = holds and within_condition(p, certificate.condition)
     checks = [
         Check("decay", holds, f"{certificate.decay:g} 1/s at every corner, in fractions"),
