@@ -146,14 +146,13 @@ def error_system(
         bounds = enclose(friction, [[whole], [cells]])
         return bounds.outputs[0].lower, bounds.outputs[0].upper, np.zeros(len(cells[0]), dtype=bool)
 
-    low, high = hull(by_angle, np.linspace(*angles, CELLS + 1))
-    least, greatest = hull(by_speed, _speeds())
-    low, high = low.reshape(n, n), high.reshape(n, n)
-    low[fast, fast], high[fast, fast] = least[0], greatest[0]
+    low, high = (v.reshape(n, n) for v in hull(by_angle, np.linspace(*angles, CELLS + 1)))
+    (low[fast, fast],), (high[fast, fast],) = hull(by_speed, _speeds())
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
         i, j = np.argwhere(~np.isfinite(low + high))[0]
         raise ConvergenceError(
-            "certificate in continuous time", f"the slope of the rate of '{plant.names[i]}' by '{plant.names[j]}' has no bound",
+            "certificate in continuous time",
+            f"the slope of the rate of '{plant.names[i]}' by '{plant.names[j]}' has no bound",
             next_step="narrow the angles, or give dry friction a creep speed",
         )  # fmt: skip
     low, high = _rounded(low, high)
