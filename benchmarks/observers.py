@@ -26,10 +26,10 @@ from nlsdesign.export import natively
 from nlsdesign.observer import (
     CascadeGain,
     CertifiedGain,
-    Trial,
-    bench_trial,
+    ObserverBench,
     certify,
     design_observer_with_details,
+    observer_bench,
     observer_errors,
     verify,
 )
@@ -122,7 +122,7 @@ def co_designs(deck: str, model: nls.FlatModel) -> None:
     print(f"  its last program ({size}) {times}: {outcome}", flush=True)
 
 
-def stepwise(trial: Trial, observer: nls.FlatModel) -> tuple[float, int]:
+def stepwise(trial: ObserverBench, observer: nls.FlatModel) -> tuple[float, int]:
     """Run the bench sample by sample with ``solve_ivp``; return seconds for a sample and all samples."""
     system = trial.system({"observer": observer})
     plant, parts = system.plant, {"observer": observer, "servo": trial.servo}
@@ -153,7 +153,7 @@ def stepwise(trial: Trial, observer: nls.FlatModel) -> tuple[float, int]:
 
 def errors(deck: str, model: nls.FlatModel) -> None:
     """Print the time of the errors over draws, and that of the peer."""
-    trial, observer = bench_trial(model), nls.design_observer(model, gain=CascadeGain())
+    trial, observer = observer_bench(model), nls.design_observer(model, gain=CascadeGain())
     found, ours = timed(
         lambda: observer_errors({"cascade": observer}, trial, draws=DRAWS, bounded=0, translate=natively)
     )

@@ -108,10 +108,10 @@ def _while_running(actuator: Assembly) -> dict[str, Callable[[Prior], float]]:
     """Return the least error of the torque that any observer could have, where there is one to observe."""
     from ..errors import ArrangementError, ValueRangeError
     from ..model import flatten
-    from ..observer import bench_trial, least_torque_error
+    from ..observer import least_torque_error, observer_bench
 
     try:
-        least = least_torque_error(bench_trial(flatten(actuator)))
+        least = least_torque_error(observer_bench(flatten(actuator)))
     except (ArrangementError, ValueRangeError):
         # A drive without a spring, or without an encoder: the plan then speaks of the resting spring alone.
         return {}

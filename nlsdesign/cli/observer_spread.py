@@ -51,7 +51,7 @@ def spread_errors(
         If no number of the deck has a spread.
     """
     from ..model.roles import measured_motion, series_spring
-    from ..observer import bench_trial, observer_errors
+    from ..observer import observer_bench, observer_errors
     from ..observer.adaptive.adaptive_observer import encoder_quantum
     from .analyse_loop import compiled
 
@@ -68,7 +68,7 @@ def spread_errors(
                 plant, kind=kind, sample_time=sample_time, spring=spring, measured=measured
             )
             observers[kind] = other.design.model
-    bench = bench_trial(plant, estimate=torque, measured=measured, sample_time=sample_time)
+    bench = observer_bench(plant, estimate=torque, measured=measured, sample_time=sample_time)
     try:
         encoder_quantum(plant, measured)
         bounded = 2

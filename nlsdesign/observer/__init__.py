@@ -38,9 +38,9 @@ from .scheduling.gains import (
 from .scheduling.run import observe
 from .scheduling.scheduled import ObserverDesign, design_observer_with_details
 from .scheduling.table import FixedGrid, Grid, GridByTolerance
-from .spread.bench_trial import Trial, bench_trial
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer
 from .spread.least_error import least_torque_error
+from .spread.observer_bench import ObserverBench, observer_bench
 from .spread.spread_errors import SpreadErrors, observer_errors
 
 __all__ = [
@@ -63,6 +63,7 @@ __all__ = [
     "GridByTolerance",
     "HeldEstimateCertificate",
     "Minimal",
+    "ObserverBench",
     "ObserverDesign",
     "ObserverOfChoice",
     "PaperForm",
@@ -72,11 +73,9 @@ __all__ = [
     "StateForm",
     "SteadyStateKalman",
     "TorqueErrorBound",
-    "Trial",
     "Trust",
     "UncertainDirections",
     "Verification",
-    "bench_trial",
     "certified_design",
     "certify",
     "certify_continuous",
@@ -91,6 +90,7 @@ __all__ = [
     "estimator_bound",
     "least_torque_error",
     "observe",
+    "observer_bench",
     "observer_errors",
     "read_certificate",
     "torque_bound",

@@ -84,8 +84,8 @@ def felt_torque(*, fast: bool = False) -> FeltTorque:
     late = {s: Bench(s, LATE_GAINS[s], late=LATE).felt(NARROW, frequencies) for s in DECKS}
     added = {}
     for cause in ADDED:
-        found = Bench(NONLINEAR, LATE_GAINS[NONLINEAR], cause=cause).felt(NARROW, np.array([11.0]))
-        added[cause.name] = (float(found.rms[0]), str(found.verdicts[0]))
+        seen = Bench(NONLINEAR, LATE_GAINS[NONLINEAR], cause=cause).felt(NARROW, np.array([11.0]))
+        added[cause.name] = (float(seen.rms[0]), str(seen.verdicts[0]))
     return FeltTorque(points, prompt, late, added)
 
 

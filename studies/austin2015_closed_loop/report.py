@@ -61,8 +61,8 @@ def write_page(
     for statement in statements:
         sections += [
             Chapter(statement.stated, f"{statement.outcome.capitalize()}. {statement.why}"),
-            TableSection("Loops that were run", ("loop", "found"),
-                         tuple((t.loop, t.found) for t in statement.trials)),
+            TableSection("Loops that were run", ("loop", "outcome"),
+                         tuple((t.loop, t.outcome) for t in statement.trials)),
         ]  # fmt: skip
     sections.append(_points(followed))
     write_report(out / "report.html", *sections, title="Torque loop of the published actuator")

@@ -13,19 +13,19 @@ OTHERWISE = "explained otherwise"
 
 
 @dataclass(frozen=True)
-class Trial:
+class LoopRun:
     """One loop that was run for a statement.
 
     Parameters
     ----------
     loop
         Which, and what was changed.
-    found
+    outcome
         What it did, with the verdict where it did not settle.
     """
 
     loop: str
-    found: str
+    outcome: str
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Statement:
     stated: str
     outcome: str
     why: str
-    trials: tuple[Trial, ...]
+    trials: tuple[LoopRun, ...]
 
 
 def settles(response: SineResponse) -> bool:

@@ -14,7 +14,7 @@ from . import causes
 from .benches import AS_IT_IS, DECKS, HIGH, LOW, NONLINEAR, SOFT, STIFF, Bench, Cause, angle_of
 from .felt_torque import FeltTorque, held_motor
 from .followed_torque import GENTLE, FollowedTorque
-from .statement import NOT_REPRODUCED, OTHERWISE, REPRODUCED, Statement, Trial, in_words, lost_at, settles
+from .statement import NOT_REPRODUCED, OTHERWISE, REPRODUCED, LoopRun, Statement, in_words, lost_at, settles
 
 OVERSHOOT = np.array([2.0, 3.0, 4.0, 5.0])  # Hz
 STRONG = TorqueGains(proportional=32.0, integral=800.0)
@@ -27,9 +27,9 @@ LATE = 6  # ms
 def overshoot(*, fast: bool = False) -> tuple[Statement, dict[str, float]]:
     """Decide what makes the overshoot at 3 to 5 Hz: the dead zone or the integral."""
     tried = (AS_IT_IS, causes.secant_spring(LOW), *(causes.SWITCHED_OFF[:1] if fast else causes.SWITCHED_OFF))
-    found = {c.name: Bench(NONLINEAR, STRONG, cause=c).response(LOW, OVERSHOOT) for c in tried}
-    found["soft linear spring"] = Bench(SOFT, STRONG).response(LOW, OVERSHOOT)
-    peak = {name: float(np.max(each.decibel)) for name, each in found.items()}
+    seen = {c.name: Bench(NONLINEAR, STRONG, cause=c).response(LOW, OVERSHOOT) for c in tried}
+    seen["soft linear spring"] = Bench(SOFT, STRONG).response(LOW, OVERSHOOT)
+    peak = {name: float(np.max(each.decibel)) for name, each in seen.items()}
     own, secant = peak[AS_IT_IS.name], peak[causes.secant_spring(LOW).name]
     none = peak[causes.NO_INTEGRAL.name]
     by_integral = own > 0.5 and none < 0.0 and secant >= own
@@ -40,7 +40,7 @@ def overshoot(*, fast: bool = False) -> tuple[Statement, dict[str, float]]:
         f"zone and of the same secant overshoots more ({secant:.2f} dB), and so does the soft one "
         f"({peak['soft linear spring']:.2f} dB). Without the integral the largest is {none:.2f} dB, so the "
         "integral makes it; the published soft spring, which does not overshoot, then had another one.",
-        _trials(found),
+        _trials(seen),
     )
     numbers = {
         "overshoot_dB": own,
@@ -56,14 +56,14 @@ def instability(*, fast: bool = False) -> tuple[Statement, dict[str, float]]:
     off: tuple[Cause, ...] = (
         causes.secant_spring(HIGH), causes.tangent_spring(HIGH), *(() if fast else causes.SWITCHED_OFF),
     )  # fmt: skip
-    found = {"Kp 40, Ki 800": Bench(NONLINEAR, HARD).response(HIGH, STABILITY)}
+    seen = {"Kp 40, Ki 800": Bench(NONLINEAR, HARD).response(HIGH, STABILITY)}
     for cause in (AS_IT_IS, *off, *((causes.NO_DELAY,) if fast else ())):
         response = Bench(NONLINEAR, HARDER, cause=cause).response(HIGH, STABILITY)
-        found[f"Kp 70, Ki 100, {cause.name}"] = response
-    beyond = lost_at(found["Kp 40, Ki 800"])
+        seen[f"Kp 70, Ki 100, {cause.name}"] = response
+    beyond = lost_at(seen["Kp 40, Ki 800"])
     shown = bool(beyond) and min(beyond) > 2.0
-    cured = [n.removeprefix("Kp 70, Ki 100, ") for n, r in found.items() if settles(r)]
-    stiff = found[f"Kp 70, Ki 100, {causes.tangent_spring(HIGH).name}"]
+    cured = [n.removeprefix("Kp 70, Ki 100, ") for n, r in seen.items() if settles(r)]
+    stiff = seen[f"Kp 70, Ki 100, {causes.tangent_spring(HIGH).name}"]
     statement = Statement(
         "Paper: at 2.8 N·m the nonlinear spring is unstable beyond 2 Hz",
         REPRODUCED if shown else NOT_REPRODUCED,
@@ -75,7 +75,7 @@ def instability(*, fast: bool = False) -> tuple[Statement, dict[str, float]]:
             "stiffness, and the delay."
             if not settles(stiff) else "A linear spring as stiff as the cam is at most settles."
         ),
-        _trials(found),
+        _trials(seen),
     )  # fmt: skip
     return statement, {
         "first_unstable_frequency_Hz": min(beyond, default=math.inf),
@@ -129,7 +129,7 @@ def like_a_linear_spring(followed: FollowedTorque) -> tuple[tuple[Statement, ...
                 f"{far[other]:.1f}° to the {other} one (Kp 32, Ki 100). Its secant stiffness at "
                 f"{torque:g} N·m is {secant:.2f} N·m/rad, that of the {like} spring "
                 f"{1.7 if like == SOFT else 3.4:g}.",
-                tuple(Trial(f"{GENTLE.name}, {s}", in_words(followed[GENTLE.name, amplitude, s].response))
+                tuple(LoopRun(f"{GENTLE.name}, {s}", in_words(followed[GENTLE.name, amplitude, s].response))
                       for s in DECKS),
             )
         )  # fmt: skip
@@ -151,7 +151,7 @@ def impedance(felt: FeltTorque) -> tuple[tuple[Statement, ...], dict[str, float]
         f"below both wherever it settles; it limit-cycles at {_lost(felt)}. "
         "To 2 Hz that is the gain: there the torque is θω/(√2·Kp) whatever "
         "the spring; the dead zone does the rest.",
-        tuple(Trial(f"{s}, ±20°", f"{1e3 * felt.prompt[s].rms[0]:.1f} mN·m at 0.5 Hz") for s in DECKS),
+        tuple(LoopRun(f"{s}, ±20°", f"{1e3 * felt.prompt[s].rms[0]:.1f} mN·m at 0.5 Hz") for s in DECKS),
     )
     rise = Statement(
         f"Paper: the torque of the nonlinear spring rises to {last:.2f} N·m rms at 11 Hz",
@@ -163,7 +163,9 @@ def impedance(felt: FeltTorque) -> tuple[tuple[Statement, ...], dict[str, float]
         f"{100 * felt.deviation(SOFT, late=True, up_to=9.1):.0f} %, stiff within "
         f"{100 * felt.deviation(STIFF, late=True, up_to=9.1):.0f} %, Kp 32, Ki 50, ±10°).",
         tuple(
-            Trial(f"Kp 70, ±10°, {name}", f"{1e3 * rms:.0f} mN·m at 11 Hz" if math.isfinite(rms) else verdict)
+            LoopRun(
+                f"Kp 70, ±10°, {name}", f"{1e3 * rms:.0f} mN·m at 11 Hz" if math.isfinite(rms) else verdict
+            )
             for name, (rms, verdict) in felt.added.items()
         ),
     )
@@ -185,15 +187,15 @@ def margins() -> tuple[Statement, dict[str, float]]:
     small = TorqueGains(proportional=1.0, integral=100.0 / 70.0)
     loop = Bench(NONLINEAR, small).loop()
     degrees = np.array([15.0, 25.0, 35.0, 45.0])
-    found = loop_margins(loop, np.radians(degrees), opening=loop.desired)
-    margin = found.gain - 20.0 * math.log10(70.0)
+    seen = loop_margins(loop, np.radians(degrees), opening=loop.desired)
+    margin = seen.gain - 20.0 * math.log10(70.0)
     statement = Statement(
         "Design notes: at Kp 70 the gain margin falls from +4.9 to −5.2 dB over the angle",
         REPRODUCED if margin[0] > 4.0 and margin[-1] < -4.0 else NOT_REPRODUCED,
         f"{margin[0]:+.1f} dB at 15°, {margin[-1]:+.1f} dB at 45°, zero near 25°: cut at the desired torque, "
         "sliding. Beyond that angle the loop is unstable, so its margin is read from the loop with Kp 1, "
         "which is stable everywhere, less 36.9 dB. At 0° there is no stiffness and no limit to the gain.",
-        tuple(Trial(f"{d:g}°", f"{m:+.1f} dB") for d, m in zip(degrees, margin, strict=True)),
+        tuple(LoopRun(f"{d:g}°", f"{m:+.1f} dB") for d, m in zip(degrees, margin, strict=True)),
     )
     return statement, {"margin_at_15_deg_dB": float(margin[0]), "margin_at_45_deg_dB": float(margin[-1])}
 
@@ -204,19 +206,19 @@ def torque_curve(error: float) -> Statement:
         "Paper, Fig. 8: torque curve of the nonlinear spring",
         REPRODUCED if error < 0.10 else NOT_REPRODUCED,
         f"{error:.3f} N·m rms from the points, the authors' own model 0.10. The deck rests on these points.",
-        (Trial("figure-consistent deck at rest", f"{error:.3f} N·m rms"),),
+        (LoopRun("figure-consistent deck at rest", f"{error:.3f} N·m rms"),),
     )
 
 
 def static_torque(spring: str, angles: np.ndarray) -> np.ndarray:
     """Return the torque in N·m at rest of one spring."""
     model = nls.flatten(Bench(spring).actuator, outputs=["spring.torque"])
-    found = []
+    seen = []
     for angle in angles:
         rest = rest_state(model, {"motor.angle": float(angle), "motor.speed": 0.0})
-        found.append(model.evaluate(list(rest))["spring.torque"])
-    return np.array(found)
+        seen.append(model.evaluate(list(rest))["spring.torque"])
+    return np.array(seen)
 
 
-def _trials(found: dict[str, SineResponse]) -> tuple[Trial, ...]:
-    return tuple(Trial(name, in_words(each)) for name, each in found.items())
+def _trials(seen: dict[str, SineResponse]) -> tuple[LoopRun, ...]:
+    return tuple(LoopRun(name, in_words(each)) for name, each in seen.items())

@@ -23,9 +23,9 @@ from nlsdesign.model import flatten
 from nlsdesign.observer import (
     CascadeGain,
     Duty,
-    bench_trial,
     design_observer,
     least_torque_error,
+    observer_bench,
     observer_errors,
 )
 from nlsdesign.simulation import Prior, declared_prior
@@ -39,7 +39,7 @@ SHORT = Duty(frequencies=(2.0,))
 @pytest.fixture(scope="module")
 def plan() -> CalibrationPlan:
     actuator = deck(LINEAR)
-    least = least_torque_error(bench_trial(flatten(actuator), duty=SHORT))
+    least = least_torque_error(observer_bench(flatten(actuator), duty=SHORT))
     return what_calibration_buys(actuator, [HungWeightTest(), FreeRunTest()], errors={RUNNING: least})
 
 
@@ -51,7 +51,7 @@ def test_now_is_the_bound_of_observer_errors(plan: CalibrationPlan) -> None:
     """One is taken along the machine as declared, the other along drawn machines, with other numbers in the
     slopes: on a linear spring they differ by no more than these numbers do, 10 % each."""
     model = flatten(deck(LINEAR))
-    trial = bench_trial(model, duty=SHORT)
+    trial = observer_bench(model, duty=SHORT)
     observers = {"cascade": design_observer(model, gain=CascadeGain())}
     drawn = observer_errors(observers, trial, draws=4, bounded=4).bound
     assert plan.now.errors[RUNNING] == pytest.approx(float(np.sqrt(np.mean(drawn**2))), rel=0.15)
@@ -83,7 +83,7 @@ def test_a_hung_weight_improves_it_and_a_free_run_alone_does_not(plan: Calibrati
 def test_the_common_scale_alone_is_seen_by_no_encoder() -> None:
     """All that is known but one common factor s of every torque: the least error is s times the torque."""
     model = flatten(deck(LINEAR))
-    trial = bench_trial(model, duty=SHORT)
+    trial = observer_bench(model, duty=SHORT)
     known = declared_prior(model)
     efforts = ("motor.torque_constant", "motor.inertia", "spring.stiffness", "bearing.damping",
                "dry_friction.sliding_effort")  # fmt: skip
@@ -98,7 +98,7 @@ def test_other_names_give_the_same() -> None:
     plain, other = flatten(deck(LINEAR)), flatten(renamed(deck(LINEAR), SCHEMES[0]).assembly)
     assert {v.name for v in plain.parameters}.isdisjoint(v.name for v in other.parameters)
     first, second = (
-        least_torque_error(bench_trial(m, duty=SHORT))(declared_prior(m)) for m in (plain, other)
+        least_torque_error(observer_bench(m, duty=SHORT))(declared_prior(m)) for m in (plain, other)
     )
     assert first == pytest.approx(second, rel=1e-6)
 

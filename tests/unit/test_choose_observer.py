@@ -20,11 +20,11 @@ from nlsdesign.observer import (
     PaperForm,
     SpreadErrors,
     Trust,
-    bench_trial,
     choose_observer,
     design_adaptive_observer,
     design_observer,
     design_observer_with_details,
+    observer_bench,
     observer_errors,
 )
 from nlsdesign.simulation.prior import declared_prior
@@ -47,7 +47,7 @@ def adaptive(linear: FlatModel) -> AdaptiveDesign:
 def errors(linear: FlatModel, adaptive: AdaptiveDesign) -> SpreadErrors:
     cascade = design_observer_with_details(linear)
     return observer_errors(
-        {"adaptive": adaptive.model, "cascade": cascade.model}, bench_trial(linear, duty=DUTY), draws=12,
+        {"adaptive": adaptive.model, "cascade": cascade.model}, observer_bench(linear, duty=DUTY), draws=12,
         bounded=2, translate=natively,
     )  # fmt: skip
 
@@ -136,7 +136,7 @@ def test_the_figures_of_the_published_actuator() -> None:
     sure[places, places] = np.log(1.01) ** 2
     calibrated = replace(known, covariance=sure)
     duty = Duty(torque=2.8)
-    trial = bench_trial(model, duty=duty)
+    trial = observer_bench(model, duty=duty)
     published = design_observer_with_details(model, form=PaperForm()).model
     for prior, rest in ((calibrated, True), (known, False)):
         design = design_adaptive_observer(model, settings=AdaptiveSettings(prior=prior, duty=duty))

@@ -44,7 +44,7 @@ class Trust:
     correlation_time: float = 0.02
     drift_time: float = 60.0
     counts: float = 1.0
-    limit: float = 4.0
+    limit: float = 2.5
     surprise: float = 3.0
     smallest: float = 0.0004
     most: int = 12

@@ -153,8 +153,7 @@ def error_system(
         raise ConvergenceError(
             "certificate in continuous time",
             f"the slope of the rate of '{plant.names[i]}' by '{plant.names[j]}' has no bound",
-            next_step="narrow the angles, or give dry friction a creep speed",
-        )  # fmt: skip
+            next_step="narrow the angles, or give dry friction a creep speed")  # fmt: skip
     low, high = _rounded(low, high)
     return ErrorSystem(
         states=plant.names, sizes=scaling(plant), moving=plant.moving,

@@ -19,7 +19,7 @@ from ..scheduling.forms import StateForm
 from ..scheduling.gains import FittedGain, GainRule
 from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details
 from ..scheduling.table import Grid
-from .bench_trial import bench_trial
+from .observer_bench import observer_bench
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def choose_observer(
 def _expected(model: FlatModel, design: AdaptiveDesign, settings: AdaptiveSettings) -> float:
     """Return the deviation that the filter expects along the bench with the numbers of the deck."""
     plant = design.step.nominal.plant
-    bench = bench_trial(
+    bench = observer_bench(
         model, duty=settings.duty, estimate=plant.estimate.name, measured=plant.angle,
         sample_time=design.step.nominal.sample_time,
     )  # fmt: skip

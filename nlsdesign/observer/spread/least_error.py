@@ -12,10 +12,10 @@ from ...simulation.prior import Prior
 from ...simulation.sampled_batch import PLANT, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
-from .bench_trial import Trial
+from .observer_bench import ObserverBench
 
 
-def least_torque_error(bench: Trial, *, translate: Translate = as_it_is) -> Callable[[Prior], float]:
+def least_torque_error(bench: ObserverBench, *, translate: Translate = as_it_is) -> Callable[[Prior], float]:
     """Return a function from a prior to the Cramér–Rao bound along the bench, N·m rms.
 
     The machine runs once, with the numbers of the deck; a calibration is worth what it takes off this bound.

@@ -18,7 +18,7 @@ from ...simulation.prior import Prior, declared_prior
 from ...simulation.sampled_batch import PLANT, BatchTrace, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
-from .bench_trial import Trial
+from .observer_bench import ObserverBench
 
 Array = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ class SpreadErrors:
 
 def observer_errors(
     observers: Mapping[str, FlatModel],
-    bench: Trial,
+    bench: ObserverBench,
     *,
     prior: Prior | None = None,
     draws: int = 64,
@@ -204,7 +204,7 @@ def observer_errors(
     )  # fmt: skip
 
 
-def relevant(prior: Prior, bench: Trial) -> Prior:
+def relevant(prior: Prior, bench: ObserverBench) -> Prior:
     """Return what is known of the numbers that the bench notices at all.
 
     Parameters
@@ -241,7 +241,7 @@ def _shifts(prior: Prior) -> list[tuple[str, Array]]:
     return shifts
 
 
-def _quantum_name(bench: Trial) -> str | None:
+def _quantum_name(bench: ObserverBench) -> str | None:
     try:
         encoder_quantum(bench.model, bench.measured)
     except ArrangementError:
@@ -251,7 +251,7 @@ def _quantum_name(bench: Trial) -> str | None:
     return next(f"{s}.quantum" for s in reading.sensors if f"{s}.quantum" in bench.model.values)
 
 
-def _errors(batch: BatchTrace, torque: str, estimates: Mapping[str, str], bench: Trial) -> Array:
+def _errors(batch: BatchTrace, torque: str, estimates: Mapping[str, str], bench: ObserverBench) -> Array:
     """Return root mean square errors, shape (observers, runs, frequencies)."""
     result = []
     for name in estimates.values():
@@ -276,7 +276,9 @@ def _causes(errors: Array, shifts: list[tuple[str, Array]], counted: bool) -> di
     return {name: np.sqrt(square) for name, square in squares.items()}
 
 
-def _bound(bench: Trial, known: Prior, rows: Mapping[str, Array], driven: Array, chosen: list[int]) -> Array:
+def _bound(
+    bench: ObserverBench, known: Prior, rows: Mapping[str, Array], driven: Array, chosen: list[int]
+) -> Array:
     sensed = SensedTorque(
         bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured),
         float(bench.servo.sample_time or 1e-3),

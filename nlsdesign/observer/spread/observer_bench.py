@@ -33,7 +33,7 @@ LEARNING, EVALUATED, RAMP = 1.5, 1.0, 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ObserverBench:
     """One run for all observers.
 
     Parameters
@@ -93,14 +93,14 @@ class Trial:
         )
 
 
-def bench_trial(
+def observer_bench(
     model: FlatModel,
     *,
     duty: Duty | None = None,
     estimate: str | None = None,
     measured: str | None = None,
     sample_time: float = 1e-3,
-) -> Trial:
+) -> ObserverBench:
     """Return the bench for a machine.
 
     Parameters
@@ -148,7 +148,7 @@ def bench_trial(
     )
     servo = _servo(form.model.inputs[place], model.variable(measured), slope, sample_time)
     courses = {"angle": angle, "rate": rate, "acceleration": acceleration}
-    return Trial(
+    return ObserverBench(
         model, estimate, measured, reading, servo,
         {f"{SERVO}.{measured}.wanted.{name}": values for name, values in courses.items()},
         float(time[-1]), stretches, points.torque,
