@@ -46,7 +46,10 @@ for analysis in (analyse_angle, loop):  # the first is the default
 def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
     try:
-        program(standalone_mode=False)
+        # Without its standalone mode click returns the exit status of a command instead of ending the run.
+        status = program(standalone_mode=False)
+        if isinstance(status, int) and status:
+            sys.exit(status)
     except click.exceptions.Exit as exit_:
         sys.exit(exit_.exit_code)
     except click.ClickException as error:

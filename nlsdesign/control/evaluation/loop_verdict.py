@@ -50,6 +50,9 @@ _FAST = 3.0
 _RISES = 1.1
 """Odd harmonic over the one before from which on it stands out."""
 _STEP = math.log(1.3)
+_LOCKED = 0.1
+"""Share of the torque above which an odd harmonic that stands out is an oscillation in step with the drive;
+what stands out less is made by the current limit."""
 _PERIODS = 4
 """Periods of a sine from which on its harmonics are told from an oscillation near one of them."""
 _SWINGS = 6
@@ -206,12 +209,18 @@ class LoopJudge:
         torque = signals[self.loop.torque]
         if not np.all(np.isfinite(torque)):
             return self._verdict(signals, torque, steady)
-        verdict = self._verdict(signals, without_harmonics(torque, cycles), steady)
+        rest = without_harmonics(torque, cycles)
+        verdict = self._verdict(signals, rest, steady)
+        if cycles == 0 and verdict.state == SETTLED and np.sqrt(np.mean(rest**2)) > verdict.threshold:
+            # Nothing drives a held torque: what moves it, however unevenly, is the loop itself.
+            strongest = int(np.argmax(np.abs(np.fft.rfft(rest * np.hanning(len(rest))))[1:])) + 1
+            frequency = strongest / (len(rest) * self.loop.sample_time)
+            return replace(verdict, state=LIMIT_CYCLE, frequency=frequency)
         driven = cycles / (len(torque) * self.loop.sample_time)
         if verdict.state == LIMIT_CYCLE or driven < _FAST:
             return verdict
         amplitude, order = locked(torque, cycles)
-        if not amplitude > verdict.threshold:
+        if not amplitude > max(verdict.threshold, _LOCKED * float(np.max(np.abs(torque)))):
             return verdict
         frequency = order * driven
         return replace(verdict, state=LIMIT_CYCLE, amplitude=amplitude, frequency=frequency)
