@@ -172,9 +172,16 @@ def test_the_observer_in_c_agrees_with_the_observer_in_python_to_1e_12(tmp_path,
     assert {status for pair in pairs for _, status in pair} == {0}
     size = np.abs(expected).max(axis=0)
     assert np.all(size > 0)
-    # An innovation is the difference of two angles: it cannot be known better than these are rounded.
-    rounding = np.finfo(float).eps * np.abs(angle).max()
-    assert np.all(np.abs(found - expected).max(axis=0) <= 1e-12 * size + rounding)
+    # A slow state counts deviations of the deck: one is its size, also where it has hardly moved.
+    slow = np.array([".deviation[" in v.name for v in estimator.outputs])
+    size = np.where(slow, np.maximum(size, 1.0), size)
+    # An innovation is the difference of two angles: it cannot be known better than both are rounded.
+    rounding = 2.0 * np.finfo(float).eps * np.abs(angle).max()
+    off = np.abs(found - expected).max(axis=0)
+    names = [v.name for v in estimator.outputs]
+    assert {
+        n: (o, s) for n, o, s in zip(names, off, size, strict=True) if not o <= 1e-12 * s + rounding
+    } == {}
 
 
 # --- the integrator itself ------------------------------------------------------------------------

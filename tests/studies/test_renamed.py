@@ -148,7 +148,8 @@ def test_export_fmu_and_cosimulate(run: Run, tmp_path: Path) -> None:
     translations: tuple[Callable[[str], str], ...] = (str, machine.name)
     sizes = []
     for number, deck in enumerate((DECKS[0], str(tmp_path / "other.toml"))):
-        status, _, err = run("export", "fmu", "--deck", deck, "--out", f"f{number}")
+        # The cascade knows the torque from the first sample; one that learns would still be learning.
+        status, _, err = run("export", "fmu", "--deck", deck, "--kind", "cascade", "--out", f"f{number}")
         assert status == 0, err
         name = translations[number]
         called = ["cosimulate", "--stop", "0.1 s", "--step", "1 ms", "--out", f"y{number}.csv", "--json"]
