@@ -102,7 +102,7 @@ def test_an_adversary_stays_within_the_bound(gentle: AdaptiveDesign) -> None:
 
 
 def test_slow_states_that_stop_the_rubber_from_decaying_are_refused(gentle: AdaptiveDesign) -> None:
-    """At four deviations the inner state runs away; the limit that is named holds, and the default is below."""
+    """At four deviations the inner state runs away; the limit that is named holds, the default is below."""
     model, trust = plant(), Trust(limit=4.0)
     wild = replace(gentle, trust=replace(gentle.trust, limit=trust.limit))
     with pytest.raises(ValueRangeError, match="held up to") as refused:
