@@ -2,6 +2,18 @@
 
 from .flat import FlatModel, Symbols, Table, Variable
 from .flatten import flatten
+from .origin import Origin
+from .plausibility import Plausibility
 from .switching import Switch, Switching
 
-__all__ = ["FlatModel", "Switch", "Switching", "Symbols", "Table", "Variable", "flatten"]
+__all__ = [
+    "FlatModel",
+    "Origin",
+    "Plausibility",
+    "Switch",
+    "Switching",
+    "Symbols",
+    "Table",
+    "Variable",
+    "flatten",
+]

@@ -15,6 +15,8 @@ from ..errors import ExportError, UnitError, ValueRangeError, unknown_name
 from ..quantity import Quantity, changed_source, same_dimension, with_unit
 from ..symbolic import Expression
 from .notebook_view import model_html
+from .origin import Origin
+from .plausibility import Plausibility
 from .readings import ReadingNames
 from .structure import MovingBody, SpringNames
 from .switching import Switching
@@ -43,6 +45,8 @@ class Variable:
         Range in which the laws are stated to hold.
     source, spread
         Where a parameter's number comes from and its one-sided relative spread.
+    plausibility
+        Of a measured input: what a reading can be; ``None`` for a command.
     """
 
     name: str
@@ -54,6 +58,7 @@ class Variable:
     maximum: float = float("inf")
     source: str = ""
     spread: float = 0.0
+    plausibility: Plausibility | None = None
 
     @property
     def bounded(self) -> bool:
@@ -147,6 +152,11 @@ class FlatModel:
     bodies, springs, readings
         What the model is made of: which variables belong together, in written order. Empty where that is
         not declared.
+    begin
+        Of a sampled model: ``casadi.Function`` (u, p, w) -> x, the states that fit the first inputs of a
+        machine at rest; ``None`` where the start values fit any.
+    origin
+        The deck behind the model, ``None`` where it was made otherwise.
     """
 
     name: str
@@ -163,6 +173,8 @@ class FlatModel:
     bodies: tuple[MovingBody, ...] = ()
     springs: tuple[SpringNames, ...] = ()
     readings: tuple[ReadingNames, ...] = ()
+    begin: ca.Function | None = None
+    origin: Origin | None = None
 
     def symbols(self) -> Symbols:
         """Return fresh symbols and the expressions in them."""
