@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from ...symbolic import Expression
+from ..scheduling.scheduled import at_rest
 from ..scheduling.table import Compact
 from .adaptive_settings import Trust
 from .adaptive_step import AdaptiveStep
@@ -248,6 +249,45 @@ class FilterEquations:
             [*results, ca.SX(0, 1), ca.SX(0, 1)],
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
+
+    def _symbols(self) -> tuple[Expression, Expression, Expression, list[Expression]]:
+        """Return memory, slow states, all states, and the arguments (x, u, p, w) of functions of a sample."""
+        size = self.n + self.slow
+        memory, slow = ca.SX.sym("memory", self.n), ca.SX.sym("slow", self.slow)
+        others = ca.SX.sym("others", 2 + size * (size + 1) // 2)
+        state = ca.SX(ca.vertcat(memory, slow, others))
+        inputs = ca.SX.sym("u", 1 + len(self.plant.inputs))
+        return memory, slow, state, [state, inputs, ca.SX(0, 1), self.w]
+
+    def expected(self) -> ca.Function:
+        """Return what is expected of each input: of the angle what the filter predicts."""
+        memory, slow, _, arguments = self._symbols()
+        predicted = ca.SX(arguments[1])
+        predicted[0] = self._begin(memory, slow)[self.angle]
+        return ca.Function("expected", arguments, [predicted])
+
+    def begin(self) -> ca.Function:
+        """Return the states of a machine that rests at its first reading, and those after a gap."""
+        memory, slow, state, arguments = self._symbols()
+        angle, zero, inner = arguments[1][0], ca.SX.zeros(self.slow, 1), range(self.step.inner)
+        following = self._matrix("next", self.n, self.n + 1 + len(self.plant.rows), zero)
+        prior = self._matrix("prior", self.n, 1, zero)
+        offset = [following[i, self.angle] * angle + following[i, self.n] + prior[i] for i in inner]
+        rest = at_rest([[following[i, j] for j in inner] for i in inner], offset)
+        begun, resumed = ca.SX(state), ca.SX(state)
+        at = ca.SX.zeros(self.n, 1)
+        for i in inner:
+            at[i] = rest[i]
+        at[self.angle] = angle
+        begun[: self.n] = at - prior
+        if self.step.inner:
+            begun[: self.n] -= ca.mtimes(
+                self._matrix("coupling", self.n, self.step.inner, zero), at[: self.step.inner]
+            )
+        resumed[self.angle] += angle - self._begin(memory, slow)[self.angle]
+        followed = self.n + self.slow + 1
+        begun[followed], resumed[followed] = angle, angle
+        return ca.Function("begin", arguments, [begun, resumed])
 
     def _process_noise(self, forget: Expression, unrest: Expression, u: Expression) -> Expression:
         """Return what one sample adds to the covariance.
