@@ -163,10 +163,13 @@ def torque_controller(
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
     model = writer.model("torque_controller", description, (output, motor.current))
-    inputs = [
-        with_declared_reading(v, plant, names.angle) if v.name == names.angle else v for v in model.inputs
-    ]
-    return replace(model, inputs=tuple(inputs))
+    return _with_declared_angle(model, plant, names.angle)
+
+
+def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) -> FlatModel:
+    """Return the controller with what the deck declares of the readings of its angle."""
+    inputs = [with_declared_reading(v, plant, angle) if v.name == angle else v for v in controller.inputs]
+    return replace(controller, inputs=tuple(inputs))
 
 
 def _parts(

@@ -145,10 +145,10 @@ def reading_constants(model: FlatModel, real: Real) -> list[str]:
 
 
 def _mover(model: FlatModel, variable: Variable, real: Real) -> str:
-    found = mover(model, variable)
-    if found is None:
+    moved = mover(model, variable)
+    if moved is None:
         return real.literal(0.0)
-    group, place = found
+    group, place = moved
     variables = model.inputs if group == "inputs" else model.states
     return f"state->{group}.{list(member_paths(variables).values())[place]}"
 

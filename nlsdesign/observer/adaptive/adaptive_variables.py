@@ -10,6 +10,7 @@ from ..scheduling.measured_angle import measured_angle
 from ..scheduling.scheduled import ESTIMATE, INNOVATION, MEMORY
 from .directions import UncertainDirections
 from .filter_equations import FilterEquations, pairs
+from .filter_start import expected_inputs, first_states
 
 Array = NDArray[np.float64]
 
@@ -42,8 +43,8 @@ def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> F
         equations=filter_.sample(),
         sample_time=filter_.step.nominal.sample_time,
         tables=writer.tables(),
-        begin=filter_.begin(),
-        expected=filter_.expected(),
+        begin=first_states(filter_),
+        expected=expected_inputs(filter_),
     )
 
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
 from ...symbolic import Expression
-from ..scheduling.scheduled import at_rest
 from ..scheduling.table import Compact
 from .adaptive_settings import Trust
 from .adaptive_step import AdaptiveStep
@@ -85,8 +84,18 @@ class FilterEquations:
         place = self.compact.places[f"{kind}[{i}][{j}]"]
         return ca.SX(place.factor) if place.column is None else place.factor * self.w[place.column]
 
-    def _matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
-        """Return a matrix of the step at the slow states."""
+    def matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
+        """Return a matrix of the step at the slow states.
+
+        Parameters
+        ----------
+        kind
+            Of :meth:`AdaptiveStep.matrices`.
+        rows, columns
+            Its shape.
+        slow
+            Slow states.
+        """
         total = ca.SX(rows, columns)
         for i in range(rows):
             for j in range(columns):
@@ -111,12 +120,20 @@ class FilterEquations:
 
     # --- the two halves of a sample ---------------------------------------------------------------------
 
-    def _begin(self, memory: Expression, slow: Expression) -> Expression:
-        """Return the states expected at a sample: what the angle adds at its end, then friction."""
-        state = memory + self._matrix("prior", self.n, 1, slow)
+    def expected_states(self, memory: Expression, slow: Expression) -> Expression:
+        """Return the states expected at a sample: what the angle adds at its end, then friction.
+
+        Parameters
+        ----------
+        memory
+            What the estimates carry on.
+        slow
+            Slow states.
+        """
+        state = memory + self.matrix("prior", self.n, 1, slow)
         inner = self.step.inner
         if inner:
-            state += ca.mtimes(self._matrix("coupling", self.n, inner, slow), state[:inner])
+            state += ca.mtimes(self.matrix("coupling", self.n, inner, slow), state[:inner])
         friction_of = self.step.friction
         speed = ca.SX.sym("speed")
         length = ca.sqrt(speed**2 + self.blur**2)
@@ -145,7 +162,7 @@ class FilterEquations:
     def _end(self, state: Expression, slow: Expression, u: Expression) -> Expression:
         """Return what goes on to the next sample."""
         count = self.n + 1 + len(self.plant.rows)
-        matrix = self._matrix("next", self.n, count, slow)
+        matrix = self.matrix("next", self.n, count, slow)
         own, slopes = self.step.driven(u)
         pushed = self._lightness(slow) * (
             own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
@@ -186,9 +203,9 @@ class FilterEquations:
         memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", slow_count)
         packed, unrest = ca.SX.sym("covariance", size * (size + 1) // 2), ca.SX.sym("unrest")
         angle, u = ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
-        slopes = self._carried(self._begin(memory, slow), memory, slow)
+        slopes = self._carried(self.expected_states(memory, slow), memory, slow)
         before = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
-        expected = self._begin(memory, slow)
+        expected = self.expected_states(memory, slow)
         innovation = angle - expected[self.angle]
         off, variance_of_angle = innovation / self.noise.angle, before[self.angle, self.angle]
         followed = ca.SX.sym("followed")
@@ -223,13 +240,13 @@ class FilterEquations:
         fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
         onward = ca.mtimes(ca.diag(fading), onward)
         next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest, u)
-        row = self._matrix("estimate", 1, n + 1, free)
+        row = self.matrix("estimate", 1, n + 1, free)
         wanted = ca.mtimes(row, ca.vertcat(s, 1))
         slopes_of_estimate = self._slopes(wanted, s, free)
         both = (ca.vertcat(s, free), ca.vertcat(state, slow_after))
         estimate, row_at = ca.substitute(wanted, *both), ca.substitute(slopes_of_estimate, *both)
         variance = ca.mtimes([row_at, after, row_at.T]) + self.noise.estimate**2
-        shown = state + self._matrix("shift", n, 1, slow_after)
+        shown = state + self.matrix("shift", n, 1, slow_after)
         outputs = [estimate, ca.sqrt(variance), shown, innovation, slow_after]
         excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
         restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)
@@ -249,45 +266,6 @@ class FilterEquations:
             [*results, ca.SX(0, 1), ca.SX(0, 1)],
             ["time", "state", "input", "parameter", "table"], ["derivative", "output", "signal", "residual"],
         )  # fmt: skip
-
-    def _symbols(self) -> tuple[Expression, Expression, Expression, list[Expression]]:
-        """Return memory, slow states, all states, and the arguments (x, u, p, w) of functions of a sample."""
-        size = self.n + self.slow
-        memory, slow = ca.SX.sym("memory", self.n), ca.SX.sym("slow", self.slow)
-        others = ca.SX.sym("others", 2 + size * (size + 1) // 2)
-        state = ca.SX(ca.vertcat(memory, slow, others))
-        inputs = ca.SX.sym("u", 1 + len(self.plant.inputs))
-        return memory, slow, state, [state, inputs, ca.SX(0, 1), self.w]
-
-    def expected(self) -> ca.Function:
-        """Return what is expected of each input: of the angle what the filter predicts."""
-        memory, slow, _, arguments = self._symbols()
-        predicted = ca.SX(arguments[1])
-        predicted[0] = self._begin(memory, slow)[self.angle]
-        return ca.Function("expected", arguments, [predicted])
-
-    def begin(self) -> ca.Function:
-        """Return the states of a machine that rests at its first reading, and those after a gap."""
-        memory, slow, state, arguments = self._symbols()
-        angle, zero, inner = arguments[1][0], ca.SX.zeros(self.slow, 1), range(self.step.inner)
-        following = self._matrix("next", self.n, self.n + 1 + len(self.plant.rows), zero)
-        prior = self._matrix("prior", self.n, 1, zero)
-        offset = [following[i, self.angle] * angle + following[i, self.n] + prior[i] for i in inner]
-        rest = at_rest([[following[i, j] for j in inner] for i in inner], offset)
-        begun, resumed = ca.SX(state), ca.SX(state)
-        at = ca.SX.zeros(self.n, 1)
-        for i in inner:
-            at[i] = rest[i]
-        at[self.angle] = angle
-        begun[: self.n] = at - prior
-        if self.step.inner:
-            begun[: self.n] -= ca.mtimes(
-                self._matrix("coupling", self.n, self.step.inner, zero), at[: self.step.inner]
-            )
-        resumed[self.angle] += angle - self._begin(memory, slow)[self.angle]
-        followed = self.n + self.slow + 1
-        begun[followed], resumed[followed] = angle, angle
-        return ca.Function("begin", arguments, [begun, resumed])
 
     def _process_noise(self, forget: Expression, unrest: Expression, u: Expression) -> Expression:
         """Return what one sample adds to the covariance.

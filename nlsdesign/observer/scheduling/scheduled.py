@@ -16,6 +16,7 @@ from ...model.roles import measured_motion, spring_torque
 from ...quantity import typeset_unit
 from ...symbolic import Expression
 from .braking import braked_speed
+from .first_reading import FirstReading
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, FittedGain, GainRule
 from .measured_angle import measured_angle, with_plausible_inputs
@@ -200,7 +201,8 @@ class _Writer:
         filtered = [ca.SX.sym(f"{name}.rate") for name in plant.measured] if self._filters else []
         angle, u = ca.SX.sym(self.angle.name), [ca.SX.sym(v.name) for v in plant.inputs]
         measured = [angle, *(self.read("measured", i) for i in range(len(plant.measured)))]
-        prior = self._prior(memory)
+        prior = self.prior(memory)
+        first = FirstReading(self, memory, [*previous, *filtered], angle)
         seen = [int(np.argmax(row)) for row in plant.output_matrix]
         innovation = [y - prior[i] for y, i in zip(measured, seen, strict=True)]
         state = [prior[i] + self.row("correction", i, innovation) for i in range(n)]
@@ -233,48 +235,8 @@ class _Writer:
             equations=equations,
             sample_time=self.step.sample_time,
             tables=self._tables(),
-            begin=self._begin(memory, [*previous, *filtered], angle),
-            expected=self._expected(memory, [*previous, *filtered], angle),
-        )
-
-    def _prior(self, memory: Sequence[Expression]) -> list[Expression]:
-        """Return the states that are expected at a sample."""
-        return self._braked([memory[i] + self.read("prior", i) for i in range(self.n)])
-
-    def _arguments(
-        self, memory: Sequence[Expression], others: Sequence[Expression], angle: Expression
-    ) -> tuple[list[Expression], list[Expression]]:
-        """Return the arguments (x, u, p, w) of functions of a sample, and the inputs one by one."""
-        u = [angle, *(ca.SX.sym(v.name) for v in self.plant.inputs)]
-        return [_column([*memory, *others]), _column(u), ca.SX(0, 1), self.w], u
-
-    def _expected(
-        self, memory: Sequence[Expression], others: Sequence[Expression], angle: Expression
-    ) -> ca.Function:
-        """Return what is expected of each input: of the angle what the model predicts."""
-        arguments, u = self._arguments(memory, others, angle)
-        return ca.Function("expected", arguments, [_column([self._prior(memory)[self.angle_place], *u[1:]])])
-
-    def _begin(
-        self, memory: Sequence[Expression], others: Sequence[Expression], angle: Expression
-    ) -> ca.Function:
-        """Return the memory of a machine that rests at an angle, and that after a gap in the readings."""
-        plant, (arguments, _) = self.plant, self._arguments(memory, others, angle)
-        given = {self.angle_place: angle, self.speed_place: ca.SX(0)}
-        measured = [self.read("measured", i) for i in range(len(plant.measured))]
-        given |= {plant.names.index(name): y for name, y in zip(plant.measured, measured, strict=True)}
-        inner = [i for i in range(self.n) if i not in given]
-        known = [given.get(i, ca.SX(0)) for i in range(self.n)]
-        offset = [self.row("next", i, [*known, ca.SX(1)]) + self.read("prior", i) for i in inner]
-        carried = [[self.read("next", i, j) for j in inner] for i in inner]
-        for i, value in zip(inner, at_rest(carried, offset), strict=True):
-            known[i] = value
-        begun = [known[i] - self.read("prior", i) for i in range(self.n)]
-        resumed = list(memory)
-        resumed[self.angle_place] += angle - self._prior(memory)[self.angle_place]
-        rates = [ca.SX(0)] * (len(others) - len(measured))
-        return ca.Function(
-            "begin", arguments, [_column([*begun, *measured, *rates]), _column([*resumed, *measured, *rates])]
+            begin=first.begin(),
+            expected=first.expected(),
         )
 
     @property
@@ -293,13 +255,13 @@ class _Writer:
             else raw
         )
 
-    def _braked(self, state: list[Expression]) -> list[Expression]:
-        """Return the state after friction has acted for one sample; the angle moves by half of that."""
+    def prior(self, memory: Sequence[Expression]) -> list[Expression]:
+        """Return the states expected at a sample, after friction, half of which moves the angle too."""
+        after = [memory[i] + self.read("prior", i) for i in range(self.n)]
         if self.plant.friction is None:
-            return state
-        time, before = self.step.sample_time, state[self.speed_place]
+            return after
+        time, before = self.step.sample_time, after[self.speed_place]
         change = ca.SX(braked_speed(self.plant.friction, time)(before)) - before
-        after = list(state)
         after[self.angle_place] += time / 2.0 * change
         after[self.speed_place] += change
         return after
@@ -357,38 +319,6 @@ class _Writer:
         return (
             Table(self.angle.name, float(grid[0]), float(grid[1] - grid[0]), columns, self.compact.values),
         )
-
-
-def at_rest(carried: Sequence[Sequence[Expression]], offset: Sequence[Expression]) -> list[Expression]:
-    """Return the inner states that stay as they are: x = A·x + g.
-
-    A state that never decays, such as a permanent set, has no rest of its own and begins at zero.
-
-    Parameters
-    ----------
-    carried
-        A, shape (n, n).
-    offset
-        g, shape (n,).
-    """
-    count = len(offset)
-    lasting = [i for i in range(count) if not _decays(carried[i][i])]
-    moving = [i for i in range(count) if i not in lasting]
-    result = [ca.SX(0)] * count
-    if not moving:
-        return result
-    matrix = ca.SX.eye(len(moving)) - ca.SX(
-        ca.vertcat(*[ca.horzcat(*[carried[i][j] for j in moving]) for i in moving])
-    )
-    rest = ca.solve(matrix, _column([offset[i] for i in moving]))
-    for place, i in enumerate(moving):
-        result[i] = rest[place]
-    return result
-
-
-def _decays(kept: Expression) -> bool:
-    """Return whether a share that is kept over a sample is below one, or varies with the angle."""
-    return not (kept.is_constant() and float(kept) >= 1.0 - 1e-12)
 
 
 def _column(items: Sequence[Expression]) -> Expression:
