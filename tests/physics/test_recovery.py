@@ -264,10 +264,11 @@ def test_both_are_the_observer_and_the_controller_with_the_current_between() -> 
     for k in range(300):
         reading = 0.5 + 0.767e-3 * round(0.3 * math.sin(0.02 * k) / 0.767e-3)
         estimate, _ = eye.step([reading, acting])
+        wish = math.sin(0.01 * k)
         at = {
             "motor.angle": reading,
             "spring.torque": estimate[0],
-            "spring.torque.desired": math.sin(0.01 * k),
+            "spring.torque.desired": wish,
         }
         (acting,), _ = hand.step([at[v.name] for v in controller.inputs])
         outputs, status = run.step([reading, wish])
