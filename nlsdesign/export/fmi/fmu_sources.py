@@ -37,7 +37,7 @@ def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
     """
     model = layout.model
     main = main_source(version)
-    texts = {main: shell(main), "instance.c": shell("instance.c")}
+    texts = {name: shell(name) for name in (main, "instance.c", "saved_state.c")}
     if model.sample_time is None:
         if model.tables:
             raise ExportError(

@@ -264,3 +264,22 @@ fmi2Status fmi2CancelStep(fmi2Component me)
 NO_STATUS(GetStatus, fmi2Status)
 NO_STATUS(GetIntegerStatus, fmi2Integer)
 NO_STATUS(GetStringStatus, fmi2String)
+
+/* Model exchange. */
+#define NO_EXCHANGE(Name, arguments, unused)          \
+    fmi2Status fmi2##Name arguments                   \
+    {                                                 \
+        unused;                                       \
+        return unsupported(me, "fmi2" #Name);         \
+    }
+#define ME fmi2Component me
+NO_EXCHANGE(EnterEventMode, (ME), )
+NO_EXCHANGE(NewDiscreteStates, (ME, fmi2EventInfo *info), (void)info)
+NO_EXCHANGE(EnterContinuousTimeMode, (ME), )
+NO_EXCHANGE(CompletedIntegratorStep, (ME, fmi2Boolean a, fmi2Boolean *b, fmi2Boolean *c), ((void)a, (void)b, (void)c))
+NO_EXCHANGE(SetTime, (ME, fmi2Real time), ((void)time))
+NO_EXCHANGE(SetContinuousStates, (ME, const fmi2Real x[], size_t n), ((void)x, (void)n))
+NO_EXCHANGE(GetDerivatives, (ME, fmi2Real x[], size_t n), ((void)x, (void)n))
+NO_EXCHANGE(GetEventIndicators, (ME, fmi2Real z[], size_t n), ((void)z, (void)n))
+NO_EXCHANGE(GetContinuousStates, (ME, fmi2Real x[], size_t n), ((void)x, (void)n))
+NO_EXCHANGE(GetNominalsOfContinuousStates, (ME, fmi2Real x[], size_t n), ((void)x, (void)n))

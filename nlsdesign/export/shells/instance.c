@@ -13,11 +13,14 @@
 #endif
 
 enum { ALL_WELL = 0, WARNED = 1, REFUSED = 3 }; /* the numbers that both versions of FMI give to ok, warning, error */
+/* Most samples in one step: eleven hours at 1 kHz, computed in seconds. */
+enum { MOST_SAMPLES = 40000000 };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16 };
 
 /* Everything that a copy of the state holds; plain data. */
 typedef struct {
-    double time;
+    double time; /* as the importer counts it */
+    double elapsed, lost; /* sum of all steps, and what its rounding has lost: a clock drifts where it is large */
     double first_time;
     double last_time;
     int32_t has_last_time;
@@ -199,44 +202,88 @@ static int enter_stepping(instance *me)
     return ALL_WELL;
 }
 
-static int advance(instance *me, double to)
+/* Adds a step to the sum of all steps. Source: Neumaier 1974. */
+static void count_time(instance *me, double length)
+{
+    const double before = me->now.elapsed, sum = before + length;
+    me->now.lost += before >= length ? (before - sum) + length : (length - sum) + before;
+    me->now.elapsed = sum;
+}
+
+#if MODEL_CONTINUOUS
+static int advance(instance *me, double from, double length)
 {
     double *v = me->now.value;
-#if MODEL_CONTINUOUS
+    const integrator_memory before = me->now.memory;
     integrator_report done;
-    if (!integrate(me->now.time, to, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], v[MODEL_EXTRA], &me->now.memory, &done)) {
+    const int found =
+        integrate(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], v[MODEL_EXTRA], &me->now.memory, &done);
+
+    if (found != INTEGRATED) {
+        me->now.memory = before;
+    }
+    if (found == TOO_LONG) {
+        return say(me, REFUSED, "the step of %.9g s needs more than %d steps of the integrator; it came to %.9g s",
+                   length, MOST_ATTEMPTS, from + done.time);
+    }
+    if (found == NO_STEP) {
         me->now.phase = FAILED;
         return say(me, REFUSED, "no step size gives the relative tolerance %.3g at time %.9g s (%d steps, %d rejected)",
-                   v[MODEL_EXTRA], done.time, done.accepted, done.rejected);
+                   v[MODEL_EXTRA], from + done.time, done.accepted, done.rejected);
     }
-    (void)say(me, ALL_WELL, "time %.9g s: %d steps, %d rejected", to, done.accepted, done.rejected);
+    (void)say(me, ALL_WELL, "time %.9g s: %d steps, %d rejected", from + length, done.accepted, done.rejected);
     me->now.outdated = 1;
+    count_time(me, length);
+    return ALL_WELL;
+}
 #else
-    /* Samples are counted, not timed: the one at to belongs to the next step, whatever the rounding of to. */
-    const double due = ceil((to - me->now.first_time) / MODEL_SAMPLE_TIME - 1e-6);
+/* Samples are counted, not timed: the one at the end belongs to the next step, whatever the rounding of the clock. */
+static int advance(instance *me, double from, double length)
+{
+    double *v = me->now.value;
+    const moment before = me->now;
+
+    count_time(me, length);
+    const double elapsed = me->now.elapsed + me->now.lost;
+    const double rounding = 8.0 * DBL_EPSILON * (fabs(from) + elapsed);
+    const double due = ceil((elapsed - rounding) / MODEL_SAMPLE_TIME - 1e-6);
+    const double needed = due - (double)me->now.samples;
+    if (!(rounding <= 0.25 * MODEL_SAMPLE_TIME) || !(needed <= (double)MOST_SAMPLES)) {
+        me->now = before;
+        return needed > (double)MOST_SAMPLES
+                   ? say(me, REFUSED, "the step of %.9g s would need %.9g samples, one step takes at most %d", length,
+                         needed, MOST_SAMPLES)
+                   : say(me, REFUSED, "at %.9g s the clock is too coarse for samples every %.9g s", from,
+                         MODEL_SAMPLE_TIME);
+    }
     while ((double)me->now.samples < due) {
         me->now.status = model_sample(&me->now.memory, &v[MODEL_U], &v[MODEL_X], &v[MODEL_Y], &v[MODEL_S]);
         ++me->now.samples;
     }
-#endif
-    me->now.time = v[0] = to;
     return ALL_WELL;
 }
+#endif
 
 static int do_step(instance *me, double from, double length)
 {
     const double to = from + length;
 
-    if (!(length > 0.0 && length <= MODEL_LARGEST)) {
+    if (!(length > 0.0 && fabs(to) <= MODEL_LARGEST)) {
         return say(me, REFUSED, "a communication step of %.9g s is not possible", length);
     }
-    if (!(fabs(from - me->now.time) <= 1e-6 * length)) {
+    /* An importer may add its steps up or multiply, so that its clock differs by rounding. */
+    const double clock = 4.0 * DBL_EPSILON * fmax(fabs(from), fabs(me->now.time)), allowance = 1e-6 * length + clock;
+    if (!(fabs(from - me->now.time) <= allowance)) {
         return say(me, REFUSED, "the communication point is %.9g s, the model stands at %.9g s", from, me->now.time);
     }
-    if (me->now.has_last_time && to > me->now.last_time + 1e-6 * length) {
+    if (me->now.has_last_time && to > me->now.last_time + allowance) {
         return say(me, REFUSED, "the step to %.9g s goes beyond the stop time %.9g s", to, me->now.last_time);
     }
-    return advance(me, to);
+    if (advance(me, from, length) != ALL_WELL) {
+        return REFUSED;
+    }
+    me->now.time = me->now.value[0] = to;
+    return ALL_WELL;
 }
 
 /* Sensitivities of derivatives, outputs and signals to time, states, inputs and parameters. */
@@ -274,50 +321,7 @@ static int derive(instance *me, const uint32_t unknowns[], size_t unknown_count,
 #endif
 }
 
-static int copy_state(const instance *me, void **copy)
-{
-    if (*copy == NULL) {
-        *copy = malloc(sizeof me->now);
-    }
-    if (*copy == NULL) {
-        return say(me, REFUSED, "no memory for a copy of the state");
-    }
-    memcpy(*copy, &me->now, sizeof me->now);
-    return ALL_WELL;
-}
-
-static int restore_state(instance *me, const void *copy)
-{
-    if (copy == NULL) {
-        return say(me, REFUSED, "there is no copy to restore");
-    }
-    memcpy(&me->now, copy, sizeof me->now);
-    return ALL_WELL;
-}
-
-enum { TOKEN_SIZE = sizeof MODEL_TOKEN, WRITTEN_SIZE = sizeof MODEL_TOKEN + sizeof(moment) };
-
-static int write_state(const instance *me, const void *copy, unsigned char bytes[], size_t size)
-{
-    if (copy == NULL || size < WRITTEN_SIZE) {
-        return say(me, REFUSED, "there is no copy, or not enough room to write it");
-    }
-    memcpy(bytes, MODEL_TOKEN, TOKEN_SIZE);
-    memcpy(bytes + TOKEN_SIZE, copy, sizeof(moment));
-    return ALL_WELL;
-}
-
-static int read_state(const instance *me, const unsigned char bytes[], size_t size, void **copy)
-{
-    if (size < WRITTEN_SIZE || memcmp(bytes, MODEL_TOKEN, TOKEN_SIZE) != 0) {
-        return say(me, REFUSED, "these bytes are not a state of this model");
-    }
-    if (copy_state(me, copy) != ALL_WELL) {
-        return REFUSED;
-    }
-    memcpy(*copy, bytes + TOKEN_SIZE, sizeof(moment));
-    return ALL_WELL;
-}
+#include "saved_state.c"
 
 static void release(instance *me)
 {
