@@ -11,11 +11,15 @@
 #if MODEL_CONTINUOUS
 #include "integrator.c"
 #endif
+#if MODEL_SWITCHES > 0
+#include "events.c"
+#endif
 
-enum { ALL_WELL = 0, WARNED = 1, REFUSED = 3 }; /* the numbers that both versions of FMI give to ok, warning, error */
+/* The numbers that both versions of FMI give to ok, warning, discard, error. */
+enum { ALL_WELL = 0, WARNED = 1, DISCARDED = 2, REFUSED = 3 };
 /* Most samples in one step: eleven hours at 1 kHz, computed in seconds. */
 enum { MOST_SAMPLES = 40000000 };
-enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16 };
+enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16, EVENT = 32, CONTINUOUS = 64 };
 
 /* Everything that a copy of the state holds; plain data. */
 typedef struct {
@@ -25,6 +29,8 @@ typedef struct {
     double last_time;
     int32_t has_last_time;
     int32_t phase;
+    int32_t exchange; /* made for model exchange, not for co-simulation */
+    int32_t arriving; /* has just entered the event mode */
     int32_t outdated; /* outputs and signals belong to other inputs */
     int32_t status;   /* status word of the last sample */
     uint64_t samples; /* done since first_time */
@@ -80,9 +86,10 @@ static int known(const instance *me, uint32_t reference)
     return reference < MODEL_VALUES;
 }
 
-static void begin(instance *me)
+static void begin(instance *me, int exchange)
 {
     memset(&me->now, 0, sizeof me->now);
+    me->now.exchange = exchange;
     me->now.phase = INSTANTIATED;
     me->now.outdated = 1;
     for (uint32_t i = 0; i < MODEL_VALUES; ++i) {
@@ -100,7 +107,14 @@ static void refresh(instance *me)
     }
     v[0] = me->now.time;
 #if MODEL_CONTINUOUS
-    model_equations(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_D], &v[MODEL_Y], &v[MODEL_S]);
+#if MODEL_SWITCHES > 0
+    double slope[MODEL_SWITCHES];
+    if ((me->now.phase & (INSTANTIATED | INITIALIZATION)) != 0) {
+        model_natural(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M]);
+    }
+    model_indicators(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], &v[MODEL_Z], slope);
+#endif
+    model_equations(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], &v[MODEL_D], &v[MODEL_Y], &v[MODEL_S]);
 #else
     /* Before the first sample: what it would give, on a copy. */
     model_memory trial;
@@ -135,8 +149,11 @@ static int judge(const instance *me, uint32_t r, double value)
     }
     const variable *is = &model_variable[r];
     const int input = within(r, MODEL_U, MODEL_INPUTS), parameter = within(r, MODEL_P, MODEL_PARAMETERS);
-    int phases = input || (parameter && !MODEL_CONTINUOUS) ? INSTANTIATED | INITIALIZATION | STEPPING
-                                                           : INSTANTIATED | INITIALIZATION;
+    /* In model exchange some importers set the states by their value references. */
+    const int moved = me->now.exchange && within(r, MODEL_X, MODEL_STATES);
+    const int phases = input || moved || (parameter && !MODEL_CONTINUOUS)
+                           ? INSTANTIATED | INITIALIZATION | STEPPING | EVENT | CONTINUOUS
+                           : INSTANTIATED | INITIALIZATION;
     if (!input && !parameter && !within(r, MODEL_X, MODEL_STATES) && !(MODEL_CONTINUOUS && r == MODEL_EXTRA)) {
         return say(me, REFUSED, "%s is computed and cannot be set", is->name);
     }
@@ -145,6 +162,9 @@ static int judge(const instance *me, uint32_t r, double value)
     }
     if (input && !MODEL_CONTINUOUS) {
         return ALL_WELL; /* the guards of the controller take anything */
+    }
+    if (moved && (me->now.phase & (EVENT | CONTINUOUS)) != 0 && fabs(value) <= MODEL_LARGEST) {
+        return ALL_WELL;
     }
     if (input && fabs(value) <= MODEL_LARGEST && !(value >= is->lowest && value <= is->highest)) {
         return say(me, WARNED, "%s = %.9g is outside the range [%.9g, %.9g] for which the laws are stated", is->name,
@@ -192,13 +212,38 @@ static int enter_initialization(instance *me, double first_time, int has_last_ti
     return ALL_WELL;
 }
 
-static int enter_stepping(instance *me)
+#if MODEL_SWITCHES > 0
+static int settle_modes(instance *me, int arriving, double most_drift)
+{
+    double *v = me->now.value;
+    const setting at = {v[0], &v[MODEL_U], &v[MODEL_P]};
+    int which = 0;
+    const int found = settle(&at, &v[MODEL_X], &v[MODEL_M], arriving, most_drift, &which);
+
+    me->now.outdated = 1;
+    if (found != SETTLED) {
+        me->now.phase = FAILED;
+        return say(me, REFUSED,
+                   found == ENDLESS ? "events of %s do not end at time %.9g s"
+                                    : "%s: what is held has moved at time %.9g s; give the acceleration of a driven "
+                                      "body as an input too",
+                   model_variable[MODEL_M + which].name, me->now.time);
+    }
+    return ALL_WELL;
+}
+#endif
+
+static int leave_initialization(instance *me)
 {
     refresh(me);
 #if !MODEL_CONTINUOUS
     model_start(&me->now.memory, &me->now.value[MODEL_X], &me->now.value[MODEL_P]);
+#elif MODEL_SWITCHES > 0
+    if (settle_modes(me, 0, 1e-3) != ALL_WELL) {
+        return REFUSED;
+    }
 #endif
-    me->now.phase = STEPPING;
+    me->now.phase = me->now.exchange ? EVENT : STEPPING;
     return ALL_WELL;
 }
 
@@ -217,7 +262,8 @@ static int advance(instance *me, double from, double length)
     const integrator_memory before = me->now.memory;
     integrator_report done;
     const int found =
-        integrate(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], v[MODEL_EXTRA], &me->now.memory, &done);
+        integrate(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], v[MODEL_EXTRA], &me->now.memory,
+                  &done);
 
     if (found != INTEGRATED) {
         me->now.memory = before;
@@ -306,8 +352,8 @@ static int derive(instance *me, const uint32_t unknowns[], size_t unknown_count,
         in[r] += seed[k];
     }
     memcpy(out, in, sizeof out);
-    model_directional(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], in[0], &in[MODEL_X], &in[MODEL_U], &in[MODEL_P],
-                      &out[MODEL_D], &out[MODEL_Y], &out[MODEL_S]);
+    model_directional(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], in[0], &in[MODEL_X], &in[MODEL_U],
+                      &in[MODEL_P], &out[MODEL_D], &out[MODEL_Y], &out[MODEL_S], &out[MODEL_Z]);
     for (size_t k = 0; k < unknown_count; ++k) {
         if (!known(me, unknowns[k])) {
             return REFUSED;
@@ -321,6 +367,7 @@ static int derive(instance *me, const uint32_t unknowns[], size_t unknown_count,
 #endif
 }
 
+#include "exchange.c"
 #include "saved_state.c"
 
 static void release(instance *me)
@@ -330,7 +377,7 @@ static void release(instance *me)
 }
 
 /* Gives a new instance in memory of the given size, or null. */
-static instance *establish(size_t size, const char *name,
+static instance *establish(size_t size, const char *name, int exchange,
                            void (*report)(const instance *, int, const char *, const char *))
 {
     instance *me = calloc(1, size);
@@ -342,7 +389,7 @@ static instance *establish(size_t size, const char *name,
             return NULL;
         }
         memcpy(me->name, name, strlen(name) + 1);
-        begin(me);
+        begin(me, exchange);
     }
     return me;
 }

@@ -91,7 +91,7 @@ static void solve(double a[ORDER][ORDER], const int row[ORDER], double b[ORDER])
 /* One step of length h from x with the Jacobian df/dx and the slope df/dt at its beginning; gives the state at
    the end and the estimate of its error. Returns 0 if the matrix is singular. */
 static int rodas4(double t, double h, const double x[], const double u[], const double p[],
-                  double jacobian[ORDER][ORDER], const double slope[ORDER], double next[ORDER],
+                  const double m[], double jacobian[ORDER][ORDER], const double slope[ORDER], double next[ORDER],
                   double error[ORDER])
 {
     double matrix[ORDER][ORDER], k[STAGES][ORDER];
@@ -112,7 +112,7 @@ static int rodas4(double t, double h, const double x[], const double u[], const 
                 next[i] += RODAS_A[stage][j] * k[j][i];
             }
         }
-        model_rates(t + RODAS_TIME[stage] * h, next, u, p, k[stage]);
+        model_rates(t + RODAS_TIME[stage] * h, next, u, p, m, k[stage]);
         for (int i = 0; i < ORDER; ++i) {
             k[stage][i] += h * RODAS_SLOPE[stage] * slope[i];
             for (int j = 0; j < stage; ++j) {
@@ -143,8 +143,8 @@ static double measured_error(const double x[], const double next[], const double
 
 /* Integrates over a length of time with constant inputs. Time is counted from the beginning of the step, so that
    a large clock does not bound the step size. Where the result is not INTEGRATED, x is as it was. */
-static int integrate(double from, double length, double x[], const double u[], const double p[], double tolerance,
-                     integrator_memory *memory, integrator_report *report)
+static int integrate(double from, double length, double x[], const double u[], const double p[], const double m[],
+                     double tolerance, integrator_memory *memory, integrator_report *report)
 {
     double now[ORDER], next[ORDER], error[ORDER], slope[ORDER], jacobian[ORDER][ORDER];
     double t = 0.0, step = memory->step > 0.0 ? memory->step : length;
@@ -166,10 +166,10 @@ static int integrate(double from, double length, double x[], const double u[], c
             return NO_STEP;
         }
         if (!fresh) {
-            model_jacobian(from + t, now, u, p, jacobian, slope);
+            model_jacobian(from + t, now, u, p, m, jacobian, slope);
             fresh = 1;
         }
-        const int solved = rodas4(from + t, h, now, u, p, jacobian, slope, next, error);
+        const int solved = rodas4(from + t, h, now, u, p, m, jacobian, slope, next, error);
         const double size = solved ? measured_error(now, next, error, memory->largest, tolerance) : 1e9;
         const double factor = 0.9 * pow(fmax(size, 1e-10), -0.25);
         if (!(size <= 1.0)) { /* also NaN */

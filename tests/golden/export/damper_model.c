@@ -16,6 +16,9 @@
 #define MODEL_P 3
 #define MODEL_Y 4
 #define MODEL_S 5
+#define MODEL_Z 6
+#define MODEL_M 6
+#define MODEL_SWITCHES 0
 #define MODEL_EXTRA 6
 #define MODEL_VALUES 7
 #define MODEL_SAMPLE_TIME 0.01
