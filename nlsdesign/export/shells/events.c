@@ -4,6 +4,7 @@
 
 enum { MOST_AT_ONCE = 40 };
 enum { SETTLED = 0, ENDLESS = 1, DRIFTED = 2 };
+static const double MOST_DRIFT = 1e-3; /* largest change of a rate that is held, as a share of the nominal size */
 
 /* Of the switches that hold a rate; zero for the others. */
 typedef struct {
@@ -134,8 +135,9 @@ static void eliminate(int n, double a[MODEL_SWITCHES][MODEL_SWITCHES], double b[
     }
 }
 
-/* Sets the rates that are held to exactly zero, without changing any momentum. */
-static int keep_held(const setting *at, double x[], const double m[], double most_drift, int *which)
+/* Sets the rates that are held to exactly zero, without changing any momentum. Where an input has moved one by more
+   than rounding and integration do, it is DRIFTED and x stays. */
+static int keep_held(const setting *at, double x[], const double m[], int *which)
 {
     double matrix[MODEL_SWITCHES][MODEL_SWITCHES], right[MODEL_SWITCHES];
     int held[MODEL_SWITCHES], count = 0, moved = 0;
@@ -160,16 +162,17 @@ static int keep_held(const setting *at, double x[], const double m[], double mos
     if (!moved) {
         return SETTLED;
     }
+    for (int i = 0; i < count; ++i) {
+        const int first = steepest(&to, held[i]);
+        if (!(fabs(right[i]) <= MOST_DRIFT * model_nominal[first] * fabs(to.slope[held[i]][first]))) {
+            *which = held[i];
+            return DRIFTED;
+        }
+    }
     eliminate(count, matrix, right);
     for (int j = 0; j < MODEL_STATES; ++j) {
-        double change = 0.0;
         for (int k = 0; k < count; ++k) {
-            change += to.reach[j][held[k]] * right[k];
-        }
-        x[j] += change;
-        if (!(fabs(change) <= most_drift * model_nominal[j])) {
-            *which = held[0];
-            return DRIFTED;
+            x[j] += to.reach[j][held[k]] * right[k];
         }
     }
     for (int i = 0; i < count; ++i) { /* what rounding has left */
@@ -198,9 +201,9 @@ static int has_ended(const setting *at, int i, double mode, double z, double slo
 }
 
 /* Changes the modes that have ended until no mode ends. */
-static int settle(const setting *at, double x[], double m[], int arriving, double most_drift, int *which)
+static int settle(const setting *at, double x[], double m[], int arriving, int *which)
 {
-    double z[MODEL_SWITCHES], slope[MODEL_SWITCHES];
+    double z[MODEL_SWITCHES], slope[MODEL_SWITCHES], natural[MODEL_SWITCHES];
 
     for (int round = 0; round < MOST_AT_ONCE; ++round) {
         int ended[MODEL_SWITCHES], any = 0;
@@ -212,8 +215,12 @@ static int settle(const setting *at, double x[], double m[], int arriving, doubl
                 *which = i;
             }
         }
-        if (!any) {
-            return keep_held(at, x, m, most_drift, which);
+        if (!any && keep_held(at, x, m, which) == SETTLED) {
+            return SETTLED;
+        }
+        if (!any) { /* an input has torn it away */
+            model_natural(at->t, x, at->u, at->p, natural);
+            m[*which] = natural[*which];
         }
         for (int i = 0; i < MODEL_SWITCHES; ++i) {
             if (ended[i]) {

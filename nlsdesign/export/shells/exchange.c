@@ -96,7 +96,7 @@ static int update_discrete(instance *me, int *states_changed)
 #if MODEL_SWITCHES > 0
     double before[ORDER];
     memcpy(before, &me->now.value[MODEL_X], MODEL_STATES * sizeof before[0]);
-    if (settle_modes(me, me->now.arriving, 1e-3) != ALL_WELL) {
+    if (settle_modes(me, me->now.arriving) != ALL_WELL) {
         return REFUSED;
     }
     *states_changed = memcmp(before, &me->now.value[MODEL_X], MODEL_STATES * sizeof before[0]) != 0;
@@ -114,6 +114,11 @@ static int event_is_due(instance *me)
     for (size_t i = 0; i < MODEL_SWITCHES; ++i) {
         due = due || me->now.value[MODEL_Z + i] < 0.0;
     }
+    const setting at = {me->now.time, &me->now.value[MODEL_U], &me->now.value[MODEL_P]};
+    double x[ORDER];
+    int which = 0;
+    memcpy(x, &me->now.value[MODEL_X], sizeof x);
+    due = due || keep_held(&at, x, &me->now.value[MODEL_M], &which) != SETTLED;
 #else
     (void)me;
 #endif

@@ -13,6 +13,7 @@
 #endif
 #if MODEL_SWITCHES > 0
 #include "events.c"
+#include "switched.c"
 #endif
 
 /* The numbers that both versions of FMI give to ok, warning, discard, error. */
@@ -213,21 +214,18 @@ static int enter_initialization(instance *me, double first_time, int has_last_ti
 }
 
 #if MODEL_SWITCHES > 0
-static int settle_modes(instance *me, int arriving, double most_drift)
+static int settle_modes(instance *me, int arriving)
 {
     double *v = me->now.value;
     const setting at = {v[0], &v[MODEL_U], &v[MODEL_P]};
     int which = 0;
-    const int found = settle(&at, &v[MODEL_X], &v[MODEL_M], arriving, most_drift, &which);
+    const int found = settle(&at, &v[MODEL_X], &v[MODEL_M], arriving, &which);
 
     me->now.outdated = 1;
     if (found != SETTLED) {
         me->now.phase = FAILED;
-        return say(me, REFUSED,
-                   found == ENDLESS ? "events of %s do not end at time %.9g s"
-                                    : "%s: what is held has moved at time %.9g s; give the acceleration of a driven "
-                                      "body as an input too",
-                   model_variable[MODEL_M + which].name, me->now.time);
+        return say(me, REFUSED, "%s: events do not end at time %.9g s", model_variable[MODEL_M + which].name,
+                   me->now.time);
     }
     return ALL_WELL;
 }
@@ -239,7 +237,7 @@ static int leave_initialization(instance *me)
 #if !MODEL_CONTINUOUS
     model_start(&me->now.memory, &me->now.value[MODEL_X], &me->now.value[MODEL_P]);
 #elif MODEL_SWITCHES > 0
-    if (settle_modes(me, 0, 1e-3) != ALL_WELL) {
+    if (settle_modes(me, 0) != ALL_WELL) {
         return REFUSED;
     }
 #endif
@@ -259,21 +257,30 @@ static void count_time(instance *me, double length)
 static int advance(instance *me, double from, double length)
 {
     double *v = me->now.value;
-    const integrator_memory before = me->now.memory;
+    const moment before = me->now;
     integrator_report done;
-    const int found =
-        integrate(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], v[MODEL_EXTRA], &me->now.memory,
-                  &done);
-
+#if MODEL_SWITCHES > 0
+    const int found = integrate_switched(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M],
+                                         v[MODEL_EXTRA], 0, &me->now.memory, &done);
+#else
+    const int found = integrate(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], v[MODEL_EXTRA],
+                                &me->now.memory, &done);
+#endif
     if (found != INTEGRATED) {
-        me->now.memory = before;
+        me->now = before;
     }
     if (found == TOO_LONG) {
         return say(me, REFUSED, "the step of %.9g s needs more than %d steps of the integrator; it came to %.9g s",
                    length, MOST_ATTEMPTS, from + done.time);
     }
-    if (found == NO_STEP) {
+    if (found != INTEGRATED) {
         me->now.phase = FAILED;
+    }
+    if (found != INTEGRATED && found != NO_STEP) {
+        return say(me, REFUSED, "events accumulate at time %.9g s; give a stop a speed below which it rests",
+                   from + done.time);
+    }
+    if (found == NO_STEP) {
         return say(me, REFUSED, "no step size gives the relative tolerance %.3g at time %.9g s (%d steps, %d rejected)",
                    v[MODEL_EXTRA], from + done.time, done.accepted, done.rejected);
     }

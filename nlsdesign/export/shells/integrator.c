@@ -141,6 +141,7 @@ static double measured_error(const double x[], const double next[], const double
     return sqrt(sum / (double)ORDER);
 }
 
+#if MODEL_SWITCHES == 0
 /* Integrates over a length of time with constant inputs. Time is counted from the beginning of the step, so that
    a large clock does not bound the step size. Where the result is not INTEGRATED, x is as it was. */
 static int integrate(double from, double length, double x[], const double u[], const double p[], const double m[],
@@ -196,3 +197,4 @@ static int integrate(double from, double length, double x[], const double u[], c
     report->time = length;
     return INTEGRATED;
 }
+#endif
