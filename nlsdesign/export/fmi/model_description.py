@@ -129,6 +129,9 @@ def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> N
     if two:
         kind.set("canNotUseMemoryManagementFunctions", "true")
         _element(_element(kind, "SourceFiles"), "File", name=main_source("2.0"))
+    elif layout.indicators:
+        kind.set("hasEventMode", "true")
+        kind.set("mightReturnEarlyFromDoStep", "true")
     elif not continuous:
         kind.set("fixedInternalStepSize", _text(layout.model.sample_time))
 

@@ -65,7 +65,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         }
         return NULL;
     }
-    instance2 *me = (instance2 *)(void *)establish(sizeof(instance2), name, type == fmi2ModelExchange, report2);
+    instance2 *me = (instance2 *)(void *)establish(sizeof(instance2), name, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, report2);
     if (me != NULL) {
         me->callbacks = callbacks;
         me->base.solver_logged = logging;
@@ -118,7 +118,7 @@ fmi2Status fmi2Terminate(fmi2Component me)
 fmi2Status fmi2Reset(fmi2Component me)
 {
     RETURN_UNLESS(me, ANY_TIME, "fmi2Reset");
-    begin(me, ((instance *)me)->now.exchange);
+    begin(me, ((instance *)me)->now.purpose);
     ((instance2 *)me)->set_up = 0;
     return fmi2OK;
 }
@@ -127,7 +127,8 @@ fmi2Status fmi2DoStep(fmi2Component me, fmi2Real from, fmi2Real length, fmi2Bool
 {
     (void)no_set_state_before;
     RETURN_UNLESS(me, STEPPING, "fmi2DoStep");
-    return (fmi2Status)do_step(me, from, length);
+    int event = 0;
+    return (fmi2Status)do_step(me, from, length, &event);
 }
 
 fmi2Status fmi2GetReal(fmi2Component me, const fmi2ValueReference references[], size_t count, fmi2Real values[])

@@ -48,7 +48,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance me, fmi3Boolean on, size_t count, co
     return fmi3OK;
 }
 
-static fmi3Instance created(fmi3String name, fmi3String token, fmi3Boolean logging, int exchange,
+static fmi3Instance created(fmi3String name, fmi3String token, fmi3Boolean logging, int purpose,
                             fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, const char *refusal)
 {
     if (refusal == NULL && (name == NULL || token == NULL || strcmp(token, MODEL_TOKEN) != 0)) {
@@ -60,7 +60,7 @@ static fmi3Instance created(fmi3String name, fmi3String token, fmi3Boolean loggi
         }
         return NULL;
     }
-    instance3 *me = (instance3 *)(void *)establish(sizeof(instance3), name, exchange, report3);
+    instance3 *me = (instance3 *)(void *)establish(sizeof(instance3), name, purpose, report3);
     if (me != NULL) {
         me->environment = environment;
         me->log = log;
@@ -75,8 +75,13 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update)
 {
-    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)intermediate_count, (void)update;
-    return created(name, token, logging, 0, environment, log, event_mode ? "there is no event mode" : NULL);
+    (void)resources, (void)visible, (void)intermediate, (void)intermediate_count, (void)update;
+    instance3 *me = created(name, token, logging, event_mode ? CO_SIMULATION_WITH_EVENTS : CO_SIMULATION, environment,
+                            log, event_mode && MODEL_SWITCHES == 0 ? "this model has no events" : NULL);
+    if (me != NULL) {
+        me->base.may_return_early = event_mode && early_return;
+    }
+    return me;
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -84,7 +89,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3LogMessageCallback log)
 {
     (void)resources, (void)visible;
-    return created(name, token, logging, 1, environment, log,
+    return created(name, token, logging, MODEL_EXCHANGE, environment, log,
                    MODEL_CONTINUOUS ? NULL : "a sampled model offers co-simulation only");
 }
 
@@ -95,7 +100,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
                                                fmi3UnlockPreemptionCallback unlock)
 {
     (void)resources, (void)visible, (void)update, (void)lock, (void)unlock;
-    return created(name, token, logging, 0, environment, log, "this model offers no scheduled execution");
+    return created(name, token, logging, CO_SIMULATION, environment, log, "this model offers no scheduled execution");
 }
 
 void fmi3FreeInstance(fmi3Instance me)
@@ -136,7 +141,7 @@ fmi3Status fmi3Terminate(fmi3Instance me)
 fmi3Status fmi3Reset(fmi3Instance me)
 {
     RETURN_UNLESS(me, ANY_TIME, "fmi3Reset");
-    begin(me, ((instance *)me)->now.exchange);
+    begin(me, ((instance *)me)->now.purpose);
     return fmi3OK;
 }
 
@@ -145,8 +150,11 @@ fmi3Status fmi3DoStep(fmi3Instance me, fmi3Float64 from, fmi3Float64 length, fmi
 {
     (void)no_set_state_before;
     RETURN_UNLESS(me, STEPPING, "fmi3DoStep");
-    const int status = do_step(me, from, length);
-    *event = *terminate = *early = false;
+    int found = 0;
+    const int status = do_step(me, from, length, &found);
+    *event = found != 0;
+    *terminate = false;
+    *early = found && ((instance *)me)->now.time < from + length;
     *last_time = ((instance *)me)->now.time;
     return (fmi3Status)status;
 }
@@ -231,10 +239,11 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance me, const fmi3Byte bytes[], size
     return (fmi3Status)read_state(me, bytes, size, state);
 }
 
-/* Model exchange. */
+/* Model exchange and event mode. */
 fmi3Status fmi3EnterEventMode(fmi3Instance me)
 {
-    RETURN_UNLESS(me, EVENT | CONTINUOUS, "fmi3EnterEventMode");
+    const int steps = me != NULL && ((instance *)me)->now.purpose == CO_SIMULATION_WITH_EVENTS ? STEPPING : 0;
+    RETURN_UNLESS(me, EVENT | CONTINUOUS | steps, "fmi3EnterEventMode");
     enter_event_mode(me);
     return fmi3OK;
 }
@@ -255,10 +264,20 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance me, fmi3Boolean *again, fmi3Boo
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance me)
 {
     RETURN_UNLESS(me, EVENT, "fmi3EnterContinuousTimeMode");
-    if (!((instance *)me)->now.exchange) {
+    if (((instance *)me)->now.purpose != MODEL_EXCHANGE) {
         return unsupported(me, "fmi3EnterContinuousTimeMode");
     }
     ((instance *)me)->now.phase = CONTINUOUS;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance me)
+{
+    RETURN_UNLESS(me, EVENT, "fmi3EnterStepMode");
+    if (((instance *)me)->now.purpose != CO_SIMULATION_WITH_EVENTS) {
+        return unsupported(me, "fmi3EnterStepMode");
+    }
+    ((instance *)me)->now.phase = STEPPING;
     return fmi3OK;
 }
 
@@ -359,7 +378,6 @@ NO_TYPE(String)
 NO_FUNCTION(EnterConfigurationMode, (ME), )
 NO_FUNCTION(ExitConfigurationMode, (ME), )
 NO_FUNCTION(EvaluateDiscreteStates, (ME), )
-NO_FUNCTION(EnterStepMode, (ME), )
 NO_FUNCTION(GetBinary, (ME, REF, size_t n, size_t sizes[], fmi3Binary values[], size_t m),
             ((void)references, (void)n, (void)sizes, (void)values, (void)m))
 NO_FUNCTION(SetBinary, (ME, REF, size_t n, const size_t sizes[], const fmi3Binary values[], size_t m),

@@ -20,6 +20,8 @@
 enum { ALL_WELL = 0, WARNED = 1, DISCARDED = 2, REFUSED = 3 };
 /* Most samples in one step: eleven hours at 1 kHz, computed in seconds. */
 enum { MOST_SAMPLES = 40000000 };
+/* What an instance was made for; the last one in FMI 3.0 only. */
+enum { CO_SIMULATION = 0, MODEL_EXCHANGE = 1, CO_SIMULATION_WITH_EVENTS = 2 };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16, EVENT = 32, CONTINUOUS = 64 };
 
 /* Everything that a copy of the state holds; plain data. */
@@ -30,7 +32,7 @@ typedef struct {
     double last_time;
     int32_t has_last_time;
     int32_t phase;
-    int32_t exchange; /* made for model exchange, not for co-simulation */
+    int32_t purpose;
     int32_t arriving; /* has just entered the event mode */
     int32_t outdated; /* outputs and signals belong to other inputs */
     int32_t status;   /* status word of the last sample */
@@ -46,6 +48,7 @@ typedef struct {
 typedef struct instance {
     moment now;
     int solver_logged;
+    int may_return_early; /* at an event */
     char *name;
     void (*report)(const struct instance *me, int status, const char *category, const char *text);
 } instance;
@@ -87,10 +90,10 @@ static int known(const instance *me, uint32_t reference)
     return reference < MODEL_VALUES;
 }
 
-static void begin(instance *me, int exchange)
+static void begin(instance *me, int purpose)
 {
     memset(&me->now, 0, sizeof me->now);
-    me->now.exchange = exchange;
+    me->now.purpose = purpose;
     me->now.phase = INSTANTIATED;
     me->now.outdated = 1;
     for (uint32_t i = 0; i < MODEL_VALUES; ++i) {
@@ -151,7 +154,7 @@ static int judge(const instance *me, uint32_t r, double value)
     const variable *is = &model_variable[r];
     const int input = within(r, MODEL_U, MODEL_INPUTS), parameter = within(r, MODEL_P, MODEL_PARAMETERS);
     /* In model exchange some importers set the states by their value references. */
-    const int moved = me->now.exchange && within(r, MODEL_X, MODEL_STATES);
+    const int moved = me->now.purpose == MODEL_EXCHANGE && within(r, MODEL_X, MODEL_STATES);
     const int phases = input || moved || (parameter && !MODEL_CONTINUOUS)
                            ? INSTANTIATED | INITIALIZATION | STEPPING | EVENT | CONTINUOUS
                            : INSTANTIATED | INITIALIZATION;
@@ -241,7 +244,7 @@ static int leave_initialization(instance *me)
         return REFUSED;
     }
 #endif
-    me->now.phase = me->now.exchange ? EVENT : STEPPING;
+    me->now.phase = me->now.purpose == CO_SIMULATION ? STEPPING : EVENT;
     return ALL_WELL;
 }
 
@@ -253,15 +256,16 @@ static void count_time(instance *me, double length)
     me->now.elapsed = sum;
 }
 
+/* Advances by a length of time, or to the first event if the importer wants that; gives how far. */
 #if MODEL_CONTINUOUS
-static int advance(instance *me, double from, double length)
+static int advance(instance *me, double from, double length, double *reached, int *event)
 {
     double *v = me->now.value;
     const moment before = me->now;
     integrator_report done;
 #if MODEL_SWITCHES > 0
     const int found = integrate_switched(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M],
-                                         v[MODEL_EXTRA], 0, &me->now.memory, &done);
+                                         v[MODEL_EXTRA], me->may_return_early, &me->now.memory, &done);
 #else
     const int found = integrate(from, length, &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], v[MODEL_EXTRA],
                                 &me->now.memory, &done);
@@ -284,14 +288,16 @@ static int advance(instance *me, double from, double length)
         return say(me, REFUSED, "no step size gives the relative tolerance %.3g at time %.9g s (%d steps, %d rejected)",
                    v[MODEL_EXTRA], from + done.time, done.accepted, done.rejected);
     }
-    (void)say(me, ALL_WELL, "time %.9g s: %d steps, %d rejected", from + length, done.accepted, done.rejected);
+    (void)say(me, ALL_WELL, "time %.9g s: %d steps, %d rejected", from + done.time, done.accepted, done.rejected);
     me->now.outdated = 1;
-    count_time(me, length);
+    count_time(me, done.time);
+    *reached = done.time;
+    *event = done.stopped;
     return ALL_WELL;
 }
 #else
 /* Samples are counted, not timed: the one at the end belongs to the next step, whatever the rounding of the clock. */
-static int advance(instance *me, double from, double length)
+static int advance(instance *me, double from, double length, double *reached, int *event)
 {
     double *v = me->now.value;
     const moment before = me->now;
@@ -313,14 +319,19 @@ static int advance(instance *me, double from, double length)
         me->now.status = model_sample(&me->now.memory, &v[MODEL_U], &v[MODEL_X], &v[MODEL_Y], &v[MODEL_S]);
         ++me->now.samples;
     }
+    *reached = length;
+    *event = 0;
     return ALL_WELL;
 }
 #endif
 
-static int do_step(instance *me, double from, double length)
+/* Makes a step; event tells that it has ended at one. */
+static int do_step(instance *me, double from, double length, int *event)
 {
     const double to = from + length;
+    double reached = 0.0;
 
+    *event = 0;
     if (!(length > 0.0 && fabs(to) <= MODEL_LARGEST)) {
         return say(me, REFUSED, "a communication step of %.9g s is not possible", length);
     }
@@ -332,10 +343,10 @@ static int do_step(instance *me, double from, double length)
     if (me->now.has_last_time && to > me->now.last_time + allowance) {
         return say(me, REFUSED, "the step to %.9g s goes beyond the stop time %.9g s", to, me->now.last_time);
     }
-    if (advance(me, from, length) != ALL_WELL) {
+    if (advance(me, from, length, &reached, event) != ALL_WELL) {
         return REFUSED;
     }
-    me->now.time = me->now.value[0] = to;
+    me->now.time = me->now.value[0] = from + reached;
     return ALL_WELL;
 }
 
@@ -384,7 +395,7 @@ static void release(instance *me)
 }
 
 /* Gives a new instance in memory of the given size, or null. */
-static instance *establish(size_t size, const char *name, int exchange,
+static instance *establish(size_t size, const char *name, int purpose,
                            void (*report)(const instance *, int, const char *, const char *))
 {
     instance *me = calloc(1, size);
@@ -396,7 +407,7 @@ static instance *establish(size_t size, const char *name, int exchange,
             return NULL;
         }
         memcpy(me->name, name, strlen(name) + 1);
-        begin(me, exchange);
+        begin(me, purpose);
     }
     return me;
 }

@@ -37,6 +37,7 @@ typedef struct {
     double time; /* how far it came from the beginning of the step, s */
     int accepted;
     int rejected;
+    int stopped; /* at an event */
 } integrator_report;
 
 /* Factorises a in place with row exchanges; returns 0 if it is singular or not finite. */
@@ -151,7 +152,8 @@ static int integrate(double from, double length, double x[], const double u[], c
     double t = 0.0, step = memory->step > 0.0 ? memory->step : length;
     int fresh = 0, growing = 1;
 
-    report->accepted = report->rejected = 0;
+    report->time = 0.0;
+    report->accepted = report->rejected = report->stopped = 0;
     for (int i = 0; i < MODEL_STATES; ++i) {
         now[i] = x[i];
         memory->largest[i] = fmax(memory->largest[i], fmax(fabs(x[i]), 1e-6 * model_nominal[i]));

@@ -41,9 +41,9 @@ static int restore_state(instance *me, const void *copy)
     if (copy == NULL) {
         return say(me, REFUSED, "there is no copy to restore");
     }
-    if (((const moment *)copy)->exchange != me->now.exchange) {
-        return say(me, REFUSED, "this copy is that of an instance for %s",
-                   me->now.exchange ? "co-simulation" : "model exchange");
+    if (((const moment *)copy)->purpose != me->now.purpose) {
+        return say(me, REFUSED, "this copy is that of an instance for another purpose: model exchange, or "
+                                "co-simulation with or without event mode");
     }
     memcpy(&me->now, copy, sizeof me->now);
     return ALL_WELL;
@@ -82,9 +82,9 @@ static int read_state(const instance *me, const unsigned char bytes[], size_t si
     if (all.check != check_sum(bytes, offsetof(written_state, check))) {
         return say(me, REFUSED, "these bytes are not a state of this model: they are damaged, the check sum differs");
     }
-    if (all.state.exchange != me->now.exchange) {
-        return say(me, REFUSED, "these bytes are the state of an instance for %s",
-                   me->now.exchange ? "co-simulation" : "model exchange");
+    if (all.state.purpose != me->now.purpose) {
+        return say(me, REFUSED, "these bytes are the state of an instance for another purpose: model exchange, or "
+                                "co-simulation with or without event mode");
     }
     if (copy_state(me, copy) != ALL_WELL) {
         return REFUSED;

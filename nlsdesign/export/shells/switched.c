@@ -111,7 +111,8 @@ static int integrate_switched(double from, double length, double x[], const doub
     double recent[MOST_EVENTS] = {0.0}, t = 0.0, step = memory->step > 0.0 ? memory->step : length;
     int events = 0, growing = 1, which = 0;
 
-    report->accepted = report->rejected = 0;
+    report->time = 0.0;
+    report->accepted = report->rejected = report->stopped = 0;
     for (int i = 0; i < MODEL_STATES; ++i) {
         one.now[i] = x[i];
         memory->largest[i] = fmax(memory->largest[i], fmax(fabs(x[i]), 1e-6 * model_nominal[i]));
@@ -164,7 +165,8 @@ static int integrate_switched(double from, double length, double x[], const doub
         growing = 1;
         ++report->accepted;
         one.at.t = from + t;
-        if (ended && stop) {
+        if (ended && stop) { /* its modes change in the event mode */
+            report->stopped = 1;
             break;
         }
         if (settle(&one.at, one.now, m, 0, &which) != SETTLED) {
