@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import casadi as ca
 import fmpy
@@ -11,10 +12,21 @@ import numpy as np
 import pytest
 
 from models import cam_rubber_actuator
+from nlsdesign.components import (
+    ROTATION,
+    CoulombFriction,
+    Element,
+    Inertia,
+    RigidStop,
+    Spring,
+    StribeckFriction,
+    tie,
+)
+from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.export import export_fmu
 from nlsdesign.model import FlatModel, flatten
-from nlsdesign.simulation import simulate
+from nlsdesign.simulation import Trace, simulate
 from tests.hand_built import plant
 
 VERSIONS = ("2.0", "3.0")
@@ -97,3 +109,138 @@ def test_casadi_imports_the_plant_and_its_jacobian_is_that_of_central_difference
         # Central differences are good to the square of the share that the step is.
         np.testing.assert_allclose(found[:, column], slope, rtol=1e-7, atol=1e-7 * np.abs(slope).max())
     assert math.isfinite(found.sum())
+
+
+# --- sharp models ---------------------------------------------------------------------------------
+
+J, K, T, PULL = 1e-3, 2.0, 0.05, 0.021
+
+
+class Case(NamedTuple):
+    """A sharp model with what it starts from, and what is held all the time."""
+
+    model: FlatModel
+    start: dict[str, float]
+    held: dict[str, float]
+    rate: str
+    rests: bool
+
+
+def rubbing(friction: Element) -> FlatModel:
+    spring = tie(Spring(stiffness=K, domain=ROTATION), "wheel")
+    return flatten(assembly("rubbing", wheel=Inertia(inertia=J), rub=tie(friction, "wheel"), spring=spring))
+
+
+def bouncing() -> FlatModel:
+    stop = RigidStop(lower=0.0, upper=1.0, restitution=0.6, resting_speed=1e-3)
+    return flatten(assembly("stopped", wheel=Inertia(inertia=J), stop=tie(stop, "wheel")))
+
+
+def clutch() -> FlatModel:
+    rub = tie(CoulombFriction(sliding_effort=T), "driver", "driven")
+    return flatten(assembly("clutch", driver=Inertia(inertia=2 * J), driven=Inertia(inertia=5 * J), rub=rub))
+
+
+STRIBECK = StribeckFriction(sliding_effort=0.03, breakaway=0.04, stribeck_speed=0.5)
+SHARP = {
+    "coulomb": lambda: Case(
+        rubbing(CoulombFriction(sliding_effort=T)), {"wheel.angle": 0.33}, {}, "wheel.speed", True
+    ),
+    "stribeck": lambda: Case(rubbing(STRIBECK), {"wheel.angle": 0.33}, {}, "wheel.speed", True),
+    "bouncing": lambda: Case(bouncing(), {"wheel.angle": 0.5}, {"wheel.torque": -0.02}, "wheel.speed", True),
+    "clutch": lambda: Case(clutch(), {"driver.speed": 2.0}, {"driver.torque": PULL}, "driver.speed", False),
+}
+TIMES = np.linspace(0.0, 1.0, 101)
+each_sharp = pytest.mark.parametrize("name", SHARP)
+
+
+@pytest.fixture(scope="module")
+def sharp(tmp_path_factory) -> dict[tuple[str, str], Path]:
+    """FMU of each sharp case and version."""
+    folder = tmp_path_factory.mktemp("sharp")
+    return {
+        (name, version): export_fmu(made().model, folder / f"{name}{version}.fmu", version=version)
+        for name, made in SHARP.items()
+        for version in VERSIONS
+    }
+
+
+def after_last_event(run: Trace) -> np.ndarray:
+    return run.time > run.events[-1].time + 1e-3
+
+
+@both
+@each_sharp
+def test_a_foreign_integrator_finds_the_events_of_a_sharp_model(name, version, sharp):
+    """States as for smooth models; events one after another, so each passes on the errors of those before."""
+    case = SHARP[name]()
+    own = simulate(case.model, TIMES, start=case.start, inputs=case.held, tolerance=1e-11)
+    assert len(own.events) >= 1
+    shown = [v.name for v in (*case.model.states, *case.model.outputs)]
+    worst = []
+    for tolerance in (1e-7, 1e-9):
+        run = exchanged(sharp[name, version], TIMES, shown, tolerance, start_values=case.start | case.held)
+        states = [v.name for v in case.model.states]
+        worst.append(max(np.abs(run[n] - own[n]).max() / np.abs(own[n]).max() for n in states))
+        assert worst[-1] < 1e3 * tolerance
+        rest = after_last_event(own)
+        if case.rests:
+            assert np.all(run[case.rate][rest] == 0.0)
+        for n in (v.name for v in case.model.outputs):
+            # What holds is seen where it sticks, also when the rate that is held is one between two bodies.
+            assert run[n][rest] == pytest.approx(own[n][rest], rel=1e4 * tolerance, abs=1e-12)
+            assert np.all(np.abs(run[n][rest]) > 1e-3)
+    assert worst[1] < worst[0]
+
+
+@both
+@each_sharp
+def test_co_simulation_of_a_sharp_model_locates_its_own_events(name, version, sharp):
+    """An L-stable method of order four with its tolerance per step, over some hundred steps."""
+    case = SHARP[name]()
+    own = simulate(case.model, TIMES, start=case.start, inputs=case.held, tolerance=1e-11)
+    shown = [v.name for v in case.model.states] + [v.name for v in case.model.outputs]
+    for interval in (0.01, 0.25):
+        times = np.arange(round(1.0 / interval) + 1) * interval
+        places = np.searchsorted(TIMES, times - 1e-9)
+        run = fmpy.simulate_fmu(
+            str(sharp[name, version]), fmi_type="CoSimulation", stop_time=1.0, output_interval=interval,
+            start_values=case.start | case.held, relative_tolerance=1e-9, output=shown,
+        )  # fmt: skip
+        for n in shown:
+            assert np.abs(run[n] - own[n][places]).max() < 1e-6 * np.abs(own[n]).max(), n
+        if case.rests:
+            assert run[case.rate][-1] == 0.0
+
+
+@each_sharp
+def test_event_mode_and_early_return_stop_at_the_events(name, sharp):
+    case = SHARP[name]()
+    own = simulate(case.model, TIMES, start=case.start, inputs=case.held, tolerance=1e-11)
+    run = fmpy.simulate_fmu(
+        str(sharp[name, "3.0"]), fmi_type="CoSimulation", stop_time=1.0, output_interval=0.01,
+        start_values=case.start | case.held, relative_tolerance=1e-10, output=[case.rate],
+        use_event_mode=True, early_return_allowed=True,
+    )  # fmt: skip
+    off_grid = [t for t in run["time"].tolist() if abs(100 * t - round(100 * t)) > 1e-6]
+    events = [e.time for e in own.events if abs(100 * e.time - round(100 * e.time)) > 1e-6]
+    # Before and after each event.
+    assert off_grid == pytest.approx([t for t in events for _ in range(2)], abs=1e-8)
+    assert len(events) >= 1
+
+
+def test_two_bodies_that_stick_keep_their_momentum(sharp):
+    """A torque of 0.021 N·m for 1 s and 2 rad/s of the driver; both bodies are as one after they meet."""
+    run = exchanged(
+        sharp["clutch", "3.0"], TIMES, ["driver.speed", "driven.speed", "rub.torque"], 1e-9,
+        start_values={"driver.speed": 2.0, "driver.torque": PULL},
+    )  # fmt: skip
+    # Relative deceleration T/(2 J) + T/(5 J) − 0.021/(2 J).
+    meet = 2.0 / (T / (2 * J) + T / (5 * J) - PULL / (2 * J))
+    stuck = meet + 1e-3 < TIMES
+    assert 0.05 < meet < 0.5
+    assert np.all(np.abs(run["driver.speed"] - run["driven.speed"])[stuck] < 1e-14)
+    assert run["driven.speed"][stuck] == pytest.approx(
+        (2 * J * 2.0 + PULL * TIMES[stuck]) / (7 * J), rel=1e-7
+    )
+    assert run["rub.torque"][stuck] == pytest.approx(np.full(stuck.sum(), PULL * 5 / 7), rel=1e-12)

@@ -44,7 +44,10 @@ def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
                 f"model '{model.name}'", "is continuous and has tables", next_step="write them as laws"
             )
         body = _continuous(layout)
-        texts |= {name: shell(name) for name in ("integrator.c", *(("events.c", "switched.c") if layout.modes else ()))}
+        texts |= {
+            name: shell(name)
+            for name in ("integrator.c", *(("events.c", "switched.c") if layout.modes else ()))
+        }
     else:
         check_discrete(model)
         name = identifier(model.name)

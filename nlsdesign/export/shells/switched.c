@@ -81,7 +81,7 @@ static double next_share(double a, double fa, double b, double fb, double c, dou
 static double locate(trial *one, double length, double finest)
 {
     /* At length zero a mode may just have changed, so the indicator is not asked there. */
-    double a = length, fa = lasts(one, length), b = 0.0, fb = INFINITY, share = 0.5, last = length;
+    double a = length, fa = lasts(one, length), b = 0.0, fb = (double)INFINITY, share = 0.5, last = length;
 
     while (fabs(b - a) > finest) {
         const double least_share = 0.5 * finest / fabs(b - a);
