@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
+<<<<<<< HEAD
 from .event_variables import indicator_variables, mode_variables
+=======
+from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
+>>>>>>> main
 
 RELATIVE_TOLERANCE = 1e-8
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
@@ -169,10 +173,10 @@ def _extra(model: FlatModel, reference: int) -> FmuVariable:
 
 
 def _status(reference: int) -> FmuVariable:
-    text = (
-        "Status word of the last sample: bit 0 input held, 1 input saturated, 2 state held, 3 output held; "
-        "bit 8 + i: input i"
+    bits = ", ".join(
+        f"{bit.bit_length() - 1} {flag.lower().replace('_', ' ')}" for flag, (bit, _) in STATUS_BITS.items()
     )
+    text = f"Status word of the last sample: bit {bits}; bit {FIRST_INDEX_BIT} + i: input i"
     status = Variable("sample.status", "1", text)
     return FmuVariable(reference, status, "local", "discrete", "calculated", integer=True)
 
