@@ -17,11 +17,8 @@ from numpy.typing import NDArray
 
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
-<<<<<<< HEAD
-from .event_variables import indicator_variables, mode_variables
-=======
 from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
->>>>>>> main
+from .event_variables import indicator_variables, mode_variables
 
 RELATIVE_TOLERANCE = 1e-8
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
