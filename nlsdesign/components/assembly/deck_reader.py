@@ -7,11 +7,12 @@ import functools
 import importlib
 import inspect
 import pkgutil
+import re
 from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
-from ...deck import NUMBER_FIELDS, Deck
+from ...deck import NUMBER_FIELDS, Deck, ParentDeck
 from ...errors import DeckError, NlsError, nearest, unknown_name
 from ...quantity import Quantity
 from ..core.domain import Domain
@@ -24,6 +25,8 @@ from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
 from .renamed import NUMBERS, renamed
+
+_PARENT_FIELDS = ("name", "digest", "change", "parent")
 
 
 @functools.cache
@@ -230,14 +233,37 @@ class Builder:
         table = self.deck.tables[name]
         return self.classes.get(str(table.get("component"))) if isinstance(table, dict) else None
 
-    def head(self) -> None:
-        """Check the table ``[deck]``."""
+    def head(self) -> ParentDeck | None:
+        """Check the table ``[deck]``, and return the deck that this one was made from."""
         for key, raw in self.deck.head.items():
-            if key not in ("name", "description"):
-                valid = ("name", "description")
+            if key not in ("name", "description", "parent"):
+                valid = ("name", "description", "parent")
                 self._problem(f"deck.{key}", "is not a field of [deck]", did_you_mean=nearest(key, valid))
-            elif not isinstance(raw, str):
+            elif key != "parent" and not isinstance(raw, str):
                 self._problem(f"deck.{key}", f"is {raw!r}, not a text")
+        return self._parent("deck.parent", self.deck.head.get("parent"))
+
+    def _parent(self, path: str, raw: object) -> ParentDeck | None:
+        if raw is None:
+            return None
+        before = len(self.problems)
+        if not isinstance(raw, dict):
+            self._problem(path, f"is {raw!r}, not a deck", next_step='write {name = "...", digest = "..."}')
+            return None
+        for key in raw:
+            if key not in _PARENT_FIELDS:
+                rule = f"is not a field of {path}"
+                self._problem(f"{path}.{key}", rule, did_you_mean=nearest(key, _PARENT_FIELDS))
+        texts = {key: raw.get(key, "") for key in ("name", "digest", "change")}
+        for key, text in texts.items():
+            if not isinstance(text, str) or not (text or key == "change"):
+                self._problem(f"{path}.{key}", f"is {text!r}, not a text" if key in raw else "is missing")
+        digest = texts["digest"]
+        if isinstance(digest, str) and digest and not re.fullmatch("[0-9a-f]{64}", digest):
+            step = "copy it from `nlsdesign deck check`, or leave the parent out"
+            self._problem(f"{path}.digest", f"'{digest}' is no SHA-256 of 64 digits", next_step=step)
+        earlier = self._parent(f"{path}.parent", raw.get("parent"))
+        return ParentDeck(**texts, parent=earlier) if len(self.problems) == before else None
 
     def _kind(self, path: str, table: Mapping[str, Any]) -> type[Part] | None:
         name = table.get("component")

@@ -161,7 +161,9 @@ def torque_controller(
     )  # fmt: skip
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
-    return writer.model("torque_controller", description, (output, motor.current))
+    return replace(
+        writer.model("torque_controller", description, (output, motor.current)), origin=plant.origin
+    )
 
 
 def _parts(

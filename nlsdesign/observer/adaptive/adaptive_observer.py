@@ -168,7 +168,8 @@ def design_adaptive_observer(
     noises = FilterNoise(noise, missed / points.inertia, missed, safe_inputs(model, prior))
     flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = AdaptiveDesign(replace(flat, bodies=observed), step, compact, directions, settings.duty, trust)
+    written = replace(flat, bodies=observed, origin=model.origin)
+    design = AdaptiveDesign(written, step, compact, directions, settings.duty, trust)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 

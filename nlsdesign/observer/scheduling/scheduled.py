@@ -133,7 +133,8 @@ def design_observer_with_details(
     step = ObserverStep(plant, fitted, sample_time, reference)
     compact = over.compact(step.entries)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = ObserverDesign(replace(_Writer(step, compact).model(), bodies=observed), step, compact)
+    written = replace(_Writer(step, compact).model(), bodies=observed, origin=model.origin)
+    design = ObserverDesign(written, step, compact)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 
