@@ -150,7 +150,7 @@ def test_other_numbers_have_the_digest_of_the_deck_that_they_would_make() -> Non
         "spring.cam.lever_arm[3]": 1.01 * arm.values[2],
     }
     changed = flatten(made).with_values(values)
-    assert origin(changed).changed == ("motor.inertia", "spring.rubber.area", "spring.cam.lever_arm")
+    assert set(origin(changed).changed) == {"motor.inertia", "spring.rubber.area", "spring.cam.lever_arm"}
     assert origin(changed).digest == deck_digest(made.with_values(values)) != deck_digest(made)
     assert origin(changed).numbers["motor.inertia"].number == 7e-4
     observer = design_observer(changed, grid=FixedGrid(-1.5, 1.5, 33))

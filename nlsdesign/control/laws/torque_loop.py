@@ -141,7 +141,7 @@ def torque_controller(
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
     outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
     _check_bandwidths(outer, inner, sample_time)
-    drive, writer = KnownDrive(plant), LawWriter(sample_time)
+    drive, writer = KnownDrive(plant), LawWriter(sample_time, plant.origin)
     names = drive.names
     heard = Heard(
         writer.input(names.desired, "N*m", "torque that the spring should have"),
@@ -161,9 +161,7 @@ def torque_controller(
     )  # fmt: skip
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
-    return replace(
-        writer.model("torque_controller", description, (output, motor.current)), origin=plant.origin
-    )
+    return writer.model("torque_controller", description, (output, motor.current))
 
 
 def _parts(
