@@ -19,6 +19,7 @@ from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
 from .controller_step import step_body
 from .guarded_step import STATUS_BITS, first_outputs, index_bit
+from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
 from .structures import initialiser, member_paths, structure
@@ -91,7 +92,7 @@ def export_c(
         source.source: source_text(model, prefix, number),
         source.selftest: selftest_source(model, prefix, number),
     }
-    write_all(texts)
+    write_all({path: stamped(text) for path, text in texts.items()})
     return source
 
 
@@ -150,13 +151,17 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
     bits = [f"#define {upper}_{flag} 0x{bit:x}u /* {text} */" for flag, (bit, text) in STATUS_BITS.items()]
     sample_time = real.literal(float(model.sample_time or 0.0))
     values = {"name": name, "NAME": upper, "title": _title(model), "bits": bits, "sample_time": sample_time}
-    return filled("controller.h", values | _heads(name) | structures)
+    texts = values | _heads(name) | structures
+    texts |= {"provenance": origin_macros(model, name), "numbers": number_lines(model)}
+    text = filled("controller.h", texts | {"interface": "0u"})
+    return filled("controller.h", texts | {"interface": interface_version(text, model)})
 
 
 def _title(model: FlatModel) -> list[str]:
     return [
         f"/* {comment(model.name)}: {comment(model.description)}",
         f"   Sample time {model.sample_time!r} s; all numbers in SI units, given in brackets.",
+        *origin_lines(model),
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]
 
