@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from .controller import export_controller
+from .export_check import check_exports
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
@@ -18,6 +19,7 @@ def export() -> None:
 
 
 export.add_command(export_controller)
+export.add_command(check_exports)
 
 
 @export.command("c")

@@ -136,17 +136,24 @@ def test_every_file_ends_with_the_date_and_the_hash_of_the_rest(
         assert two.read_text("utf-8").rpartition("/* ")[0] == rest
 
 
+EMPTY = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
+"""SHA-256 of nothing, as in RFC 6234 and FIPS 180-4 test data."""
+
+
 def paths(source: CSource) -> tuple[Path, ...]:
     return source.header, source.source, source.selftest
 
 
 def test_an_edited_file_no_longer_has_its_hash() -> None:
-    text = stamped("int x = 1;\n")
-    stated, found = stamp_of(text)
-    assert stated == found == hashlib.sha256(b"int x = 1;\n").hexdigest()
-    stated, found = stamp_of(text.replace("= 1", "= 2"))
-    assert stated != found
-    assert stamp_of("int x = 1;\n") == ("", "")
+    text = stamped("int x = 1;\n", hand_built_observer())
+    digest = hashlib.sha256(b"int x = 1;\n").hexdigest()
+    assert stamp_of(text) == ("", digest, digest)
+    edited = stamp_of(text.replace("= 1", "= 2"))
+    assert edited is not None
+    assert edited.stated == digest != edited.found
+    assert stamp_of("int x = 1;\n") is None
+    model = torque_controller(flatten(declare(load_deck(DECKS[0]))))
+    assert stamp_of(stamped("", model)) == (deck_digest(declare(load_deck(DECKS[0])))[:12], *2 * [EMPTY])
 
 
 @pytest.mark.parametrize("given", ["yesterday", "1e400", "99999999999999999999", "1.5"])

@@ -92,7 +92,7 @@ def export_c(
         source.source: source_text(model, prefix, number),
         source.selftest: selftest_source(model, prefix, number),
     }
-    write_all({path: stamped(text) for path, text in texts.items()})
+    write_all({path: stamped(text, model) for path, text in texts.items()})
     return source
 
 

@@ -8,6 +8,7 @@ import re
 import zlib
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from typing import NamedTuple
 
 from ...errors import ExportError
 from ...locations import version
@@ -23,7 +24,10 @@ _LONGEST_ROW = 6
 """Numbers of a row that are shown; of a longer row the first three and the last."""
 
 _STAMP = "SHA-256 of all above this comment:"
-_STAMPED = re.compile(rf"/\* [^\n]*{re.escape(_STAMP)}\n   ([0-9a-f]{{64}}) \*/\n*\Z")
+_STAMPED = re.compile(
+    rf"/\* Exported [^\n]*; (?:no deck|deck ([0-9a-f]{{12}}))\. {re.escape(_STAMP)}\n"
+    r"   ([0-9a-f]{64}) \*/\n*\Z"
+)
 _DATE_VARIABLE = "SOURCE_DATE_EPOCH"
 
 
@@ -52,31 +56,47 @@ def export_date() -> datetime:
         ) from None  # fmt: skip
 
 
-def stamped(text: str) -> str:
-    """Return a generated file with a last comment: version, date and a digest of what is above.
+def stamped(text: str, model: FlatModel) -> str:
+    """Return a generated file with a last comment: version, date, deck, and a digest of what is above.
 
     Parameters
     ----------
     text
         The file.
+    model
+        That it is generated from.
     """
+    deck = f"deck {model.origin.digest[:SHORT]}" if model.origin else "no deck"
     digest = hashlib.sha256(text.encode()).hexdigest()
     date = f"{export_date():%Y-%m-%d %H:%M} UTC"
-    return f"{text}/* Exported by nlsdesign {version()} on {date}. {_STAMP}\n   {digest} */\n"
+    return f"{text}/* Exported by nlsdesign {version()} on {date}; {deck}. {_STAMP}\n   {digest} */\n"
 
 
-def stamp_of(text: str) -> tuple[str, str]:
-    r"""Return the digest that stands in the last comment of a file, and that of what is above it.
+class Stamp(NamedTuple):
+    """Last comment of a generated file: first digits of its deck, digest of the text, and what it is now."""
+
+    deck: str
+    stated: str
+    found: str
+
+
+def stamp_of(text: str) -> Stamp | None:
+    r"""Return what the last comment of a file says, and the digest of what is above it.
 
     Parameters
     ----------
     text
-        A file with line ends as ``\n``; without such a comment both are empty.
+        A file with line ends as ``\n``.
+
+    Returns
+    -------
+    Stamp
+        ``None`` where the file has no such comment.
     """
     found = _STAMPED.search(text)
     if found is None:
-        return "", ""
-    return found[1], hashlib.sha256(text[: found.start()].encode()).hexdigest()
+        return None
+    return Stamp(found[1] or "", found[2], hashlib.sha256(text[: found.start()].encode()).hexdigest())
 
 
 def origin_lines(model: FlatModel) -> list[str]:
