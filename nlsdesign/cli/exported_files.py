@@ -82,7 +82,7 @@ def exported_files(folder: Path) -> tuple[list[ExportedFile], list[ExportError]]
     ExportError
         If there is no such folder, or it cannot be listed.
     """
-    found: list[ExportedFile] = []
+    files: list[ExportedFile] = []
     problems: list[ExportError] = []
     for path in _paths(folder):
         try:
@@ -90,8 +90,8 @@ def exported_files(folder: Path) -> tuple[list[ExportedFile], list[ExportError]]
         except ExportError as error:
             problems.append(error)
         else:
-            found += [each] if each else []
-    return found, problems
+            files += [each] if each else []
+    return files, problems
 
 
 def _paths(folder: Path) -> Iterator[Path]:
@@ -127,10 +127,10 @@ def exported_file(path: Path) -> ExportedFile | None:
         If it cannot be read, is damaged, or is larger than any export.
     """
     try:
-        found = path.lstat()
-        if not stat.S_ISREG(found.st_mode):
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode):
             return None
-        return _READERS[path.suffix.lower()](path, found.st_size)
+        return _READERS[path.suffix.lower()](path, status.st_size)
     except OSError as error:
         raise ExportError(str(path), f"cannot be read: {error.strerror or error}") from None
     except RecursionError:
@@ -155,18 +155,18 @@ def _c_file(path: Path, size: int) -> ExportedFile | None:
     edited = ""
     if stamp is None:
         edited = "its last comment, with the SHA-256 of the text, is missing"
-    elif stamp.stated != stamp.found:
+    elif stamp.stated != stamp.actual:
         edited = "its text is not the one that was written"
-    said = {each for each in (line and line[2], whole[:SHORT], stamp and stamp.deck) if each}
-    if len(said) > 1:
-        edited = edited or f"it names {len(said)} decks: {', '.join(sorted(said))}"
+    decks = {each for each in (line and line[2], whole[:SHORT], stamp and stamp.deck) if each}
+    if len(decks) > 1:
+        edited = edited or f"it names {len(decks)} decks: {', '.join(sorted(decks))}"
     digest = whole or (line[2] if line else "") or (stamp.deck if stamp else "")
     return ExportedFile(path, "C", line[1] if line else "", digest, _macro(text, "PARENT_DIGEST"), edited)
 
 
 def _macro(text: str, ending: str) -> str:
-    found = re.search(rf'^#define \w+_{ending} "([0-9a-f]{{64}})"$', text, re.MULTILINE)
-    return found[1] if found else ""
+    match = re.search(rf'^#define \w+_{ending} "([0-9a-f]{{64}})"$', text, re.MULTILINE)
+    return match[1] if match else ""
 
 
 def _fmu(path: Path, size: int) -> ExportedFile | None:
@@ -234,9 +234,9 @@ def _is_deck(raw: object) -> bool:
     return raw.setdefault("parent", None) is None or _is_deck(raw["parent"])
 
 
-def _difference(stated: dict[str, str], found: dict[str, str]) -> str:
-    changed = [name for name in stated if name in found and stated[name] != found[name]]
-    missing, added = sorted(stated.keys() - found.keys()), sorted(found.keys() - stated.keys())
+def _difference(stated: dict[str, str], actual: dict[str, str]) -> str:
+    changed = [name for name in stated if name in actual and stated[name] != actual[name]]
+    missing, added = sorted(stated.keys() - actual.keys()), sorted(actual.keys() - stated.keys())
     parts = {"changed": changed, "missing": missing, "added": added}
     return "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names)
 

@@ -150,7 +150,7 @@ def test_an_edited_file_no_longer_has_its_hash() -> None:
     assert stamp_of(text) == ("", digest, digest)
     edited = stamp_of(text.replace("= 1", "= 2"))
     assert edited is not None
-    assert edited.stated == digest != edited.found
+    assert edited.stated == digest != edited.actual
     assert stamp_of("int x = 1;\n") is None
     model = torque_controller(flatten(declare(load_deck(DECKS[0]))))
     assert stamp_of(stamped("", model)) == (deck_digest(declare(load_deck(DECKS[0])))[:12], *2 * [EMPTY])

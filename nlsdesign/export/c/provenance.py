@@ -77,7 +77,7 @@ class Stamp(NamedTuple):
 
     deck: str
     stated: str
-    found: str
+    actual: str
 
 
 def stamp_of(text: str) -> Stamp | None:
@@ -93,10 +93,10 @@ def stamp_of(text: str) -> Stamp | None:
     Stamp
         ``None`` where the file has no such comment.
     """
-    found = _STAMPED.search(text)
-    if found is None:
+    match = _STAMPED.search(text)
+    if match is None:
         return None
-    return Stamp(found[1] or "", found[2], hashlib.sha256(text[: found.start()].encode()).hexdigest())
+    return Stamp(match[1] or "", match[2], hashlib.sha256(text[: match.start()].encode()).hexdigest())
 
 
 def origin_lines(model: FlatModel) -> list[str]:
