@@ -24,6 +24,7 @@ from ..deck import read_deck
 from ..errors import ExportError, NlsError
 from ..export.c.provenance import SHORT, stamp_of
 from ..export.fmi.fmu_origin import ORIGIN_FILE, ORIGIN_FORMAT
+from ..model.derived_deck import digits_in_name
 
 MEGABYTE = 1 << 20
 LARGEST_TEXT, LARGEST_ARCHIVE = 32 * MEGABYTE, 512 * MEGABYTE
@@ -32,7 +33,6 @@ _MOST_FILES = 10_000
 _GENERATED = re.compile(r"^   Written by nlsdesign \S+ with CasADi ", re.MULTILINE)
 _DECK_LINE = re.compile(r"^   Deck (.*), ([0-9a-f]{12}) \(SHA-256 of its parts\)\.$", re.MULTILINE)
 _DIGEST = re.compile("[0-9a-f]{64}")
-_NAMED = re.compile(r"_[a-z]+_([0-9a-f]{8})")
 
 
 @dataclass(frozen=True)
@@ -250,9 +250,9 @@ def _deck(path: Path, size: int) -> ExportedFile | None:
     except (NlsError, tomllib.TOMLDecodeError) as error:
         raise ExportError(str(path), f"cannot be read as a deck: {error}") from None
     digest = deck_digest(assembly)
-    stated, edited = _NAMED.search(assembly.name[-18:]), ""
-    if stated and assembly.parent and not digest.startswith(stated[1]):
-        edited = f"its name says {stated[1]}, its parts have {digest[:8]}"
+    stated, edited = digits_in_name(assembly), ""
+    if not digest.startswith(stated):
+        edited = f"its name says {stated}, its parts have {digest[: len(stated)]}"
     parent = assembly.parent.digest if assembly.parent else ""
     return ExportedFile(path, "deck", assembly.name, digest, parent, edited)
 

@@ -96,8 +96,8 @@ def test_parents_are_named_the_latest_first() -> None:
     header = header_text(torque_controller(flatten(made)), "law", DOUBLE)
     assert macro(header, "PARENT_DIGEST") == "b" * 64
     first = header.index("Deck better, ")
-    second = header.index(f"diagnosed from bench, {'b' * 12}.")
-    third = header.index(f"made from paper, {'a' * 12}.")
+    second = header.index(f"From bench, {'b' * 12} (diagnosed).")
+    third = header.index(f"From paper, {'a' * 12}.")
     assert first < second < third
 
 

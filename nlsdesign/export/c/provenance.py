@@ -112,8 +112,8 @@ def origin_lines(model: FlatModel) -> list[str]:
         return ["   Made without a deck."]
     lines = [f"   Deck {comment(origin.deck)}, {origin.digest[:SHORT]} (SHA-256 of its parts)."]
     for parent in origin.parent.line() if origin.parent else ():
-        made = comment(parent.change) or "made"
-        lines.append(f"   It was {made} from {comment(parent.name)}, {parent.digest[:SHORT]}.")
+        how = comment(parent.change)
+        lines.append(f"   From {comment(parent.name)}, {parent.digest[:SHORT]}{how and f' ({how})'}.")
     if origin.changed:
         names = ", ".join(origin.changed[:4]) + ", ..." * (len(origin.changed) > 4)
         lines.append(f"   Not as in the deck that was read: {comment(names)}.")
