@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .controller import controller_of, export_controller, law_options
+from .export_check import check_exports
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
@@ -25,6 +26,7 @@ def export() -> None:
 
 
 export.add_command(export_controller)
+export.add_command(check_exports)
 
 
 @export.command("c")

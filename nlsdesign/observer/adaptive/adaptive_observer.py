@@ -169,8 +169,9 @@ def design_adaptive_observer(
     noises = FilterNoise(noise, missed / points.inertia, missed, safe_inputs(model, prior))
     flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    flat = with_plausible_inputs(replace(flat, bodies=observed), model, plant, compact.angles)
-    design = AdaptiveDesign(flat, step, compact, directions, settings.duty, trust)
+    written = replace(flat, bodies=observed, origin=model.origin)
+    written = with_plausible_inputs(written, model, plant, compact.angles)
+    design = AdaptiveDesign(written, step, compact, directions, settings.duty, trust)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 

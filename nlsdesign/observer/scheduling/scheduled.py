@@ -135,8 +135,9 @@ def design_observer_with_details(
     step = ObserverStep(plant, fitted, sample_time, reference)
     compact = over.compact(step.entries)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    written = replace(_Writer(step, compact).model(), bodies=observed)
-    design = ObserverDesign(with_plausible_inputs(written, model, plant, compact.angles), step, compact)
+    written = replace(_Writer(step, compact).model(), bodies=observed, origin=model.origin)
+    written = with_plausible_inputs(written, model, plant, compact.angles)
+    design = ObserverDesign(written, step, compact)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 
