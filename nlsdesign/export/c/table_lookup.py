@@ -170,7 +170,7 @@ def _index(each: IndexedTable, real: Real, argument: str) -> list[str]:
 
 
 def _searched(each: IndexedTable, real: Real, argument: str) -> list[str]:
-    """Return the statements that find the cell among breakpoints: the same few halvings for every argument."""
+    """Return the statements that find the cell among breakpoints, by the same halvings for every argument."""
     k, cells = each.number, each.table.values.shape[0] - 1
     b = f"breakpoints_{k}"
     lines = [
