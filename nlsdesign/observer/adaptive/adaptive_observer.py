@@ -34,7 +34,7 @@ from ..scheduling.forms import finished, minimal_form
 from ..scheduling.gains import CascadeGain
 from ..scheduling.scheduled import MEMORY, check_sampling, whole_contour
 from ..scheduling.step import ObserverStep
-from ..scheduling.table import Compact, Grid
+from ..scheduling.table import Compact, Draft, Grid
 from .adaptive_settings import AdaptiveSettings, Trust
 from .adaptive_step import AdaptiveStep, adaptive_step
 from .adaptive_variables import FOLLOWED, filter_model
@@ -163,12 +163,16 @@ def design_adaptive_observer(
     step = adaptive_step(
         form, ObserverStep(plant, CascadeGain(), sample_time, reference), directions, form.model.values
     )
-    compact = over.compact(step.entries)
     missed = math.hypot(resolution, directions.left_out)
     noises = FilterNoise(noise, missed / points.inertia, missed, safe_inputs(model, prior))
-    flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = AdaptiveDesign(replace(flat, bodies=observed), step, compact, directions, settings.duty, trust)
+
+    def written(compact: Compact) -> AdaptiveDesign:
+        flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
+        learning = replace(flat, bodies=observed)
+        return AdaptiveDesign(learning, step, compact, directions, settings.duty, trust)
+
+    design = written(over.compact(step.entries, Draft(plant, written)))
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 

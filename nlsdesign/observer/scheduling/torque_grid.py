@@ -1,0 +1,191 @@
+"""A table as small as a stated error of the estimated torque allows, and no larger than a stated size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ConvergenceError, ValueRangeError
+from .breakpoints import FineEntries
+from .table import Compact, Draft, Entries, Grid, check_range
+from .table_trial import TableTrial
+
+Array = NDArray[np.float64]
+
+TORQUE_SHARE = 2e-4
+"""Torque error that a table may cause where none is stated, as a share of the full scale."""
+MOST_SHARE = 0.02
+"""Torque error up to which a table is made coarser to meet a size where no error is stated."""
+RESOLUTION = 0.1e-3
+"""Width in rad to which jumps are narrowed down: an eighth of a count of a 13 bit encoder."""
+OTHERS = 2e-3
+"""Share of its size that any sum of the step may be off, as far as the size allows it."""
+PROBE = 1e-2
+"""Share of a sum by which all its entries may be off while its effect on the torque is measured."""
+STEPS = 7
+"""Halvings of the search for the largest error that keeps the budget, in the logarithm."""
+SEARCH_BYTES = 20
+"""Flash of one halving of the search among breakpoints, on an Arm Cortex-M."""
+
+
+@dataclass(frozen=True)
+class GridByTorqueError(Grid):
+    """The smallest table whose effect on the estimated torque keeps a bound, uniform or by breakpoints.
+
+    The effect is measured, not estimated: an observer with the table and one with the exact functions of the
+    angle watch the same motions over the whole range, and the largest difference of their torques counts.
+    How much the entries of one sum matter is measured in the same way, so that what hardly moves the torque
+    is tabulated coarsely. A jump of an entry over the angle becomes a ramp of the width ``resolution``.
+
+    Parameters
+    ----------
+    lower, upper
+        Range in rad; beyond it the ends are held.
+    torque_error
+        Bound in the unit of the estimate; by default 0.02 % of the largest torque in the range.
+    most_bytes
+        The table takes at most so much flash; it is made coarser, to an error of ``torque_error``, or of 2 %
+        of the largest torque where none is stated.
+    resolution
+        In rad; by default an eighth of a count of a 13 bit encoder.
+    bytes_per_number
+        Of the flash, 4 for ``float`` and 8 for ``double``.
+
+    Raises
+    ------
+    ValueRangeError
+        If the torque error or the number of bytes is not positive.
+    """
+
+    lower: float = -1.1
+    upper: float = 1.1
+    torque_error: float | None = None
+    most_bytes: int | None = None
+    resolution: float = RESOLUTION
+    bytes_per_number: int = 4
+
+    def __post_init__(self) -> None:
+        check_range(self.lower, self.upper)
+        for name, value in (("torque_error", self.torque_error), ("most_bytes", self.most_bytes)):
+            if value is not None and not 0.0 < value < np.inf:
+                raise ValueRangeError(f"{name} {value:g}", "must be positive")
+
+    def compact(self, entries: Entries, draft: Draft | None = None) -> Compact:
+        """Return the table; see :class:`Grid`.
+
+        Raises
+        ------
+        ValueRangeError
+            If there is no draft to measure the torque with.
+        ConvergenceError
+            If the bound cannot be kept, or not within the size: with what would be reached.
+        """
+        if draft is None:
+            raise ValueRangeError(
+                "grid by torque error", "needs the observer whose torque counts",
+                next_step="take GridByTolerance for entries alone",
+            )  # fmt: skip
+        fine = FineEntries.of(entries, self.lower, self.upper, self.resolution)
+        search = _Search(TableTrial(draft, fine), self.bytes_per_number)
+        scale, unit = search.trial.full_scale, draft.plant.estimate.unit
+        asked = TORQUE_SHARE * scale if self.torque_error is None else self.torque_error
+        table = search.within(asked)
+        if table is None:
+            finest = search.table(0.0)
+            raise ConvergenceError(
+                f"table of the observer with a torque error of {asked:.3g} {unit}",
+                f"cannot be met; the finest table has {finest.size(self.bytes_per_number)} bytes and errs by "
+                f"{_largest(finest):.3g} {unit}",
+                next_step="allow a larger torque error",
+            )
+        if self.most_bytes is None or table.size(self.bytes_per_number) <= self.most_bytes:
+            return table
+        return self._smaller(search, table, asked, unit)
+
+    def _smaller(self, search: _Search, table: Compact, asked: float, unit: str) -> Compact:
+        """Return a coarser table within the size, or refuse with what it would cost."""
+        each, most = self.bytes_per_number, self.most_bytes or 0
+        largest = MOST_SHARE * search.trial.full_scale if self.torque_error is None else self.torque_error
+        coarser = search.of_size(most) if self.torque_error is None else None
+        if coarser is not None and _largest(coarser) <= largest:
+            return coarser
+        least = table if self.torque_error is not None else search.within(largest) or table
+        cost = coarser if coarser is not None else search.of_size(most)
+        words = "no table is that small" if cost is None else f"it would cost {_largest(cost):.3g} {unit}"
+        raise ConvergenceError(
+            f"table of the observer in {most} bytes",
+            f"cannot be met: {words}, more than {largest:.3g} {unit}; the smallest that keeps this has "
+            f"{least.size(each)} bytes",
+            next_step=f"allow {least.size(each)} bytes for the table, or a larger torque error",
+        )
+
+
+class _Search:
+    """Tables by one number: the error that the sums may have together, in the unit of the estimate."""
+
+    def __init__(self, trial: TableTrial, bytes_per_number: int) -> None:
+        self.trial, self.fine, self.each = trial, trial.fine, bytes_per_number
+        self._rows = list(dict.fromkeys(e.row for e in self.fine.entries))
+        self._effects = {row: self._effect(row) for row in self._rows}
+
+    def _effect(self, row: str) -> float:
+        """Return the torque error when all entries of one sum are read with the error of the probe."""
+        mine = np.array([e.row == row for e in self.fine.entries])
+        allowed = np.where(mine, PROBE, np.inf) / self._weights
+        table = self.fine.placed(allowed).with_breakpoints()
+        read = self.fine.at(self.trial.angles)
+        from_table = self._read(table)
+        return self.trial.error_of(np.where(mine[:, None], from_table, read)).largest
+
+    def _read(self, table: Compact) -> Array:
+        from .breakpoints import read_from
+
+        return read_from(table.angles, table.values, dict(table.places), self.fine, self.trial.angles)
+
+    @property
+    def _weights(self) -> Array:
+        return np.array([e.weight if e.weight > 0.0 else 1.0 for e in self.fine.entries])
+
+    def table(self, error: float, *, others: float = OTHERS) -> Compact:
+        """Return the smaller table of a uniform grid and of breakpoints, for an error of the torque."""
+        shares = {
+            row: min(others, PROBE * error / (len(self._rows) * effect)) if effect > 0.0 else others
+            for row, effect in self._effects.items()
+        }
+        allowed = np.array([shares[e.row] for e in self.fine.entries]) / self._weights
+        placed = self.fine.placed(allowed)
+        uneven, even = placed.with_breakpoints(), placed.uniform()
+        search = SEARCH_BYTES * int(np.ceil(np.log2(max(len(uneven.angles) - 1, 1))))
+        larger = even is None or even.size(self.each) > uneven.size(self.each) + search
+        table = uneven if larger or even is None else even
+        return replace(table, torque_error=self.trial.error(table))
+
+    def within(self, error: float) -> Compact | None:
+        """Return the coarsest table found whose torque error is at most a number."""
+        kept, low, high = None, 1e-3, 30.0
+        for _ in range(STEPS):
+            middle = float(np.sqrt(low * high))
+            table = self.table(middle * error)
+            if _largest(table) <= error:
+                kept, low = table, middle
+            else:
+                high = middle
+        return kept
+
+    def of_size(self, most: int) -> Compact | None:
+        """Return the finest table found that takes at most so many bytes."""
+        kept, low, high = None, 1e-4 * self.trial.full_scale, 3.0 * self.trial.full_scale
+        for _ in range(2 * STEPS):
+            middle = float(np.sqrt(low * high))
+            table = self.table(middle, others=max(OTHERS, 10.0 * middle / self.trial.full_scale))
+            if table.size(self.each) <= most:
+                kept, high = table, middle
+            else:
+                low = middle
+        return kept
+
+
+def _largest(table: Compact) -> float:
+    return table.torque_error.largest if table.torque_error is not None else np.inf
