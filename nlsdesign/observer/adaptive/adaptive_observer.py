@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,7 @@ from .adaptive_variables import FOLLOWED, filter_model
 from .directions import UncertainDirections, uncertain_directions
 from .duty import Duty, operating_points
 from .filter_equations import FilterEquations, FilterNoise
+from .held_observer import held_observer
 
 Array = NDArray[np.float64]
 
@@ -166,13 +168,9 @@ def design_adaptive_observer(
     missed = math.hypot(resolution, directions.left_out)
     noises = FilterNoise(noise, missed / points.inertia, missed, safe_inputs(model, prior))
     observed = tuple(body for body in model.bodies if body.motion == measured)
-
-    def written(compact: Compact) -> AdaptiveDesign:
-        flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
-        learning = replace(flat, bodies=observed)
-        return AdaptiveDesign(learning, step, compact, directions, settings.duty, trust)
-
-    design = written(over.compact(step.entries, Draft(plant, written)))
+    compact = over.compact(step.entries, Draft(plant, partial(held_observer, step)))
+    flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
+    design = AdaptiveDesign(replace(flat, bodies=observed), step, compact, directions, settings.duty, trust)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 

@@ -15,8 +15,8 @@ from .table import NOTHING, SHARE, ColumnPlace, Compact, Entries, Entry, place_o
 
 Array = NDArray[np.float64]
 
-FIRST_CELLS = 1024
-"""Cells in which kinks and jumps are looked for; a feature narrower than half a cell is not seen."""
+FIRST_CELLS = 256
+"""Cells in which kinks and jumps are looked for at first; a spike narrower than half a cell may be missed."""
 FINE_TOLERANCE = 2e-5
 """Share of a sum to which the fine grid follows the entries, so that it can stand for them."""
 STRAIGHT_CELLS = (8, 16, 32, 64, 128, 256, 512, 1024)
@@ -81,16 +81,6 @@ class FineEntries:
     def values(self) -> Array:
         """All entries, shape (entries, n)."""
         return np.array([e.values for e in self.entries])
-
-    def at(self, angles: Array) -> Array:
-        """Return all entries at other angles, held beyond the ends, shape (entries, N).
-
-        Parameters
-        ----------
-        angles
-            Shape (N,).
-        """
-        return np.array([np.interp(angles, self.angles, e.values) for e in self.entries])
 
     def placed(self, allowed: Array) -> PlacedEntries:
         """Return where entries are read if each may be off by so much: as literals, alone or shared.
@@ -166,14 +156,15 @@ class PlacedEntries:
         return None
 
     def _columns_at(self, angles: Array) -> Array:
-        if not self.columns:
-            return np.zeros((0, len(angles)))
-        return np.array([np.interp(angles, self.fine.angles, c.values) for c in self.columns])
+        values = np.array([c.values for c in self.columns]).reshape(-1, len(self.fine.angles))
+        return linearly(self.fine.angles, values.T, angles)
 
     def _kept_on(self, grid: Array) -> bool:
         factors, kept, exact, allowed = self._tabled
-        read = [np.interp(self.fine.angles, grid, row) for row in self._columns_at(grid)]
-        return not len(kept) or bool(np.all(np.abs(factors * np.array(read)[kept] - exact) <= allowed))
+        if not len(kept):
+            return True
+        read = linearly(grid, self._columns_at(grid).T, self.fine.angles)
+        return bool(np.all(np.abs(factors * read[kept] - exact) <= allowed))
 
     def _keeps(self, i: int, j: int) -> bool:
         factors, kept, exact, allowed = self._tabled
@@ -187,35 +178,34 @@ class PlacedEntries:
 
     def _compact(self, grid: Array, *, uniform: bool) -> Compact:
         values = np.ascontiguousarray(self._columns_at(grid).T)
-        off = np.max(np.abs(read_from(grid, values, self.places, self.fine) - self.fine.values), axis=1)
+        read = linearly(grid, values, self.fine.angles)
+        places = [self.places[entry.key] for entry in self.fine.entries]
+        rows = [p.factor * (np.ones(read.shape[1]) if p.column is None else read[p.column]) for p in places]
+        off = np.max(np.abs(np.array(rows) - self.fine.values), axis=1)
         error: dict[str, float] = {}
         for entry, largest in zip(self.fine.entries, off, strict=True):
             error[entry.row] = error.get(entry.row, 0.0) + entry.weight * float(largest)
         return Compact(grid, self.columns, values, self.places, error, 0.0, uniform)
 
 
-def read_from(
-    grid: Array, values: Array, places: dict[str, ColumnPlace], fine: FineEntries, at: Array | None = None
-) -> Array:
-    """Return what is read of all entries, shape (entries, N).
+def linearly(grid: Array, values: Array, at: Array) -> Array:
+    """Return columns at many angles, linear between grid points and held at the ends, shape (columns, N).
 
     Parameters
     ----------
-    grid, values, places
-        Of a table.
-    fine
-        Whose entries.
+    grid
+        Ascending, shape (n,).
+    values
+        Shape (n, columns).
     at
-        Angles, shape (N,); those of the fine grid by default.
+        Angles, shape (N,).
     """
-    angles = fine.angles if at is None else at
-    columns = [np.interp(angles, grid, column) for column in values.T]
-    rows = []
-    for entry in fine.entries:
-        place = places[entry.key]
-        one = np.ones(len(angles)) if place.column is None else columns[place.column]
-        rows.append(place.factor * one)
-    return np.array(rows)
+    held = np.clip(at, grid[0], grid[-1])
+    left = np.clip(np.searchsorted(grid, held, side="right") - 1, 0, len(grid) - 2)
+    share = (held - grid[left]) / (grid[left + 1] - grid[left])
+    rows = values.T
+    read: Array = rows[:, left] + share * (rows[:, left + 1] - rows[:, left])
+    return read
 
 
 def _finite(entries: Sequence[Entry]) -> Sequence[Entry]:

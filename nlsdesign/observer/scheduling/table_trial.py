@@ -14,7 +14,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from .breakpoints import FineEntries, read_from
+from ...model import FlatModel
+from .breakpoints import FineEntries, linearly
 from .plant import AngleScheduledPlant
 from .table import NOTHING, ColumnPlace, Compact, Draft, Entry, TableTorqueError
 
@@ -24,14 +25,12 @@ SPAN = 2.0
 """Length of a motion in s."""
 FEWEST = 1000
 """Samples of a motion, however slow the observer is sampled."""
-SWINGS = (
-    (0.5, 0.0, 1.0), (2.0, 0.0, 1.0), (5.0, 0.0, 0.5), (10.0, 0.0, 0.1),
-    (3.0, 0.4, 0.2), (3.0, -0.4, 0.2), (1.0, 0.7, 0.3), (1.0, -0.7, 0.3),
-)  # fmt: skip
+SWINGS = ((0.5, 0.0, 1.0), (3.0, 0.0, 0.8), (10.0, 0.0, 0.1), (3.0, 0.5, 0.4), (2.0, -0.6, 0.4))
 """Frequency in Hz; middle and amplitude as shares of half the range."""
 HELD = ((0.0, 0.45), (0.03, -0.15), (0.9, -0.9), (-0.01, 0.6), (0.005, 0.0))
 """Angles as shares of half the range, between which a motion runs and at which it rests."""
 CHUNK = 250
+"""Samples that one call computes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,78 +53,88 @@ class TableTrial:
     """
 
     def __init__(self, draft: Draft, fine: FineEntries) -> None:
-        self.draft, self.fine = draft, fine
-        self._table = _separate(fine)
-        self._observer = draft.write(self._table)
-        self._rows = [fine.entries.index(column) for column in self._table.columns]
-        self._motions = _motions(draft.plant, float(self._observer.model.sample_time or 1.0), fine)
+        self.fine = fine
+        separate = _separate(fine)
+        observer = draft.write(separate)
+        self._model = observer.model
+        self.deciding = _deciding(self._model, separate.columns)
+        self._columns = [separate.columns.index(entry) for entry in self.deciding]
+        self._motions = _motions(draft.plant, float(self._model.sample_time or 1.0), fine)
+        begin = [self._model.with_values(observer.start(float(a))) for a in self._motions.angles[0]]
+        self._start = np.array([each.start(each.states) for each in begin]).T
         self._step = self._stepped()
-        self._exact = self._run(self._given(self.fine.at(self._seen)))
+        values = np.array([entry.values for entry in self.deciding]).reshape(-1, len(fine.angles))
+        self._exactly = linearly(fine.angles, values.T, self._seen)
+        self._estimate = self._run(self._exactly)
 
     @property
     def full_scale(self) -> float:
         """Largest exact estimate over the motions."""
-        return float(np.max(np.abs(self._exact)))
+        return float(np.max(np.abs(self._estimate)))
 
-    def error(self, table: Compact) -> TableTorqueError:
+    def error(self, table: Compact, *, only: str | None = None) -> TableTorqueError:
         """Return the torque error that a table causes.
 
         Parameters
         ----------
         table
             Of the same entries.
+        only
+            Sum whose entries are read from it while the others are exact; all by default.
         """
-        read = read_from(table.angles, table.values, dict(table.places), self.fine, self._seen)
-        return self.error_of(read)
-
-    def error_of(self, read: Array) -> TableTorqueError:
-        """Return the torque error with other numbers in the place of the entries.
-
-        Parameters
-        ----------
-        read
-            What is read of each entry at the angles of the motions, shape (entries, angles).
-        """
-        off = self._run(self._given(read)) - self._exact
+        columns = linearly(table.angles, table.values, self._seen)
+        read = self._exactly.copy()
+        for k, entry in enumerate(self.deciding):
+            if only in (None, entry.row):
+                place = table.places[entry.key]
+                read[k] = place.factor * (1.0 if place.column is None else columns[place.column])
+        off = self._run(read) - self._estimate
         if not np.all(np.isfinite(off)):
             return TableTorqueError(np.inf, np.inf, self.full_scale)
         return TableTorqueError(float(np.max(np.abs(off))), float(np.sqrt(np.mean(off**2))), self.full_scale)
-
-    @property
-    def angles(self) -> Array:
-        """Angles of all motions one after another, at which :meth:`error_of` takes its entries."""
-        return self._seen
 
     @cached_property
     def _seen(self) -> Array:
         return self._motions.angles.ravel()
 
-    def _given(self, read: Array) -> Array:
-        """Return inputs and looked-up numbers of all samples, shape (inputs + entries, N · motions)."""
+    @cached_property
+    def _inputs(self) -> Array:
         angles, inputs = self._motions.angles, self._motions.inputs
-        given = np.concatenate([angles[:, :, None], inputs], axis=2)
-        return np.vstack([given.reshape(angles.size, -1).T, read[self._rows]])
+        return np.concatenate([angles[:, :, None], inputs], axis=2).reshape(angles.size, -1).T
 
     def _stepped(self) -> ca.Function:
-        model, many = self._observer.model, self._motions.angles.shape[1]
-        s = model.symbols()
+        many, s = self._motions.angles.shape[1], self._model.symbols()
         step = ca.Function(
             "step", [s.state, ca.vertcat(s.input, s.table)],
             [ca.densify(s.derivative), ca.densify(s.output[0])],
         )  # fmt: skip
         return step.map(many).mapaccum("samples", CHUNK, {"base": 10})
 
-    def _run(self, given: Array) -> Array:
-        """Return the estimates, shape (N · motions,)."""
-        model, many = self._observer.model, self._motions.angles.shape[1]
-        begin = [model.with_values(self._observer.start(float(a))) for a in self._motions.angles[0]]
-        state = np.array([each.start(each.states) for each in begin]).T
-        shown = []
+    def _run(self, read: Array) -> Array:
+        """Return the estimates with these entries, shape (N · motions,)."""
+        many = self._motions.angles.shape[1]
+        looked_up = np.zeros((self._model.symbols().table.numel(), read.shape[1]))
+        looked_up[self._columns] = read
+        given = np.vstack([self._inputs, looked_up])
+        state, shown = self._start, []
         for first in range(0, given.shape[1], CHUNK * many):
             course, output = self._step(state, given[:, first : first + CHUNK * many])
             state = np.array(course[:, -many:])
             shown.append(np.array(output))
         return np.concatenate(shown, axis=1)[0]
+
+
+def _deciding(model: FlatModel, columns: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    """Return the entries that can change the estimate, now or later."""
+    s = model.symbols()
+    estimate, states = s.output[0], model.states
+    into = np.array(ca.DM(ca.jacobian_sparsity(s.derivative, s.state))).astype(bool)
+    needed = np.array(ca.DM(ca.jacobian_sparsity(estimate, s.state))).astype(bool).ravel()
+    for _ in states:
+        needed = needed | into[needed].any(axis=0)
+    rows = [s.derivative[int(i)] for i in np.flatnonzero(needed)]
+    used = set(ca.jacobian_sparsity(ca.vertcat(estimate, *rows), s.table).get_triplet()[1])
+    return tuple(column for k, column in enumerate(columns) if k in used)
 
 
 def _separate(fine: FineEntries) -> Compact:

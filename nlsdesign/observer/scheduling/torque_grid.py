@@ -24,8 +24,10 @@ OTHERS = 2e-3
 """Share of its size that any sum of the step may be off, as far as the size allows it."""
 PROBE = 1e-2
 """Share of a sum by which all its entries may be off while its effect on the torque is measured."""
-STEPS = 7
-"""Halvings of the search for the largest error that keeps the budget, in the logarithm."""
+STEPS = 6
+"""Trials of the search for the largest error of the sums that keeps the budget."""
+HALVINGS = 14
+"""Of the search for a size."""
 SEARCH_BYTES = 20
 """Flash of one halving of the search among breakpoints, on an Arm Cortex-M."""
 
@@ -93,11 +95,11 @@ class GridByTorqueError(Grid):
         asked = TORQUE_SHARE * scale if self.torque_error is None else self.torque_error
         table = search.within(asked)
         if table is None:
-            finest = search.table(0.0)
+            finest = search.judged(search.table(0.0))
             raise ConvergenceError(
                 f"table of the observer with a torque error of {asked:.3g} {unit}",
                 f"cannot be met; the finest table has {finest.size(self.bytes_per_number)} bytes and errs by "
-                f"{_largest(finest):.3g} {unit}",
+                f"{largest_of(finest):.3g} {unit}",
                 next_step="allow a larger torque error",
             )
         if self.most_bytes is None or table.size(self.bytes_per_number) <= self.most_bytes:
@@ -109,11 +111,11 @@ class GridByTorqueError(Grid):
         each, most = self.bytes_per_number, self.most_bytes or 0
         largest = MOST_SHARE * search.trial.full_scale if self.torque_error is None else self.torque_error
         coarser = search.of_size(most) if self.torque_error is None else None
-        if coarser is not None and _largest(coarser) <= largest:
+        if coarser is not None and largest_of(coarser) <= largest:
             return coarser
         least = table if self.torque_error is not None else search.within(largest) or table
         cost = coarser if coarser is not None else search.of_size(most)
-        words = "no table is that small" if cost is None else f"it would cost {_largest(cost):.3g} {unit}"
+        words = "no table is that small" if cost is None else f"it would cost {largest_of(cost):.3g} {unit}"
         raise ConvergenceError(
             f"table of the observer in {most} bytes",
             f"cannot be met: {words}, more than {largest:.3g} {unit}; the smallest that keeps this has "
@@ -123,69 +125,69 @@ class GridByTorqueError(Grid):
 
 
 class _Search:
-    """Tables by one number: the error that the sums may have together, in the unit of the estimate."""
+    """Tables by one number: the error that the sums may cause together, in the unit of the estimate."""
 
     def __init__(self, trial: TableTrial, bytes_per_number: int) -> None:
         self.trial, self.fine, self.each = trial, trial.fine, bytes_per_number
-        self._rows = list(dict.fromkeys(e.row for e in self.fine.entries))
-        self._effects = {row: self._effect(row) for row in self._rows}
+        self._weights = np.array([e.weight if e.weight > 0.0 else 1.0 for e in self.fine.entries])
+        rows = list(dict.fromkeys(e.row for e in trial.deciding))
+        effects = [(row, self._effect(row) * len(rows)) for row in rows]
+        self._effects = {row: effect for row, effect in effects if effect > 0.0}
 
     def _effect(self, row: str) -> float:
         """Return the torque error when all entries of one sum are read with the error of the probe."""
         mine = np.array([e.row == row for e in self.fine.entries])
-        allowed = np.where(mine, PROBE, np.inf) / self._weights
-        table = self.fine.placed(allowed).with_breakpoints()
-        read = self.fine.at(self.trial.angles)
-        from_table = self._read(table)
-        return self.trial.error_of(np.where(mine[:, None], from_table, read)).largest
-
-    def _read(self, table: Compact) -> Array:
-        from .breakpoints import read_from
-
-        return read_from(table.angles, table.values, dict(table.places), self.fine, self.trial.angles)
-
-    @property
-    def _weights(self) -> Array:
-        return np.array([e.weight if e.weight > 0.0 else 1.0 for e in self.fine.entries])
+        table = self.fine.placed(np.where(mine, PROBE, np.inf) / self._weights).with_breakpoints()
+        return self.trial.error(table, only=row).largest
 
     def table(self, error: float, *, others: float = OTHERS) -> Compact:
         """Return the smaller table of a uniform grid and of breakpoints, for an error of the torque."""
-        shares = {
-            row: min(others, PROBE * error / (len(self._rows) * effect)) if effect > 0.0 else others
-            for row, effect in self._effects.items()
-        }
-        allowed = np.array([shares[e.row] for e in self.fine.entries]) / self._weights
+        shares = {row: min(others, PROBE * error / effect) for row, effect in self._effects.items()}
+        allowed = np.array([shares.get(e.row, others) for e in self.fine.entries]) / self._weights
         placed = self.fine.placed(allowed)
         uneven, even = placed.with_breakpoints(), placed.uniform()
         search = SEARCH_BYTES * int(np.ceil(np.log2(max(len(uneven.angles) - 1, 1))))
         larger = even is None or even.size(self.each) > uneven.size(self.each) + search
-        table = uneven if larger or even is None else even
+        return uneven if larger or even is None else even
+
+    def judged(self, table: Compact) -> Compact:
+        """Return the table with its torque error."""
         return replace(table, torque_error=self.trial.error(table))
 
     def within(self, error: float) -> Compact | None:
-        """Return the coarsest table found whose torque error is at most a number."""
-        kept, low, high = None, 1e-3, 30.0
+        """Return the smallest table found whose torque error is at most a number."""
+        kept, tried, before = None, error, 0
         for _ in range(STEPS):
-            middle = float(np.sqrt(low * high))
-            table = self.table(middle * error)
-            if _largest(table) <= error:
-                kept, low = table, middle
-            else:
-                high = middle
+            table = self.judged(self.table(tried))
+            found, size = largest_of(table), table.size(self.each)
+            if found <= error and (kept is None or size < kept.size(self.each)):
+                kept = table
+            if 0.8 * error <= found <= error or (found <= error and size == before):
+                break
+            before = size
+            tried *= float(np.clip(0.92 * error / max(found, 1e-9 * error), 0.02, 50.0))
         return kept
 
     def of_size(self, most: int) -> Compact | None:
-        """Return the finest table found that takes at most so many bytes."""
-        kept, low, high = None, 1e-4 * self.trial.full_scale, 3.0 * self.trial.full_scale
-        for _ in range(2 * STEPS):
+        """Return the finest table found that takes at most so many bytes, with its torque error."""
+        scale = self.trial.full_scale
+        kept, low, high = None, 1e-5 * scale, 3.0 * scale
+        for _ in range(HALVINGS):
             middle = float(np.sqrt(low * high))
-            table = self.table(middle, others=max(OTHERS, 10.0 * middle / self.trial.full_scale))
+            table = self.table(middle, others=max(OTHERS, 10.0 * middle / scale))
             if table.size(self.each) <= most:
                 kept, high = table, middle
             else:
                 low = middle
-        return kept
+        return None if kept is None else self.judged(kept)
 
 
-def _largest(table: Compact) -> float:
+def largest_of(table: Compact) -> float:
+    """Return the largest torque error of a table; infinite where it was not measured.
+
+    Parameters
+    ----------
+    table
+        Any.
+    """
     return table.torque_error.largest if table.torque_error is not None else np.inf
