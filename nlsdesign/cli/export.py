@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .controller import export_controller
+from .flash import flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
@@ -28,16 +30,20 @@ export.add_command(export_controller)
 @measured_option
 @out_option("out/c")
 @real_option
-def export_observer(deck_name: str, sample_time: float, out: Path, real: str, **chosen: str | None) -> None:
+@flash_options
+def export_observer(deck_name: str, sample_time: float, out: Path, real: str, **options: Any) -> None:
     """Write the torque observer as C99; by default the one that is best over the spread of the deck."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..export import export_c
     from ..model import flatten
 
-    model = observer_of(flatten(declare(load_deck(deck_name))), sample_time, **chosen)
+    plant = flatten(declare(load_deck(deck_name)))
+    sized = sized_observer(plant, sample_time, real=real, **options)
+    model = sized.designed.model
     source = export_c(model, out, real=real, name="observer")
-    click.echo(model.description)
+    for sentence in (model.description, *sized.sentences):
+        click.echo(sentence)
     click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
 
 

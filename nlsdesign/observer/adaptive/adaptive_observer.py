@@ -95,7 +95,7 @@ class AdaptiveDesign:
         lines = [
             f"Adaptive observer of {estimate.name} every {self.step.nominal.sample_time:g} s",
             f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
-            f"{len(self.compact.columns)} columns",
+            f"{len(self.compact.columns)} columns{self.compact.cost(estimate.unit)}",
             "  slow states, with the torque that one deviation moves:",
         ]
         for d, effect in enumerate(self.directions.effect):

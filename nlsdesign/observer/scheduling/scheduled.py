@@ -88,7 +88,7 @@ class ObserverDesign:
         lines = [
             f"Observer of {self.step.plant.estimate.name} every {self.step.sample_time:g} s",
             f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
-            f"{len(self.compact.columns)} columns",
+            f"{len(self.compact.columns)} columns{self.compact.cost(self.step.plant.estimate.unit)}",
             f"  estimate is linear in the inner states to {self.step.plant.affine_error:.2g} of its size",
         ]
         lines += [

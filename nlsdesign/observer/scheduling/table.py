@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, ValueRangeError
 from ...model import FlatModel, Table, Variable
+from ...quantity import typeset_unit
 from .plant import AngleScheduledPlant
 
 Array = NDArray[np.float64]
@@ -134,6 +135,18 @@ class Compact:
         if not self.columns:
             return 0
         return bytes_per_number * (self.values.size + (0 if self.uniform else len(self.angles)))
+
+    def cost(self, unit: str) -> str:
+        """Return what the table costs in torque, as the end of a sentence; empty where it was not measured.
+
+        Parameters
+        ----------
+        unit
+            Of the estimate.
+        """
+        if self.torque_error is None:
+            return ""
+        return f", which move the torque by at most {self.torque_error.largest:.2g} {typeset_unit(unit)}"
 
     def table(self, argument: str) -> Table | None:
         """Return the table of a flat model; ``None`` where every entry is a literal.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, ValueRangeError
+from ...quantity import typeset_unit
 from .breakpoints import FineEntries
 from .table import Compact, Draft, Entries, Grid, check_range
 from .table_trial import TableTrial
@@ -97,9 +98,9 @@ class GridByTorqueError(Grid):
         if table is None:
             finest = search.judged(search.table(0.0))
             raise ConvergenceError(
-                f"table of the observer with a torque error of {asked:.3g} {unit}",
+                f"table of the observer with a torque error of {asked:.3g} {typeset_unit(unit)}",
                 f"cannot be met; the finest table has {finest.size(self.bytes_per_number)} bytes and errs by "
-                f"{largest_of(finest):.3g} {unit}",
+                f"{largest_of(finest):.3g} {typeset_unit(unit)}",
                 next_step="allow a larger torque error",
             )
         if self.most_bytes is None or table.size(self.bytes_per_number) <= self.most_bytes:
@@ -115,13 +116,42 @@ class GridByTorqueError(Grid):
             return coarser
         least = table if self.torque_error is not None else search.within(largest) or table
         cost = coarser if coarser is not None else search.of_size(most)
-        words = "no table is that small" if cost is None else f"it would cost {largest_of(cost):.3g} {unit}"
-        raise ConvergenceError(
-            f"table of the observer in {most} bytes",
-            f"cannot be met: {words}, more than {largest:.3g} {unit}; the smallest that keeps this has "
-            f"{least.size(each)} bytes",
-            next_step=f"allow {least.size(each)} bytes for the table, or a larger torque error",
+        raise TableTooLargeError(
+            most, largest, None if cost is None else largest_of(cost), least.size(each), unit
         )
+
+
+class TableTooLargeError(ConvergenceError):
+    """A table cannot be as small as was asked for.
+
+    Parameters
+    ----------
+    most
+        Bytes that it may take.
+    allowed
+        Torque error that it may cause.
+    cost
+        Torque error that the best table of that size would cause; ``None`` where there is none that small.
+    least
+        Bytes of the smallest table found that keeps what is allowed.
+    unit
+        Of the torque.
+    """
+
+    def __init__(self, most: int, allowed: float, cost: float | None, least: int, unit: str) -> None:
+        self.allowed, self.cost, self.least, self.unit = allowed, cost, least, typeset_unit(unit)
+        super().__init__(
+            f"table of the observer in {most} B",
+            f"cannot be met: {self.words}; the smallest found that keeps this has {least} B",
+            next_step=f"allow {least} B for the table, or a larger torque error",
+        )
+
+    @property
+    def words(self) -> str:
+        """What the size would cost."""
+        if self.cost is None:
+            return f"no table is that small within {self.allowed:.3g} {self.unit}"
+        return f"it would cost {self.cost:.3g} {self.unit}, more than {self.allowed:.3g} {self.unit}"
 
 
 class _Search:
