@@ -10,6 +10,7 @@ import click
 
 from .controller import controller_of, export_controller, law_options
 from .export_check import check_exports
+from .flash import flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
@@ -45,6 +46,7 @@ export.add_command(check_exports)
 @measured_option
 @out_option("out/c")
 @real_option
+@flash_options
 @click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")
 def export_code(
     deck_name: str, what: str, sample_time: float, out: Path, real: str, examples: bool, **chosen: Any
@@ -59,19 +61,20 @@ def export_code(
     from ..model import flatten
 
     plant = flatten(declare(load_deck(deck_name)))
-    name, model = sampled_part(plant, what, sample_time, chosen)
+    name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     source = export_c(model, out, real=real, name=name)
     written = [source.header, source.source, source.selftest]
     if examples:
         written += write_examples(source)
-    click.echo(model.description)
+    for sentence in (model.description, *sentences):
+        click.echo(sentence)
     click.echo(f"written: {', '.join(str(path) for path in written)}")
 
 
 def sampled_part(
     plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]
-) -> tuple[str, FlatModel]:
-    """Return what a controller runs, and what its files are called.
+) -> tuple[str, FlatModel, tuple[str, ...]]:
+    """Return what a controller runs, what its files are called, and what is to be known of its size.
 
     Parameters
     ----------
@@ -82,18 +85,20 @@ def sampled_part(
     sample_time
         In s.
     chosen
-        Options of observer and law by name.
+        Options of observer, law and size by name.
     """
     law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-    kind = {name: chosen[name] for name in ("kind", "spring", "measured")}
+    others = {name: value for name, value in chosen.items() if name not in law}
     if what == CONTROLLER:
-        return CONTROLLER, controller_of(plant, sample_time, **law)
-    observer = observer_of(plant, sample_time, **kind)
+        return CONTROLLER, controller_of(plant, sample_time, **law), ()
     if what == OBSERVER:
-        return OBSERVER, observer
+        sized = sized_observer(plant, sample_time, **others)
+        return OBSERVER, sized.designed.model, sized.sentences
     from ..control import joined
 
-    return "torque_loop", joined(observer, controller_of(plant, sample_time, **law))
+    controller = controller_of(plant, sample_time, **law)
+    sized = sized_observer(plant, sample_time, part_of=lambda each: joined(each, controller), **others)
+    return "torque_loop", joined(sized.designed.model, controller), sized.sentences
 
 
 @export.command("fmu")
