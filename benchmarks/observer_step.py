@@ -140,7 +140,7 @@ def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) 
 
 
 def compilers() -> dict[str, list[str]]:
-    """Commands that compile for any processor of this kind: valgrind does not know the newest instructions."""
+    """Commands that compile for any processor of this kind: valgrind lacks the newest instructions."""
     found = {"zig cc": [*compiler(), *BASELINE]}
     if shutil.which("gcc"):
         found["gcc"] = ["gcc"]

@@ -21,7 +21,7 @@ NATIVE = """
 #if defined(__ARM_FEATURE_SVE) || defined(__ARM_FEATURE_SVE2)
 #error instructions of newer Arm processors
 #endif
-int portable(void);
+__attribute__((visibility("default"))) int portable(void);
 int portable(void) { return 1; }
 """
 
