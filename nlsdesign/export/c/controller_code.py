@@ -1,8 +1,7 @@
 """C99 for the controller: a discrete model as ``init`` and ``step`` on a structure that the caller owns.
 
-No heap, no recursion, no mutable data outside the caller's structure, tables ``static const``, no loop: a
-step is straight-line code. For any input states and outputs stay finite, and the status word tells what was
-held or saturated. CasADi generates the arithmetic (see :mod:`.instructions`).
+No heap, recursion, loop, or mutable data outside the caller's structure: a step is straight-line code. States
+and outputs stay finite, the status word tells what was held. The arithmetic is CasADi's (:mod:`.instructions`).
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
 from .controller_step import step_body
+from .elementary import elementary_functions, portable
 from .guarded_step import STATUS_BITS, first_outputs, index_bit
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
@@ -185,7 +185,7 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     real
         Number type.
     """
-    body, used = step_body(model, name, real)
+    body, used = step_body(model, name, portable(real))
     tables = [table_data(each, real) for each in indexed_tables(model) if each.columns(used)]
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
@@ -194,7 +194,10 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     guards += [filled("controller_parameter.c", names)] if model.parameters else []
     values = {
         "title": _title(model),
-        "tables": [line for table in tables for line in (*table, "")],
+        "tables": [
+            *elementary_functions(real, body),
+            *(line for table in tables for line in (*table, "")),
+        ],
         "start_parameters": initialiser(model.parameters, real),
         "start_states": initialiser(model.states, real),
         "start_inputs": initialiser(inputs, real),
