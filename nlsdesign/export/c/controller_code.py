@@ -1,7 +1,7 @@
 """C99 for the controller: a discrete model as ``init`` and ``step`` on a structure that the caller owns.
 
 No heap, recursion, loop, or mutable data outside the caller's structure: a step is straight-line code. States
-and outputs stay finite, the status word tells what was held. The arithmetic is CasADi's (:mod:`.instructions`).
+and outputs stay finite, the status word says what was held. The arithmetic is CasADi's, see ``instructions``.
 """
 
 from __future__ import annotations
