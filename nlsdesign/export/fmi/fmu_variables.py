@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
+from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
 
 RELATIVE_TOLERANCE = 1e-8
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
@@ -163,10 +164,10 @@ def _extra(model: FlatModel, reference: int) -> FmuVariable:
 
 
 def _status(reference: int) -> FmuVariable:
-    text = (
-        "Status word of the last sample: bit 0 input held, 1 input saturated, 2 state held, 3 output held; "
-        "bit 8 + i: input i"
+    bits = ", ".join(
+        f"{bit.bit_length() - 1} {flag.lower().replace('_', ' ')}" for flag, (bit, _) in STATUS_BITS.items()
     )
+    text = f"Status word of the last sample: bit {bits}; bit {FIRST_INDEX_BIT} + i: input i"
     status = Variable("sample.status", "1", text)
     return FmuVariable(reference, status, "local", "discrete", "calculated", integer=True)
 
