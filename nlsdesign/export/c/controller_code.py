@@ -251,7 +251,8 @@ def _settled(model: FlatModel, name: str, real: Real) -> list[str]:
     if model.begin is None:
         return []
     lines: list[str] = []
-    for which, verb in enumerate(("begin", "resume")):
+    # Without a measured input there are no gaps after which to resume.
+    for which, verb in enumerate(("begin", "resume") if measured_inputs(model) else ("begin",)):
         words = "rests at its first readings" if which == 0 else "goes on after a gap in its readings"
         lines += [f"/* Sets the states of a machine that {words}. */"]
         lines += [f"static void {name}_{verb}({name}_state *state)", "{"]

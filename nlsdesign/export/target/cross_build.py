@@ -110,7 +110,7 @@ def controller_sizes(
         If the compiler is missing or finds a mistake.
     """
     alone = section_sizes(controller_object(source, processor, folder))
-    found = []
+    images = []
     for present in (1, 0):
         if not present:
             (folder / "nothing.c").write_text("", encoding="utf-8")
@@ -119,8 +119,8 @@ def controller_sizes(
                 about="an empty file",
             )
         values = {"present": str(present)}
-        found.append(section_sizes(image(source, processor, folder, main="target_empty.c", values=values)))
-    with_it, without = found
+        images.append(section_sizes(image(source, processor, folder, main="target_empty.c", values=values)))
+    with_it, without = images
     added = SectionSizes(
         with_it.constant - without.constant,
         with_it.preset - without.preset,

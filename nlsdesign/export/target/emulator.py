@@ -59,10 +59,10 @@ def emulated(image: Path, processor: Processor) -> list[list[int]]:
         raise ExportError(
             f"{image.name} on {processor.name}", f"does not end within {_SECONDS} s", next_step="report it"
         ) from error
-    said = done.stdout + done.stderr
-    if done.returncode != 0 or "fault" in said:
-        last = said.strip().splitlines()[-1:] or ["it said nothing"]
+    answer = done.stdout + done.stderr
+    if done.returncode != 0 or "fault" in answer:
+        last = answer.strip().splitlines()[-1:] or ["it said nothing"]
         raise ExportError(
             f"{image.name} on {processor.name}", f"fails under {EMULATOR}: {last[0]}", next_step="report it"
         )
-    return [[int(number, 16) for number in line.split()] for line in said.splitlines() if line.strip()]
+    return [[int(number, 16) for number in line.split()] for line in answer.splitlines() if line.strip()]

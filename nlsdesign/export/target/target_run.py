@@ -151,13 +151,13 @@ def _run(source: CSource, processor: Processor, folder: Path, given: NDArray[np.
             next_step="measure with another version of qemu-system-arm",
         )
     table = np.array(rows, dtype=np.uint32)
-    said = np.ascontiguousarray(table[:, 5:])
-    outputs = said.view(np.float32 if real.name == "float" else np.float64)
+    words = np.ascontiguousarray(table[:, 5:])
+    outputs = words.view(np.float32 if real.name == "float" else np.float64)
     step = CompiledStep(source)
     expected = [step(row) for row in given.tolist()]
     here = np.array([each for each, _ in expected]).reshape(outputs.shape).astype(outputs.dtype)
     status = table[:, 4].astype(np.int64)
-    same = here.tobytes() == outputs.tobytes() and status.tolist() == [word for _, word in expected]
+    same = here.tobytes() == outputs.tobytes() and status.tolist() == [flags for _, flags in expected]
     return TargetRun(
         np.rint([_instructions(*row[:3]) for row in rows]).astype(np.int64),
         table[:, 3].astype(np.int64),
