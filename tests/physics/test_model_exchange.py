@@ -27,6 +27,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.export import export_fmu
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
+from tests.fmu_unit import Unit, opened
 from tests.hand_built import plant
 
 VERSIONS = ("2.0", "3.0")
@@ -266,3 +267,67 @@ def test_two_bodies_that_stick_keep_their_momentum(sharp):
         (2 * J * 2.0 + PULL * TIMES[stuck]) / (7 * J), rel=1e-7
     )
     assert run["rub.torque"][stuck] == pytest.approx(np.full(stuck.sum(), PULL * 5 / 7), rel=1e-12)
+
+
+@both
+def test_a_short_touch_within_one_long_step_is_not_missed(version, sharp):
+    """Thrown at the upper stop and free again at the end of the only step: 0.9 + 2.2·t − 10·t²."""
+    start, length = {"wheel.angle": 0.9, "wheel.speed": 2.2}, 0.2
+    with opened(sharp["bouncing", version]) as unit:
+        unit.put(start)
+        unit.begin().run()
+        unit.set(wheel__torque=-0.02)
+        unit.step(length)
+        found = unit.get("wheel.angle", "wheel.speed")
+    # Meets 1 at the smaller root of 10·t² − 2.2·t + 0.1 = 0 with 2.2 − 20·t, and leaves with 0.6 of that.
+    meets = (2.2 - math.sqrt(2.2**2 - 4.0)) / 20.0
+    speed, rest = -0.6 * (2.2 - 20.0 * meets), length - meets
+    assert 0.9 + 2.2 * length - 10.0 * length**2 < 1.0
+    assert found == pytest.approx([1.0 + speed * rest - 10.0 * rest**2, speed - 20.0 * rest], rel=1e-9)
+
+
+@both
+def test_events_are_located_at_a_large_time_as_from_zero(version, sharp):
+    rows = []
+    with opened(sharp["coulomb", version]) as unit:
+        for start in (0.0, 1.7e9):
+            unit.raw.reset()
+            unit.put(DROPPED)
+            unit.begin(start=start).run()
+            for _ in range(600):
+                unit.step(STEP)
+            rows.append(unit.get("wheel.angle", "wheel.speed", "rub.mode"))
+    assert rows[0][1:] == [0.0, 0.0]
+    assert rows[1] == pytest.approx(rows[0], rel=1e-12)
+
+
+@both
+@each_sharp
+def test_a_restored_copy_of_a_sharp_model_goes_on_bit_by_bit(name, version, sharp):
+    case = SHARP[name]()
+    shown = [v.name for v in (*case.model.states, *case.model.outputs)]
+
+    def stepped(unit: Unit) -> list[list[float]]:
+        rows = []
+        for k in range(150):
+            unit.step(STEP * (1 + k % 4))
+            rows.append(unit.get(*shown))
+        return rows
+
+    with opened(sharp[name, version]) as unit:
+        unit.put(case.start | case.driven)
+        unit.begin().run()
+        stepped(unit)
+        copy, time = unit.raw.getFMUState(), unit.time
+        written = unit.raw.serializeFMUState(copy)
+        first = stepped(unit)
+        unit.raw.setFMUState(copy)
+        unit.raw.freeFMUState(copy)
+        unit.time = time
+        assert stepped(unit) == first
+        with opened(sharp[name, version]) as other:
+            read = other.raw.deserializeFMUState(written)
+            other.raw.setFMUState(read)
+            other.raw.freeFMUState(read)
+            other.time = time
+            assert stepped(other) == first
