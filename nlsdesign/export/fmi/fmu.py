@@ -22,6 +22,7 @@ from ..c.c_text import identifier
 from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
 from ..files import shell
 from .fmu_documentation import icon, page
+from .fmu_origin import with_origin
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
@@ -90,7 +91,7 @@ def export_fmu(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
     with draft(target) as file:
-        _write_archive(file, contents | binaries)
+        _write_archive(file, with_origin(model, contents | binaries))
     return target
 
 
