@@ -15,6 +15,7 @@ from models import cam_rubber_actuator
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
+    Driven,
     Element,
     Inertia,
     RigidStop,
@@ -158,6 +159,12 @@ def struck() -> FlatModel:
     )
 
 
+def belt() -> FlatModel:
+    """Stick–slip on a belt that moves: the rate that is held is that to the belt, an input."""
+    spring, rub = tie(Spring(stiffness=K, domain=ROTATION), "wheel"), tie(STRIBECK, "wheel", "belt")
+    return flatten(assembly("belt", belt=Driven(), wheel=Inertia(inertia=J), spring=spring, rub=rub))
+
+
 STRIBECK = StribeckFriction(sliding_effort=0.03, breakaway=0.04, stribeck_speed=0.5)
 DROPPED, SPEED = {"wheel.angle": 0.33}, "wheel.speed"
 SHARP = {
@@ -172,6 +179,7 @@ SHARP = {
         clutch(), {"driver.speed": 2.0}, {"driver.torque": PULL}, "driver.speed", False, ("rub.torque",)
     ),
     "struck": lambda: Case(struck(), {"motor.speed": 2.0, "load.speed": 2.0}, {}, "load.speed", False, ()),
+    "belt": lambda: Case(belt(), {SPEED: 0.4}, {"belt.speed": 0.4}, SPEED, False, ()),
 }
 TIMES = np.linspace(0.0, 1.0, 101)
 each_sharp = pytest.mark.parametrize("name", SHARP)
@@ -210,7 +218,7 @@ def test_a_foreign_integrator_finds_the_events_of_a_sharp_model(name, version, s
         if case.rests:
             assert np.all(run[case.rate][rest] == 0.0)
         for n in case.holding:
-            # What holds is seen where it sticks, also when the rate that is held is one between two bodies; it
+            # What holds is seen where it sticks, also when what is held is the rate between two bodies. It
             # carries the error of the efforts that it balances.
             size = max(np.abs(own[v.name]).max() for v in case.model.outputs)
             assert run[n][rest] == pytest.approx(own[n][rest], rel=0.0, abs=1e3 * tolerance * size)
