@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from .output import deck_option, out_option
 from .units import Number
+
+if TYPE_CHECKING:
+    from ..model import FlatModel
 
 
 @click.command("controller")
@@ -43,18 +47,15 @@ def export_controller(
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
-    from ..control import PidTorque, ScheduledTorque, VelocityLoop, largest_torque, torque_controller
+    from ..control import largest_torque
     from ..deck import load_deck
     from ..export import export_c, export_fmu
     from ..model import flatten
 
-    bandwidth = bandwidths["bandwidth"]
-    if law == "pid" and bandwidth is not None:
+    if law == "pid" and bandwidths["bandwidth"] is not None:
         raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
     plant = flatten(declare(load_deck(deck_name)))
-    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
-    inner = VelocityLoop(bandwidth=bandwidths["velocity_bandwidth"])
-    model = torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
+    model = torque_law_of(plant, law=law, sample_time=sample_time, **bandwidths)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
     written = [source.header, source.source, source.selftest]
@@ -63,3 +64,31 @@ def export_controller(
     click.echo(str(model))
     click.echo(f"largest torque that the drive can hold: {most:.4g} N·m")
     click.echo(f"written: {', '.join(str(path) for path in written)}")
+
+
+def torque_law_of(
+    plant: FlatModel,
+    *,
+    law: str = "scheduled",
+    sample_time: float,
+    bandwidth: float | None = None,
+    velocity_bandwidth: float | None = None,
+) -> FlatModel:
+    """Return the torque controller as commands write it.
+
+    Parameters
+    ----------
+    plant
+        On the bench.
+    law
+        ``"scheduled"`` or ``"pid"``.
+    sample_time
+        In s.
+    bandwidth, velocity_bandwidth
+        Of the scheduled law and of the velocity loop inside, in Hz.
+    """
+    from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
+
+    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
+    inner = VelocityLoop(bandwidth=velocity_bandwidth)
+    return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
