@@ -42,8 +42,8 @@ def _table(generated: GeneratedCode) -> TableSection:
         caption=f"Sine of {AMPLITUDE:g} N·m at {FREQUENCY:g} Hz wanted, rms over cycle {CYCLES}: spring "
         "torque less wanted, estimated less spring torque; peak of the current. `best` has the least "
         "expected error over the spread of its deck; the gains are the defaults. Where the numbers of the "
-        "deck hold, the cascade errs less: the diagnosed deck keeps its declared spreads, though records know "
-        "better.",
+        "deck hold, the cascade errs less: the diagnosed deck keeps its declared spreads, though records "
+        "know better.",
     )
 
 
