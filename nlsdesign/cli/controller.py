@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -13,37 +14,83 @@ from .units import Number
 if TYPE_CHECKING:
     from ..model import FlatModel
 
+F = TypeVar("F", bound=Callable[..., Any])
 
-@click.command("controller")
-@deck_option
-@click.option(
+_LAW = click.option(
     "--law",
     type=click.Choice(["scheduled", "pid"]),
     default="scheduled",
     show_default=True,
-    help="Speed by tangent stiffness, or a PID.",
+    help="Of the controller: speed by tangent stiffness, or a PID.",
 )
-@click.option(
+_BANDWIDTH = click.option(
     "--bandwidth", type=Number("Hz"), default=None, help="Of the scheduled law; by default 12 Hz at 1 kHz."
 )
-@click.option(
+_VELOCITY_BANDWIDTH = click.option(
     "--velocity-bandwidth",
     type=Number("Hz"),
     default=None,
     help="Of the velocity loop inside; by default 45 Hz at 1 kHz.",
 )
+
+
+def law_options(command: F) -> F:
+    """Add the options that choose the law of a torque controller.
+
+    Parameters
+    ----------
+    command
+        Takes ``law``, ``bandwidth`` and ``velocity_bandwidth``.
+    """
+    return _LAW(_BANDWIDTH(_VELOCITY_BANDWIDTH(command)))
+
+
+def controller_of(
+    plant: FlatModel,
+    sample_time: float,
+    *,
+    law: str,
+    bandwidth: float | None,
+    velocity_bandwidth: float | None,
+) -> FlatModel:
+    """Return the torque controller that the options of a command ask for.
+
+    Parameters
+    ----------
+    plant
+        Flat model of an actuator.
+    sample_time
+        In s.
+    law
+        ``"scheduled"`` or ``"pid"``.
+    bandwidth
+        Of the scheduled law in Hz.
+    velocity_bandwidth
+        Of the velocity loop in Hz.
+
+    Raises
+    ------
+    BadParameter
+        If a bandwidth is given for a PID, which has gains.
+    """
+    from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
+
+    if law == "pid" and bandwidth is not None:
+        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
+    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
+    inner = VelocityLoop(bandwidth=velocity_bandwidth)
+    return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
+
+
+@click.command("controller")
+@deck_option
+@law_options
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
 @out_option("out/controller")
 @click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
 @click.option("--fmu", is_flag=True, help="Write an FMU for co-simulation (FMI 3.0) beside the C code.")
 def export_controller(
-    deck_name: str,
-    law: str,
-    sample_time: float,
-    out: Path,
-    real: str,
-    fmu: bool,
-    **bandwidths: float | None,
+    deck_name: str, sample_time: float, out: Path, real: str, fmu: bool, **chosen: Any
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
@@ -52,10 +99,8 @@ def export_controller(
     from ..export import export_c, export_fmu
     from ..model import flatten
 
-    if law == "pid" and bandwidths["bandwidth"] is not None:
-        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
     plant = flatten(declare(load_deck(deck_name)))
-    model = torque_law_of(plant, law=law, sample_time=sample_time, **bandwidths)
+    model = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
     written = [source.header, source.source, source.selftest]
@@ -64,31 +109,3 @@ def export_controller(
     click.echo(str(model))
     click.echo(f"largest torque that the drive can hold: {most:.4g} N·m")
     click.echo(f"written: {', '.join(str(path) for path in written)}")
-
-
-def torque_law_of(
-    plant: FlatModel,
-    *,
-    law: str = "scheduled",
-    sample_time: float,
-    bandwidth: float | None = None,
-    velocity_bandwidth: float | None = None,
-) -> FlatModel:
-    """Return the torque controller as commands write it.
-
-    Parameters
-    ----------
-    plant
-        On the bench.
-    law
-        ``"scheduled"`` or ``"pid"``.
-    sample_time
-        In s.
-    bandwidth, velocity_bandwidth
-        Of the scheduled law and of the velocity loop inside, in Hz.
-    """
-    from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
-
-    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
-    inner = VelocityLoop(bandwidth=velocity_bandwidth)
-    return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)

@@ -1,15 +1,16 @@
-"""Everything that runs a machine, from one deck: observer and controller as C and FMU, the plant as FMU."""
+"""Everything that runs a machine, from one deck: observer, controller and both as one step, and the plant."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
 from ..errors import NlsError
-from .controller import torque_law_of
+from .controller import controller_of
 from .observer_kinds import observer_of
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ export_option = click.option(
     "--export",
     "exports",
     is_flag=True,
-    help="Write observer and controller of the better deck as C, and both with the plant as FMUs.",
+    help="Write observer, controller and both as one step from the better deck as C, and all as FMUs.",
 )
 
 
@@ -48,7 +49,9 @@ def export_machine(
     spring: str | None = None,
     measured: str | None = None,
 ) -> ExportedMachine:
-    """Write observer and controller as C and FMU, and the plant as FMU; what fails leaves the others.
+    """Write observer, controller and both as one step, as C and FMU, and the plant as FMU.
+
+    What fails leaves the others.
 
     Parameters
     ----------
@@ -63,15 +66,22 @@ def export_machine(
     spring, measured
         Where the structure of the plant leaves them open.
     """
+    from ..control import joined
     from ..export import export_c, export_fmu
 
+    @cache
     def observing() -> FlatModel:
         return observer or observer_of(plant, sample_time, spring=spring, measured=measured)
+
+    @cache
+    def controlling() -> FlatModel:
+        return controller_of(plant, sample_time, law="scheduled", bandwidth=None, velocity_bandwidth=None)
 
     models: dict[str, Callable[[], FlatModel]] = {
         "plant": lambda: plant,
         "observer": observing,
-        "controller": lambda: torque_law_of(plant, sample_time=sample_time),
+        "controller": controlling,
+        "torque_loop": lambda: joined(observing(), controlling()),
     }
     files: dict[Path, str] = {}
     reasons: list[str] = []

@@ -176,7 +176,7 @@ def _model(
         ca.SX.sym("w", 0),
     ]
     rows = [[solved.derivatives[n] for n in states], solved.outputs, solved.signals, solved.checks]
-    switches = switching(laws, columns, rows[0], states) if laws.switches else None
+    switches = switching(laws, columns, rows, states) if laws.switches else None
     rows = _natural(laws, rows)
     equations = ca.Function(
         "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],

@@ -24,6 +24,7 @@ from tests.unit.test_identification_shooting import NOISE, TRUE
 from tests.unit.test_identification_shooting import truth as slide_record
 
 __all__ = ["run"]
+PARTS = ("observer", "controller", "torque_loop")
 SEED, ONLY = 5, ("sine_25deg_2.0Hz", "sine_15deg_5.0Hz", "multisine")
 
 
@@ -168,11 +169,11 @@ def test_the_fitted_machine_is_exported_and_belongs_to_its_deck(
     content = json.loads(out[out.index("{") :])
     assert content["not_exported"] == []
     names = {str(Path(path).relative_to(tmp_path / "out")) for path in content["exported"]}
-    code = {f"c/{part}{end}" for part in ("observer", "controller") for end in (".c", ".h", "_selftest.c")}
-    assert names == code | {"plant.fmu", "observer.fmu", "controller.fmu"}
+    code = {f"c/{part}{end}" for part in PARTS for end in (".c", ".h", "_selftest.c")}
+    assert names == code | {"plant.fmu", *(f"{part}.fmu" for part in PARTS)}
     declared, fitted = assembly_of(bench / "deck.toml"), assembly_of(tmp_path / "out" / "model.toml")
     assert fitted.name == f"{declared.name}_refitted_{deck_digest(fitted)[:8]}"
-    for part in ("observer", "controller"):
+    for part in PARTS:
         header = (tmp_path / "out" / "c" / f"{part}.h").read_text("utf-8")
         assert f'_DECK_DIGEST "{deck_digest(fitted)}"' in header
         assert f'_PARENT_DIGEST "{deck_digest(declared)}"' in header
@@ -181,6 +182,6 @@ def test_the_fitted_machine_is_exported_and_belongs_to_its_deck(
         "export", "check", str(tmp_path / "out"), "--deck", str(tmp_path / "out" / "model.toml")
     )
     assert status == 0, out
-    assert "All 10 files belong" in out
+    assert "All 14 files belong" in out
     status, out, _ = run("export", "check", str(tmp_path / "out"), "--deck", str(bench / "deck.toml"))
     assert status == 1

@@ -19,7 +19,6 @@ from ...errors import ExportError, ValueRangeError, nearest
 from ...model.flat import FlatModel
 from ...writing import draft
 from ..c.c_text import identifier
-from ..c.smooth_only import refuse_jumps
 from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
 from ..files import shell
 from .fmu_documentation import icon, page
@@ -113,7 +112,6 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
     dict
         Content by path within the FMU.
     """
-    refuse_jumps(model)
     variables = layout(model)
     texts = {"modelDescription.xml": model_description(variables, version=version, token=_TOKEN, step=step)}
     for name, text in fmu_sources(variables, version, _TOKEN).items():
