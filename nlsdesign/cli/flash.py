@@ -34,8 +34,8 @@ def flash_options(command: F) -> F:
     """
     command = click.option(
         "--flash", type=Bytes(), metavar="SIZE",
-        help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser for "
-        "it, and what that costs is said. Without the mathematical functions of the C library.",
+        help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser "
+        "for it, and what that costs is said. Without the mathematical functions of the C library.",
     )(command)  # fmt: skip
     return click.option(
         "--table-error", type=Number("N*m"), metavar="TORQUE",
@@ -128,11 +128,11 @@ def sized_observer(
         return first
     found, chosen = first, {**chosen, "kind": designed.kind}
     for _ in range(ATTEMPTS):
-        most = flash - (found.code or 0)
-        if most < each:
+        most = max(flash - (found.code or 0), 1)
+        if not found.tables:
             raise ValueRangeError(
                 f"flash of {flash} B", f"the code alone takes {found.code} B on a Cortex-M4F",
-                next_step=f"allow {first.code + first.tables} B, or take another --kind or --real float",
+                next_step=f"allow {found.code} B, or take another --kind or --real float",
             )  # fmt: skip
         grid = _grid(plant, table_error, each, most)
         try:
@@ -142,7 +142,8 @@ def sized_observer(
                 f"flash of {flash} B",
                 f"cannot be met beside {found.code} B of code: {error.words}; the smallest that keeps this "
                 f"has {(found.code or 0) + error.least} B",
-                next_step=f"allow {(found.code or 0) + error.least} B, or a larger --table-error",
+                next_step=f"allow {(found.code or 0) + error.least} B, a larger --table-error, or take "
+                "another --kind or --real float",
             ) from None
         # The kind is decided: a coarser table does not change which one errs least over the spread.
         again = replace(again, reason=designed.reason, expected=designed.expected)
