@@ -65,7 +65,7 @@ class SizedObserver:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What the table costs, and how large everything is."""
-        compact, unit = self.designed.design.compact, typeset_unit(self._plant.estimate.unit)
+        compact, unit = self.designed.design.compact, typeset_unit(self.designed.design.model.outputs[0].unit)
         kind = "uniform" if compact.uniform else "by breakpoints"
         error = compact.torque_error
         words = f"table: {len(compact.angles)} angles {kind}, {len(compact.columns)} columns"
@@ -79,11 +79,6 @@ class SizedObserver:
         total = f"flash on a Cortex-M4F: {self.code + self.tables} B"
         return words, f"{total} ({self.code} B code, {self.tables} B tables), without the C library"
 
-    @property
-    def _plant(self) -> Any:
-        step = self.designed.design.step
-        return getattr(step, "nominal", step).plant
-
 
 def sized_observer(
     plant: FlatModel,
@@ -92,7 +87,7 @@ def sized_observer(
     real: str,
     flash: int | None = None,
     table_error: float | None = None,
-    **chosen: str | None,
+    **chosen: Any,
 ) -> SizedObserver:
     """Design an observer whose code and tables keep a size.
 

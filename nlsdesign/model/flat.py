@@ -137,8 +137,7 @@ class Table:
         """All grid points, shape (grid points,)."""
         if self.breakpoints is not None:
             return self.breakpoints
-        uniform: NDArray[np.float64] = self.lower + self.step * np.arange(self.values.shape[0])
-        return uniform
+        return np.asarray(self.lower + self.step * np.arange(self.values.shape[0]), dtype=np.float64)
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -121,7 +121,8 @@ class TableTrial:
             course, output = self._step(state, given[:, first : first + CHUNK * many])
             state = np.array(course[:, -many:])
             shown.append(np.array(output))
-        return np.concatenate(shown, axis=1)[0]
+        estimates: Array = np.concatenate(shown, axis=1)[0]
+        return estimates
 
 
 def _deciding(model: FlatModel, columns: tuple[Entry, ...]) -> tuple[Entry, ...]:
@@ -165,8 +166,8 @@ def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) 
     mixed = np.sum(waves, axis=0)
     shares.append(mixed / np.max(np.abs(mixed)))
     for held in zip(*HELD, strict=True):
-        marks = np.linspace(0.0, end, 2 * len(held))
-        shares.append(_smooth(time, marks, np.repeat(held, 2)))
+        marks = np.asarray(np.linspace(0.0, end, 2 * len(held)), dtype=np.float64)
+        shares.append(_smooth(time, marks, np.repeat(np.array(held, dtype=np.float64), 2)))
     angles = (low + high) / 2.0 + (high - low) / 2.0 * np.array(shares).T
     speed = np.gradient(angles, sample_time, axis=0)
     acceleration = np.gradient(speed, sample_time, axis=0)
