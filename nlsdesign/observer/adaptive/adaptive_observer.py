@@ -171,7 +171,9 @@ def design_adaptive_observer(
     observed = tuple(body for body in model.bodies if body.motion == measured)
     compact = over.compact(step.entries, Draft(plant, partial(held_observer, step)))
     flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
-    flat = with_plausible_inputs(replace(flat, bodies=observed), model, plant, compact.angles)
+    flat = with_plausible_inputs(
+        replace(flat, bodies=observed, origin=model.origin), model, plant, compact.angles
+    )
     design = AdaptiveDesign(flat, step, compact, directions, settings.duty, trust)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 

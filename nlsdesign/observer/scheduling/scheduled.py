@@ -154,7 +154,7 @@ def design_observer_with_details(
     observed = tuple(body for body in model.bodies if body.motion == measured)
 
     def written(compact: Compact) -> ObserverDesign:
-        flat = replace(_Writer(step, compact).model(), bodies=observed)
+        flat = replace(_Writer(step, compact).model(), bodies=observed, origin=model.origin)
         return ObserverDesign(with_plausible_inputs(flat, model, plant, compact.angles), step, compact)
 
     design = written(over.compact(step.entries, Draft(plant, written)))
