@@ -87,6 +87,7 @@ def sized_observer(
     real: str,
     flash: int | None = None,
     table_error: float | None = None,
+    part_of: Callable[[FlatModel], FlatModel] = lambda observer: observer,
     **chosen: Any,
 ) -> SizedObserver:
     """Design an observer whose code and tables keep a size.
@@ -103,6 +104,8 @@ def sized_observer(
         Most bytes on a Cortex-M4F.
     table_error
         Torque error that the table may cause, in the unit of the estimate.
+    part_of
+        Makes what is exported of the observer; by default that is the observer alone.
     chosen
         Kind, spring and measured state, as for :func:`~nlsdesign.cli.observer_kinds.designed_observer`.
 
@@ -118,16 +121,16 @@ def sized_observer(
     each = 4 if real == "float" else 8
     grid = _grid(plant, table_error, each, None)
     designed = designed_observer(plant, sample_time=sample_time, grid=grid, **chosen)
-    first = _sized(designed, real, each, needed=flash is not None)
+    first = _sized(designed, part_of(designed.model), real, needed=flash is not None)
     if flash is None or first.code is None or first.code + first.tables <= flash:
         return first
-    found, chosen = first, {**chosen, "kind": designed.kind}
+    current, chosen = first, {**chosen, "kind": designed.kind}
     for _ in range(ATTEMPTS):
-        most = max(flash - (found.code or 0), 1)
-        if not found.tables:
+        most = max(flash - (current.code or 0), 1)
+        if not current.tables:
             raise ValueRangeError(
-                f"flash of {flash} B", f"the code alone takes {found.code} B on a Cortex-M4F",
-                next_step=f"allow {found.code} B, or take another --kind or --real float",
+                f"flash of {flash} B", f"the code alone takes {current.code} B on a Cortex-M4F",
+                next_step=f"allow {current.code} B, or take another --kind or --real float",
             )  # fmt: skip
         grid = _grid(plant, table_error, each, most)
         try:
@@ -135,19 +138,19 @@ def sized_observer(
         except TableTooLargeError as error:
             raise ValueRangeError(
                 f"flash of {flash} B",
-                f"cannot be met beside {found.code} B of code: {error.words}; the smallest that keeps this "
-                f"has {(found.code or 0) + error.least} B",
-                next_step=f"allow {(found.code or 0) + error.least} B, a larger --table-error, or take "
+                f"cannot be met beside {current.code} B of code: {error.words}; the smallest that keeps this "
+                f"has {(current.code or 0) + error.least} B",
+                next_step=f"allow {(current.code or 0) + error.least} B, a larger --table-error, or take "
                 "another --kind or --real float",
             ) from None
         # The kind is decided: a coarser table does not change which one errs least over the spread.
         again = replace(again, reason=designed.reason, expected=designed.expected)
-        found = _sized(again, real, each, needed=True)
-        if (found.code or 0) + found.tables <= flash:
-            return found
+        current = _sized(again, part_of(again.model), real, needed=True)
+        if (current.code or 0) + current.tables <= flash:
+            return current
     raise ValueRangeError(
         f"flash of {flash} B", f"was not met within {ATTEMPTS} attempts",
-        next_step=f"allow {(found.code or 0) + found.tables} B",
+        next_step=f"allow {(current.code or 0) + current.tables} B",
     )  # fmt: skip
 
 
@@ -157,13 +160,13 @@ def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) ->
     return replace(whole_contour(plant), torque_error=error, bytes_per_number=each, most_bytes=most)
 
 
-def _sized(designed: DesignedObserver, real: str, each: int, *, needed: bool) -> SizedObserver:
+def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed: bool) -> SizedObserver:
     from ..export import export_c
     from ..export.compilation.code_size import flash_bytes
 
-    tables = designed.design.compact.size(each)
+    tables = designed.design.compact.size(4 if real == "float" else 8)
     with tempfile.TemporaryDirectory() as folder:
-        source = export_c(designed.model, Path(folder), real=real, name="observer")
+        source = export_c(exported, Path(folder), real=real, name="part")
         try:
             return SizedObserver(designed, flash_bytes(source) - tables, tables)
         except ExportError:
