@@ -35,7 +35,7 @@ def flash_options(command: F) -> F:
     command = click.option(
         "--flash", type=Bytes(), metavar="SIZE",
         help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser "
-        "for it, and what that costs is said. Without the mathematical functions of the C library.",
+        "for it, and what that costs is said.",
     )(command)  # fmt: skip
     return click.option(
         "--table-error", type=Number("N*m"), metavar="TORQUE",
@@ -77,7 +77,7 @@ class SizedObserver:
         if self.code is None:
             return words, f"flash of the tables: {self.tables} B; the code was not measured: no compiler"
         total = f"flash on a Cortex-M4F: {self.code + self.tables} B"
-        return words, f"{total} ({self.code} B code, {self.tables} B tables), without the C library"
+        return words, f"{total} ({self.code} B code with what it calls, {self.tables} B tables)"
 
 
 def sized_observer(
@@ -162,13 +162,15 @@ def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) ->
 
 def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed: bool) -> SizedObserver:
     from ..export import export_c
-    from ..export.compilation.code_size import flash_bytes
+    from ..export.target.cross_build import controller_sizes
+    from ..export.target.processors import CORTEX_M4F
 
     tables = designed.design.compact.size(4 if real == "float" else 8)
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")
         try:
-            return SizedObserver(designed, flash_bytes(source) - tables, tables)
+            _, added = controller_sizes(source, CORTEX_M4F, Path(folder))
+            return SizedObserver(designed, added.flash - tables, tables)
         except ExportError:
             # Without the wheel of the compiler C is still written; only a budget cannot be judged.
             if needed:
