@@ -121,8 +121,8 @@ class TableTrial:
             course, output = self._step(state, given[:, first : first + CHUNK * many])
             state = np.array(course[:, -many:])
             shown.append(np.array(output))
-        estimates: Array = np.concatenate(shown, axis=1)[0]
-        return estimates
+        torque: Array = np.concatenate(shown, axis=1)[0]
+        return torque
 
 
 def _deciding(model: FlatModel, columns: tuple[Entry, ...]) -> tuple[Entry, ...]:
@@ -158,7 +158,7 @@ def _separate(fine: FineEntries) -> Compact:
 def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) -> _Motions:
     """Return swings over the whole range, runs between rests, and a mixture of frequencies."""
     count = CHUNK * -(-max(FEWEST, round(SPAN / sample_time)) // CHUNK)
-    time, low, high = sample_time * np.arange(count), float(fine.angles[0]), float(fine.angles[-1])
+    time, low, high = sample_time * np.arange(float(count)), float(fine.angles[0]), float(fine.angles[-1])
     end = float(time[-1])
     shares = [m + a * np.sin(2.0 * np.pi * f * time) for f, m, a in SWINGS]
     draw = np.random.default_rng(1)
@@ -166,7 +166,7 @@ def _motions(plant: AngleScheduledPlant, sample_time: float, fine: FineEntries) 
     mixed = np.sum(waves, axis=0)
     shares.append(mixed / np.max(np.abs(mixed)))
     for held in zip(*HELD, strict=True):
-        marks = np.asarray(np.linspace(0.0, end, 2 * len(held)), dtype=np.float64)
+        marks: Array = np.linspace(0.0, end, 2 * len(held)).astype(np.float64)
         shares.append(_smooth(time, marks, np.repeat(np.array(held, dtype=np.float64), 2)))
     angles = (low + high) / 2.0 + (high - low) / 2.0 * np.array(shares).T
     speed = np.gradient(angles, sample_time, axis=0)
