@@ -1,6 +1,7 @@
 """C code for the controller, FMUs for everybody else, and co-simulation of FMUs."""
 
 from .c.controller_code import CSource, export_c
+from .c.examples import write_examples
 from .compilation.compiled_step import natively
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
@@ -28,4 +29,5 @@ __all__ = [
     "host_platform",
     "measure_on_target",
     "natively",
+    "write_examples",
 ]

@@ -19,6 +19,7 @@ from .c_text import Real, comment, identifier, real_type, signature
 from .controller_step import measured_inputs, reading_constants, settled_body, step_body, take_body
 from .elementary import elementary_functions, portable
 from .guarded_step import first_outputs
+from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
 from .reading_guard import AGREEING, GAP, MOST
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
@@ -93,7 +94,7 @@ def export_c(
         source.source: source_text(model, prefix, number),
         source.selftest: selftest_source(model, prefix, number),
     }
-    write_all(texts)
+    write_all({path: stamped(text, model) for path, text in texts.items()})
     return source
 
 
@@ -159,13 +160,17 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
         else [],
         "readings": [f"{name}_reading readings[{count}]; /* in the order of the inputs */"] if count else [],
     }
-    return filled("controller.h", values | _heads(name) | structures | readings)
+    texts = values | _heads(name) | structures | readings
+    texts |= {"provenance": origin_macros(model, name), "numbers": number_lines(model)}
+    text = filled("controller.h", texts | {"interface": "0u"})
+    return filled("controller.h", texts | {"interface": interface_version(text, model)})
 
 
 def _title(model: FlatModel) -> list[str]:
     return [
         f"/* {comment(model.name)}: {comment(model.description)}",
         f"   Sample time {model.sample_time!r} s; all numbers in SI units, given in brackets.",
+        *origin_lines(model),
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]
 

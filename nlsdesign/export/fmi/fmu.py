@@ -19,10 +19,10 @@ from ...errors import ExportError, ValueRangeError, nearest
 from ...model.flat import FlatModel
 from ...writing import draft
 from ..c.c_text import identifier
-from ..c.smooth_only import refuse_jumps
 from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
 from ..files import shell
 from .fmu_documentation import icon, page
+from .fmu_origin import with_origin
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
@@ -91,7 +91,7 @@ def export_fmu(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
     with draft(target) as file:
-        _write_archive(file, contents | binaries)
+        _write_archive(file, with_origin(model, contents | binaries))
     return target
 
 
@@ -112,7 +112,6 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
     dict
         Content by path within the FMU.
     """
-    refuse_jumps(model)
     variables = layout(model)
     texts = {"modelDescription.xml": model_description(variables, version=version, token=_TOKEN, step=step)}
     for name, text in fmu_sources(variables, version, _TOKEN).items():

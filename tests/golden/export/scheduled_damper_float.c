@@ -1,5 +1,7 @@
 /* scheduled damper: Force of a damper whose viscosity depends on speed
    Sample time 0.01 s; all numbers in SI units, given in brackets.
+   Deck damper, 111111111111 (SHA-256 of its parts).
+   From older_damper, 000000000000 (diagnosed).
    Written by nlsdesign (version) with CasADi (version); do not edit. */
 #include <float.h>
 #include <math.h>
