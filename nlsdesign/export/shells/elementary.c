@@ -44,18 +44,24 @@ static @real@ portable_exp@f@(@real@ x)
     return result * portable_power_of_two@f@(half) * portable_power_of_two@f@(both - half);
 }
 
-/* exp(x) - 1; at most 2.2 ulp. NaN stays NaN, what is too large becomes infinite, and -0 becomes 0. */
-static @real@ portable_expm1@f@(@real@ x)
+/* exp(x) - 1 where it is finite and more than -1. */
+static @real@ portable_expm1_inside@f@(@real@ x)
 {
-    const @real@ above = x < @expm1_lowest@ ? @expm1_lowest@ : x;
-    const @real@ inside = above > @exp_highest@ ? @exp_highest@ : above;
     @word@ bits;
-    const @real@ n = portable_binary_exponent@f@(inside, &bits);
-    const @real@ r = (inside - n * @ln2_high@) - n * @ln2_low@;
+    const @real@ n = portable_binary_exponent@f@(x, &bits);
+    const @real@ r = (x - n * @ln2_high@) - n * @ln2_low@;
     const @real@ half_power = portable_power_of_two@f@(bits - @shift_less_bias_below@u);
     const @real@ half_result = half_power * portable_expm1_kernel@f@(r) + (half_power - @half@);
 
     return half_result + half_result;
+}
+
+/* exp(x) - 1; at most 2.2 ulp. NaN stays NaN, what is too large becomes infinite, and -0 becomes 0. */
+static @real@ portable_expm1@f@(@real@ x)
+{
+    const @real@ above = x < @expm1_lowest@ ? @expm1_lowest@ : x;
+
+    return portable_expm1_inside@f@(above > @exp_highest@ ? @exp_highest@ : above);
 }
 
 /* tanh(x); at most 3 ulp. NaN stays NaN. */
@@ -63,7 +69,7 @@ static @real@ portable_tanh@f@(@real@ x)
 {
     const @real@ size = fabs@f@(x);
     const @real@ inside = size > @tanh_one@ ? @tanh_one@ : size;
-    const @real@ t = portable_expm1@f@(inside + inside);
+    const @real@ t = portable_expm1_inside@f@(inside + inside);
 
     return copysign@f@(t / (t + @two@), x);
 }
