@@ -141,8 +141,9 @@ def _attributes(each: FmuVariable) -> dict[str, object]:
         attributes["min"] = v.minimum
     if v.maximum < math.inf:
         attributes["max"] = v.maximum
-    if each.causality not in ("parameter", "independent") and each.variability == "continuous":
-        attributes["nominal"] = abs(v.nominal) or 1.0
+    size = v.start if each.causality == "parameter" or each.variability == "constant" else v.nominal
+    if each.causality != "independent" and size:
+        attributes["nominal"] = abs(size)
     if each.has_start:
         attributes["start"] = v.start
     return attributes
