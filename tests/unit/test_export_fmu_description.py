@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
 
 import casadi as ca
+import fmpy
 import numpy as np
 import pytest
 from lxml import etree
@@ -13,14 +16,18 @@ from lxml import etree
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.control import torque_controller
 from nlsdesign.deck import load_deck
+from nlsdesign.errors import ExportError, ValueRangeError
 from nlsdesign.export.c.guarded_step import GuardedModel
+from nlsdesign.export.fmi.authorship import Authorship
 from nlsdesign.export.fmi.dependencies import model_structure
 from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.export.fmi.fmu_variables import layout
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel, Table, Variable
+from nlsdesign.model.origin import Origin
 from tests.hand_built import controller, observer
 
+SCHEMAS = Path(fmpy.__file__).parent / "schema"
 DECKS = (
     "austin2015_as_printed",
     "austin2015_figure_consistent",
@@ -199,3 +206,59 @@ def test_sizes_see_through_gears_and_leave_stated_ones():
     stated = {each.variable.name: each.variable.nominal for each in layout(observer()).reals}
     assert stated["motor.current"] == 5.0
     assert stated["spring.torque"] > 0.0
+
+
+# --- authorship -----------------------------------------------------------------------------------
+
+ORIGIN = Origin("bench_one", "ab" * 32)
+NOON = datetime(2026, 3, 4, 14, 0, 5, tzinfo=timezone(timedelta(hours=2)))
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_an_fmu_says_who_made_it_when_and_from_which_deck(version):
+    model = replace(controller(), origin=ORIGIN)
+    about = Authorship("A. Maker", "© 2026 A. Maker", "CC-BY-4.0 <for all>", date=NOON)
+    texts = fmu_texts(model, version=version, step=1e-3, authorship=about)
+    root = etree.fromstring(texts["modelDescription.xml"])
+    assert root.get("author") == "A. Maker"
+    assert root.get("copyright") == "© 2026 A. Maker"
+    assert root.get("license") == "CC-BY-4.0 <for all>"
+    assert root.get("generationDateAndTime") == "2026-03-04T12:00:05Z"
+    assert root.get("version") == "abababababab"
+    assert root.get("description").endswith("(deck bench_one, SHA-256 abababababab)")
+    (deck,) = root.iter("deck")
+    assert dict(deck.attrib) == {"name": "bench_one", "sha256": "ab" * 32}
+    folder = f"fmi{version[0]}"
+    schema = etree.XMLSchema(etree.parse(str(SCHEMAS / folder / f"{folder}ModelDescription.xsd")))
+    schema.assertValid(root)
+    page = texts["documentation/index.html"].decode()
+    for text in ("A. Maker", "bench_one", "ab" * 32, "2026-03-04T12:00:05Z", "CC-BY-4.0 &lt;for all&gt;"):
+        assert f"<dd>{text}</dd>" in page
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_token_is_a_hash_of_the_content_without_the_date(version):
+    def token(model: FlatModel, about: Authorship) -> str:
+        text = fmu_texts(model, version=version, step=1e-3, authorship=about)["modelDescription.xml"]
+        root = etree.fromstring(text)
+        return root.get("guid") or root.get("instantiationToken")
+
+    one, later = Authorship(date=NOON), Authorship(date=NOON + timedelta(days=9))
+    assert token(controller(), one) == token(controller(), later)
+    assert token(replace(controller(), origin=ORIGIN), one) != token(controller(), one)
+    assert token(controller(), Authorship("A. Maker", date=NOON)) != token(controller(), one)
+
+
+def test_the_date_is_given_or_that_of_the_environment_or_now(monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    assert Authorship().dated().stamp == "1970-01-02T00:00:00Z"
+    assert Authorship(date=NOON).dated().stamp == "2026-03-04T12:00:05Z"
+    for bad in ("noon", "1e30", "9" * 30):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", bad)
+        with pytest.raises(ExportError, match="SOURCE_DATE_EPOCH"):
+            Authorship().dated()
+    monkeypatch.delenv("SOURCE_DATE_EPOCH")
+    now = Authorship().dated().date
+    assert abs((datetime.now(UTC) - now).total_seconds()) < 60.0
+    with pytest.raises(ValueRangeError, match="time zone"):
+        Authorship(date=datetime(2026, 3, 4))

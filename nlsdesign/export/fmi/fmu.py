@@ -1,8 +1,8 @@
 """Functional mock-up units for co-simulation, FMI 3.0 and 2.0, of any flat model.
 
 A continuous model contains its own integrator, a discrete one the same C code as the controller.
-Archives are deterministic: the same model gives the same bytes, and the instantiation token is a hash of the
-content.
+Archives are deterministic: the same model and date give the same bytes. The instantiation token is a hash of
+the content without the date.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..c.c_text import identifier
 from ..c.smooth_only import refuse_jumps
 from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
 from ..files import shell
+from .authorship import Authorship
 from .fmu_documentation import icon, page
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
@@ -38,6 +39,7 @@ def export_fmu(
     version: str = "3.0",
     platforms: Sequence[str] | None = None,
     step: float | None = None,
+    authorship: Authorship | None = None,
 ) -> Path:
     """Write a co-simulation FMU with sources, documentation and compiled binaries.
 
@@ -54,6 +56,9 @@ def export_fmu(
         the machine this runs on.
     step
         Communication step of the default experiment in s; 1 ms or the sample time by default.
+    authorship
+        Author, licence and date of the export; the date is the present time by default, or that of
+        ``SOURCE_DATE_EPOCH``.
 
     Returns
     -------
@@ -86,7 +91,7 @@ def export_fmu(
     if not (math.isfinite(length) and length > 0.0):
         raise ValueRangeError(f"step={length}", "must be a positive number of seconds")
     chosen = chosen_platforms(platforms)
-    contents = fmu_texts(model, version=version, step=length)
+    contents = fmu_texts(model, version=version, step=length, authorship=(authorship or Authorship()).dated())
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
@@ -95,7 +100,9 @@ def export_fmu(
     return target
 
 
-def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes]:
+def fmu_texts(
+    model: FlatModel, *, version: str, step: float, authorship: Authorship | None = None
+) -> dict[str, bytes]:
     """Return everything in an FMU but the binaries.
 
     Parameters
@@ -106,6 +113,8 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
         ``"3.0"`` or ``"2.0"``.
     step
         Communication step of the default experiment in s.
+    authorship
+        Author, licence and date. The date has no part in the token.
 
     Returns
     -------
@@ -113,13 +122,16 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
         Content by path within the FMU.
     """
     refuse_jumps(model)
-    variables = layout(model)
-    texts = {"modelDescription.xml": model_description(variables, version=version, token=_TOKEN, step=step)}
-    for name, text in fmu_sources(variables, version, _TOKEN).items():
-        texts[f"sources/{name}"] = text
-    token = _token(texts)
-    texts = {path: text.replace(_TOKEN, token) for path, text in texts.items()}
-    texts["documentation/index.html"] = page(variables)
+    variables, about = layout(model), authorship or Authorship()
+
+    def description(token: str, shown: Authorship) -> str:
+        return model_description(variables, version=version, token=token, step=step, authorship=shown)
+
+    sources = {f"sources/{name}": text for name, text in fmu_sources(variables, version, _TOKEN).items()}
+    token = _token(sources | {"modelDescription.xml": description(_TOKEN, about.undated())})
+    texts = {path: text.replace(_TOKEN, token) for path, text in sources.items()}
+    texts["modelDescription.xml"] = description(token, about)
+    texts["documentation/index.html"] = page(variables, about)
     texts["documentation/licenses/license.txt"] = shell("license.txt")
     if version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(variables)

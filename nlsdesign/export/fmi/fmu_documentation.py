@@ -9,18 +9,22 @@ from collections.abc import Sequence
 from html import escape
 
 from ...locations import version as own_version
+from ...model.origin import Origin
 from ...quantity import typeset_unit
 from ..files import filled
+from .authorship import Authorship
 from .fmu_variables import FmuLayout, FmuVariable
 
 
-def page(layout: FmuLayout) -> str:
+def page(layout: FmuLayout, authorship: Authorship | None = None) -> str:
     """Return ``documentation/index.html``: a table of all variables, readable without a network.
 
     Parameters
     ----------
     layout
         Variables of the FMU.
+    authorship
+        Author, licence and date.
     """
     model = layout.model
     kind = (
@@ -39,8 +43,26 @@ def page(layout: FmuLayout) -> str:
         ("Derivatives and signals", (*layout.derivatives, *layout.signals)),
     )
     tables = "\n".join(_table(title, group) for title, group in groups if group)
+    rows = _about(model.origin, authorship or Authorship())
     texts = {"title": model.name, "description": model.description, "kind": kind, "version": own_version()}
-    return filled("index.html", {key: escape(text) for key, text in texts.items()} | {"tables": tables})
+    return filled(
+        "index.html", {key: escape(text) for key, text in texts.items()} | {"about": rows, "tables": tables}
+    )
+
+
+def _about(origin: Origin | None, authorship: Authorship) -> list[str]:
+    """Return rows of a list that says where the FMU comes from."""
+    known = authorship.attributes(origin)
+    texts = {
+        "Deck": origin.deck if origin else "",
+        "SHA-256 of the deck": origin.digest if origin else "",
+        "Version": known.get("version", ""),
+        "Author": authorship.author,
+        "Copyright": authorship.copyright,
+        "Licence": known["license"],
+        "Date of export": authorship.stamp,
+    }
+    return [f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in texts.items() if text]
 
 
 def _table(title: str, group: Sequence[FmuVariable]) -> str:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 from ...locations import version as own_version
 from ...quantity import BASE, parse_unit
 from ..c.c_text import identifier
+from .authorship import Authorship, described
 from .dependencies import FmiUnknown, ModelStructure, model_structure
 from .fmu_sources import main_source
 from .fmu_variables import RELATIVE_TOLERANCE, FmuLayout, FmuVariable
@@ -22,7 +23,9 @@ LOG_CATEGORIES = {
 _SHOWN: Mapping[tuple[int, ...], str] = {(0, 0, 0, 0, 0, 1): "deg", (0, 0, -1, 0, 0, 1): "deg/s"}
 
 
-def model_description(layout: FmuLayout, *, version: str, token: str, step: float) -> str:
+def model_description(
+    layout: FmuLayout, *, version: str, token: str, step: float, authorship: Authorship | None = None
+) -> str:
     """Return ``modelDescription.xml``.
 
     Parameters
@@ -35,6 +38,8 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
         Instantiation token or GUID.
     step
         Communication step of the default experiment in s.
+    authorship
+        Author, licence and date; nothing but the licence of the shells by default.
     """
     model, two = layout.model, version == "2.0"
     root = _element(
@@ -43,7 +48,8 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
         fmiVersion=version,
         modelName=model.name,
         **{"guid" if two else "instantiationToken": token},
-        description=model.description,
+        description=described(model.description, model.origin),
+        **(authorship or Authorship()).attributes(model.origin),
         generationTool=f"nlsdesign {own_version()}",
         variableNamingConvention="structured",
     )
@@ -56,12 +62,19 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
     if model.sample_time is None:
         experiment.set("tolerance", _text(RELATIVE_TOLERANCE))
     experiment.set("stepSize", _text(step))
+    if two and model.origin:
+        tool = _element(ElementTree.SubElement(root, "VendorAnnotations"), "Tool", name="nlsdesign")
+        _element(tool, "deck", name=model.origin.deck, sha256=model.origin.digest)
     variables = ElementTree.SubElement(root, "ModelVariables")
     for each in layout.everything:
         (_variable2 if two else _variable3)(variables, each)
     (_structure2 if two else _structure3)(
         ElementTree.SubElement(root, "ModelStructure"), model_structure(layout)
     )
+    if not two and model.origin:
+        notes = ElementTree.SubElement(root, "Annotations")
+        note = _element(notes, "Annotation", type="nlsdesign.deck")
+        _element(note, "deck", name=model.origin.deck, sha256=model.origin.digest)
     return _written(root)
 
 
