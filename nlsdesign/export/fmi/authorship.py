@@ -14,8 +14,8 @@ SHORT_DIGEST = 12
 """Digits of a deck's digest where the whole would be in the way."""
 
 _LICENCE = (
-    "Shells in C: MIT, see documentation/licenses/license.txt; equations and numbers: as the author of the model "
-    "states"
+    "Shells in C: MIT, see documentation/licenses/license.txt; equations and numbers: as the author of the "
+    "model states"
 )
 
 

@@ -27,6 +27,7 @@ from .fmu_documentation import icon, page
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
+from .terminals import terminals
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _TOKEN = "{token-of-this-content}"
@@ -135,9 +136,16 @@ def fmu_texts(
     texts["documentation/licenses/license.txt"] = shell("license.txt")
     if version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(variables)
-        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons()
-    picture = "model.png" if version == "2.0" else "terminalsAndIcons/icon.png"
-    return {path: text.encode() for path, text in texts.items()} | {picture: icon()}
+        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(variables)
+    return {path: text.encode() for path, text in texts.items()} | _pictures(variables.model, version)
+
+
+def _pictures(model: FlatModel, version: str) -> dict[str, bytes]:
+    """Return the pictures of the model, and in FMI 3.0 of its terminals."""
+    if version == "2.0":
+        return {"model.png": icon()}
+    attached = {each.picture for each in terminals(model)}
+    return {f"terminalsAndIcons/{name}.png": icon(name) for name in ("icon", *sorted(attached))}
 
 
 def _token(texts: Mapping[str, str]) -> str:

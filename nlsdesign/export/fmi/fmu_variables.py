@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
 from .expression_walk import EVERYTHING, Interval, ranges
+from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
 
 RELATIVE_TOLERANCE = 1e-8
@@ -116,6 +117,7 @@ def layout(model: FlatModel) -> FmuLayout:
     continuous = model.sample_time is None
     changing = "continuous" if continuous else "discrete"
     _check_names(model)
+    model = with_flange_outputs(model)
     sizes = typical_sizes(model)
     model = _as_shown(model, sizes)
     outputs, signals = _named_once(model)

@@ -13,6 +13,7 @@ from .authorship import Authorship, described
 from .dependencies import FmiUnknown, ModelStructure, model_structure
 from .fmu_sources import main_source
 from .fmu_variables import RELATIVE_TOLERANCE, FmuLayout, FmuVariable
+from .terminals import FLANGE, Terminal, terminals
 
 LOG_CATEGORIES = {
     "logStatusError": "What could not be done, and why",
@@ -93,14 +94,45 @@ def build_description(layout: FmuLayout) -> str:
     return _written(root)
 
 
-def terminals_and_icons() -> str:
-    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: the place of the icon."""
+def terminals_and_icons(layout: FmuLayout) -> str:
+    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: icon and terminals with their places.
+
+    Parameters
+    ----------
+    layout
+        Variables of the FMU.
+    """
     root = _element(None, "fmiTerminalsAndIcons", fmiVersion="3.0")
     picture = ElementTree.SubElement(root, "GraphicalRepresentation")
     corners = {"x1": -100.0, "y1": -100.0, "x2": 100.0, "y2": 100.0}
     _element(picture, "CoordinateSystem", **corners, suggestedScalingFactorTo_mm=0.1)
     _element(picture, "Icon", **corners)
+    every = terminals(layout.model)
+    group = ElementTree.SubElement(root, "Terminals") if every else root
+    beside = [each for each in every if each.picture == FLANGE]
+    for each in every:
+        # The bus on the left, flanges on the right, one above the other.
+        right = each in beside
+        x = 100.0 if right else -100.0
+        y = 100.0 - 200.0 * (beside.index(each) + 1) / (len(beside) + 1) if right else 0.0
+        _terminal(group, each, (x, y))
     return _written(root)
+
+
+def _terminal(parent: ElementTree.Element, each: Terminal, place: tuple[float, float]) -> None:
+    names = {"name": each.name, "matchingRule": each.rule, "terminalKind": each.kind}
+    terminal = _element(parent, "Terminal", **names, description=each.description)
+    for member in each.members:
+        _element(
+            terminal,
+            "TerminalMemberVariable",
+            variableName=member.variable,
+            memberName=member.name,
+            variableKind=member.kind,
+        )
+    x, y = place
+    corners = {"x1": x - 10.0, "y1": y - 10.0, "x2": x + 10.0, "y2": y + 10.0}
+    _element(terminal, "TerminalGraphicalRepresentation", **corners, iconBaseName=each.picture)
 
 
 def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> None:
