@@ -6,11 +6,14 @@ from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
 from .cosimulation.cosimulate import CoSimulation, cosimulate
 from .cosimulation.master import Late
+from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
+from .fmi.reference_results import write_reference
 
 __all__ = [
     "ALL_PLATFORMS",
     "PLATFORMS",
+    "Authorship",
     "CSource",
     "CoSimulation",
     "CompiledStep",
@@ -20,4 +23,5 @@ __all__ = [
     "export_fmu",
     "host_platform",
     "natively",
+    "write_reference",
 ]
