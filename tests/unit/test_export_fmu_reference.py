@@ -90,7 +90,7 @@ def test_fmpys_run_of_the_fmu_agrees_with_the_reference(name, version, tmp_path)
     assert worst_deviation(fmu, model) > 5e-5
 
 
-@pytest.mark.parametrize("name", ("specimen", "observer"))
+@pytest.mark.parametrize("name", ["specimen", "observer"])
 def test_the_files_keep_the_rules_of_the_cross_check(name, tmp_path):
     model = MODELS[name]
     files = write_reference(model, tmp_path / "x.fmu")

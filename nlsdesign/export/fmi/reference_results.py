@@ -117,22 +117,24 @@ def write_reference(model: FlatModel, fmu: str | Path, *, step: float | None = N
     >>> write_reference(plant, "out/fmu/plant.fmu")  # doctest: +SKIP
     (PosixPath('out/fmu/plant_ref.csv'), ...)
     """
-    found = reference_results(model, step=step)
+    reference = reference_results(model, step=step)
     place = Path(fmu)
-    length = float(found.time[1] - found.time[0])
+    length = float(reference.time[1] - reference.time[0])
     options = {
         "StartTime": 0.0,
-        "StopTime": float(found.time[-1]),
+        "StopTime": float(reference.time[-1]),
         "StepSize": length,
         "RelTol": RELATIVE_TOLERANCE,
         "OutputIntervalLength": length,
     }
     texts = {
-        place.with_name(f"{place.stem}_ref.csv"): _csv(found.time, found.result_names, found.results),
+        place.with_name(f"{place.stem}_ref.csv"): _csv(
+            reference.time, reference.result_names, reference.results
+        ),
         place.with_name(f"{place.stem}_ref.opt"): "".join(f"{k}, {v!r}\n" for k, v in options.items()),
     }
-    if found.input_names:
-        given = _csv(found.time, found.input_names, found.inputs)
+    if reference.input_names:
+        given = _csv(reference.time, reference.input_names, reference.inputs)
         texts[place.with_name(f"{place.stem}_in.csv")] = given
     write_all(texts)
     return tuple(texts)
