@@ -88,6 +88,11 @@ class Table:
     columns: tuple[Variable, ...]
     values: NDArray[np.float64]
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """First and last grid point."""
+        return self.lower, self.lower + self.step * (self.values.shape[0] - 1)
+
     def look_up(self, at: float) -> NDArray[np.float64]:
         """Return all columns at one argument; not a number where the argument is none.
 
@@ -153,8 +158,12 @@ class FlatModel:
         What the model is made of: which variables belong together, in written order. Empty where that is
         not declared.
     begin
-        Of a sampled model: ``casadi.Function`` (u, p, w) -> x, the states that fit the first inputs of a
-        machine at rest; ``None`` where the start values fit any.
+        Of a sampled model: ``casadi.Function`` (x, u, p, w) -> (begun, resumed): from the start values the
+        states of a machine that rests at its first reading, and from the last states those with which it
+        goes on after a gap in its readings. ``None`` where the states fit any reading.
+    expected
+        Of a sampled model: ``casadi.Function`` (x, u, p, w) -> what it expects of each input, which takes the
+        place of a reading that cannot be used; ``None`` where it expects nothing.
     origin
         The deck behind the model, ``None`` where it was made otherwise.
     """
@@ -174,6 +183,7 @@ class FlatModel:
     springs: tuple[SpringNames, ...] = ()
     readings: tuple[ReadingNames, ...] = ()
     begin: ca.Function | None = None
+    expected: ca.Function | None = None
     origin: Origin | None = None
 
     def symbols(self) -> Symbols:

@@ -87,6 +87,7 @@ class FilteredDifference(DesiredRate):
         before = writer.state("torque_loop.desired.previous", "N*m", "desired torque one sample ago")
         old = writer.state("torque_loop.desired.rate", "N*m/s", "filtered rate of the desired torque")
         rate = writer.low_pass(old, (heard.desired - before) / writer.sample_time, corner)
+        writer.begin("torque_loop.desired.previous", heard.desired)
         writer.follow("torque_loop.desired.previous", heard.desired)
         writer.follow("torque_loop.desired.rate", rate)
         return rate
@@ -223,6 +224,7 @@ class ScheduledTorque(TorqueLaw):
         before = writer.state("torque_loop.feedforward.previous", "rad/s", "feedforward one sample ago")
         old = writer.state("torque_loop.feedforward.rate", "rad/s^2", "filtered rate of the feedforward")
         rate = writer.low_pass(old, (ahead - before) / writer.sample_time, corner)
+        writer.begin("torque_loop.feedforward.previous", ahead)
         writer.follow("torque_loop.feedforward.previous", ahead)
         writer.follow("torque_loop.feedforward.rate", rate)
         return share * rate

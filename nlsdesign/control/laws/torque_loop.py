@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from ...errors import ArrangementError, ValueRangeError
 from ...model import FlatModel, Variable
+from ...model.declared_limits import with_declared_reading
 from .known_drive import KnownDrive
 from .law_writer import LawWriter
 from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
@@ -161,7 +162,14 @@ def torque_controller(
     )  # fmt: skip
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
-    return writer.model("torque_controller", description, (output, motor.current))
+    model = writer.model("torque_controller", description, (output, motor.current))
+    return _with_declared_angle(model, plant, names.angle)
+
+
+def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) -> FlatModel:
+    """Return the controller with what the deck declares of the readings of its angle."""
+    inputs = [with_declared_reading(v, plant, angle) if v.name == angle else v for v in controller.inputs]
+    return replace(controller, inputs=tuple(inputs))
 
 
 def _parts(

@@ -17,10 +17,12 @@ from ...locations import version
 from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
-from .controller_step import step_body
-from .guarded_step import STATUS_BITS, first_outputs, index_bit
+from .controller_step import measured_inputs, reading_constants, settled_body, step_body, take_body
+from .guarded_step import first_outputs
+from .reading_guard import AGREEING, GAP, MOST
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
+from .status_bits import STATUS_BITS, index_bit
 from .structures import initialiser, member_paths, structure
 from .table_lookup import indexed_tables, table_data
 
@@ -150,7 +152,14 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
     bits = [f"#define {upper}_{flag} 0x{bit:x}u /* {text} */" for flag, (bit, text) in STATUS_BITS.items()]
     sample_time = real.literal(float(model.sample_time or 0.0))
     values = {"name": name, "NAME": upper, "title": _title(model), "bits": bits, "sample_time": sample_time}
-    return filled("controller.h", values | _heads(name) | structures)
+    count = len(measured_inputs(model))
+    readings = {
+        "reading": filled("controller_reading.h", {"name": name, "real": real.name}).splitlines()
+        if count
+        else [],
+        "readings": [f"{name}_reading readings[{count}]; /* in the order of the inputs */"] if count else [],
+    }
+    return filled("controller.h", values | _heads(name) | structures | readings)
 
 
 def _title(model: FlatModel) -> list[str]:
@@ -190,8 +199,6 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
     names = {"real": real.name, "zero": real.literal(0.0), "name": name, "NAME": name.upper()}
-    guards = [filled("controller_guard.c", names)] if model.inputs else []
-    guards += [filled("controller_parameter.c", names)] if model.parameters else []
     values = {
         "title": _title(model),
         "tables": [line for table in tables for line in (*table, "")],
@@ -199,11 +206,70 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
         "start_states": initialiser(model.states, real),
         "start_inputs": initialiser(inputs, real),
         "start_outputs": initialiser(outputs, real),
-        "guards": [line for guard in guards for line in (*guard.splitlines(), "")],
+        "guards": _guards(model, real, names),
         "assignments": _assignments(model, real),
+        "start_readings": _start_readings(model, name, real),
+        "settled": _settled(model, name, real),
+        "take": [*take_body(model, name, real), *_beginning(model, name)],
         "body": body,
     }
     return filled("controller.c", {**names, **_heads(name), **values})
+
+
+def _guards(model: FlatModel, real: Real, names: dict[str, str]) -> list[str]:
+    """Return the functions that judge commands, readings and parameters, as far as there are any."""
+    largest = "FLT_MAX" if real.name == "float" else "DBL_MAX"
+    numbers: dict[str, str | list[str]] = {
+        **names, "LARGEST": largest, "fabs": real.function("fabs"), "AGREEING": str(AGREEING),
+        "GAP": str(GAP), "MOST": str(MOST), "readings": reading_constants(model, real),
+    }  # fmt: skip
+    count = len(measured_inputs(model))
+    wanted = {
+        "controller_guard.c": len(model.inputs) > count,
+        "controller_reading.c": count > 0,
+        "controller_parameter.c": bool(model.parameters),
+    }
+    texts = [filled(shell, numbers) for shell, is_wanted in wanted.items() if is_wanted]
+    return [line for text in texts for line in (*text.splitlines(), "")]
+
+
+def _start_readings(model: FlatModel, name: str, real: Real) -> list[str]:
+    paths, lines = member_paths(model.inputs), []
+    for reading, number in measured_inputs(model).items():
+        lines.append(f"state->readings[{number}] = ({name}_reading){{0}};")
+        lines.append(f"state->readings[{number}].last = start_inputs.{paths[reading]};")
+    return lines
+
+
+def _settled(model: FlatModel, name: str, real: Real) -> list[str]:
+    """Return the functions that begin and resume, where the states depend on the readings."""
+    if model.begin is None:
+        return []
+    lines: list[str] = []
+    for which, verb in enumerate(("begin", "resume")):
+        words = "rests at its first readings" if which == 0 else "goes on after a gap in its readings"
+        lines += [f"/* Sets the states of a machine that {words}. */"]
+        lines += [f"static void {name}_{verb}({name}_state *state)", "{"]
+        lines += [f"    {line}" for line in settled_body(model, real, which) or ["(void)state;"]]
+        lines += ["}", ""]
+    return lines
+
+
+def _beginning(model: FlatModel, name: str) -> list[str]:
+    """Return the statements that begin with the first usable readings, and resume after a gap."""
+    readings = measured_inputs(model).values()
+    begin = [f"    {name}_begin(state);"] if model.begin is not None else []
+    seen = " && ".join(f"state->readings[{number}].seen != 0u" for number in readings)
+    condition = f"state->begun == 0u && {seen}" if seen else "state->begun == 0u"
+    lines = [f"if ({condition}) {{", *begin, "    state->begun = 1u;"]
+    if readings and model.begin is not None:
+        return [
+            *lines,
+            "} else if (state->begun != 0u && resuming != 0u) {",
+            f"    {name}_resume(state);",
+            "}",
+        ]
+    return [*lines, "}"]
 
 
 def _at(variable: Variable, start: float) -> Variable:

@@ -174,6 +174,7 @@ def _discrete(layout: FmuLayout, name: str) -> str:
     missing = [t for t in indexed_tables(model) if t.columns(looked_up) and not t.columns(known)]
     values = {
         "name": name,
+        "NAME": name.upper(),
         "tables": [line for each in missing for line in (*table_data(each, DOUBLE), "")],
         "parameters": [f"parameters.{path} = p[{i}];" for i, path in enumerate(p)],
         "start": [f"memory->states.{path} = x[{i}];" for i, path in enumerate(x)],

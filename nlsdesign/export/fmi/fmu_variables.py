@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
+from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
 from .expression_walk import EVERYTHING, Interval, ranges
 from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
@@ -206,10 +207,10 @@ def _extra(model: FlatModel, reference: int) -> FmuVariable:
 
 
 def _status(reference: int) -> FmuVariable:
-    text = (
-        "Status word of the last sample: bit 0 input held, 1 input saturated, 2 state held, 3 output held; "
-        "bit 8 + i: input i"
+    bits = ", ".join(
+        f"{bit.bit_length() - 1} {flag.lower().replace('_', ' ')}" for flag, (bit, _) in STATUS_BITS.items()
     )
+    text = f"Status word of the last sample: bit {bits}; bit {FIRST_INDEX_BIT} + i: input i"
     status = Variable("sample.status", "1", text)
     return FmuVariable(reference, status, "local", "discrete", "calculated", integer=True)
 

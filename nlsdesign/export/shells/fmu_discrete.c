@@ -18,6 +18,11 @@ static void model_start(model_memory *memory, const double x[], const double p[]
     (void)@name@_init(memory, NULL);
     @start@
     model_tune(memory, p);
+    for (int i = 0; i < MODEL_STATES; ++i) { /* states that were set are not taken from the first readings */
+        if (x[i] < model_variable[MODEL_X + i].start || x[i] > model_variable[MODEL_X + i].start) {
+            memory->begun = 1u;
+        }
+    }
     (void)x;
 }
 
@@ -25,12 +30,18 @@ static void model_start(model_memory *memory, const double x[], const double p[]
 static int32_t model_sample(model_memory *memory, const double u[], double x[], double y[],
                             double s[])
 {
-    const @name@_states before = memory->states;
     @name@_inputs inputs = {0};
     @name@_outputs outputs = {0};
 
     @inputs@
-    const uint32_t status = @name@_step(memory, &inputs, &outputs);
+    uint32_t status = @name@_take(memory, &inputs);
+    const @name@_states before = memory->states;
+    if (memory->begun == 0u) {
+        outputs = memory->outputs;
+        status |= @NAME@_WAITING;
+    } else {
+        status |= @name@_advance(memory, &outputs);
+    }
     @states@
     @outputs@
     @signals@

@@ -103,7 +103,8 @@ static void refresh(instance *me)
     model_memory trial;
     memset(&trial, 0, sizeof trial);
     model_start(&trial, &v[MODEL_X], &v[MODEL_P]);
-    me->now.status = model_sample(&trial, &v[MODEL_U], &v[MODEL_X], &v[MODEL_Y], &v[MODEL_S]);
+    double states[MODEL_STATES > 0 ? MODEL_STATES : 1]; /* those that are set stay shown until the first sample */
+    me->now.status = model_sample(&trial, &v[MODEL_U], states, &v[MODEL_Y], &v[MODEL_S]);
 #endif
     me->now.outdated = 0;
 }

@@ -32,6 +32,7 @@ from ...quantity import typeset_unit
 from ...simulation.prior import Prior, declared_prior
 from ..scheduling.forms import finished, minimal_form
 from ..scheduling.gains import CascadeGain
+from ..scheduling.measured_angle import with_plausible_inputs
 from ..scheduling.scheduled import MEMORY, check_sampling, whole_contour
 from ..scheduling.step import ObserverStep
 from ..scheduling.table import Compact, Grid
@@ -168,7 +169,8 @@ def design_adaptive_observer(
     noises = FilterNoise(noise, missed / points.inertia, missed, safe_inputs(model, prior))
     flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = AdaptiveDesign(replace(flat, bodies=observed), step, compact, directions, settings.duty, trust)
+    flat = with_plausible_inputs(replace(flat, bodies=observed), model, plant, compact.angles)
+    design = AdaptiveDesign(flat, step, compact, directions, settings.duty, trust)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 

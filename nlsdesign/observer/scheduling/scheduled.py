@@ -16,8 +16,10 @@ from ...model.roles import measured_motion, spring_torque
 from ...quantity import typeset_unit
 from ...symbolic import Expression
 from .braking import braked_speed
+from .first_reading import FirstReading
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, FittedGain, GainRule
+from .measured_angle import measured_angle, with_plausible_inputs
 from .step import ObserverStep
 from .table import Compact, Grid, GridByTolerance
 
@@ -133,7 +135,8 @@ def design_observer_with_details(
     step = ObserverStep(plant, fitted, sample_time, reference)
     compact = over.compact(step.entries)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = ObserverDesign(replace(_Writer(step, compact).model(), bodies=observed), step, compact)
+    written = replace(_Writer(step, compact).model(), bodies=observed)
+    design = ObserverDesign(with_plausible_inputs(written, model, plant, compact.angles), step, compact)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 
@@ -198,7 +201,8 @@ class _Writer:
         filtered = [ca.SX.sym(f"{name}.rate") for name in plant.measured] if self._filters else []
         angle, u = ca.SX.sym(self.angle.name), [ca.SX.sym(v.name) for v in plant.inputs]
         measured = [angle, *(self.read("measured", i) for i in range(len(plant.measured)))]
-        prior = self._braked([memory[i] + self.read("prior", i) for i in range(n)])
+        prior = self.prior(memory)
+        first = FirstReading(self, memory, [*previous, *filtered], angle)
         seen = [int(np.argmax(row)) for row in plant.output_matrix]
         innovation = [y - prior[i] for y, i in zip(measured, seen, strict=True)]
         state = [prior[i] + self.row("correction", i, innovation) for i in range(n)]
@@ -231,6 +235,8 @@ class _Writer:
             equations=equations,
             sample_time=self.step.sample_time,
             tables=self._tables(),
+            begin=first.begin(),
+            expected=first.expected(),
         )
 
     @property
@@ -249,13 +255,13 @@ class _Writer:
             else raw
         )
 
-    def _braked(self, state: list[Expression]) -> list[Expression]:
-        """Return the state after friction has acted for one sample; the angle moves by half of that."""
+    def prior(self, memory: Sequence[Expression]) -> list[Expression]:
+        """Return the states expected at a sample, after friction, half of which moves the angle too."""
+        after = [memory[i] + self.read("prior", i) for i in range(self.n)]
         if self.plant.friction is None:
-            return state
-        time, before = self.step.sample_time, state[self.speed_place]
+            return after
+        time, before = self.step.sample_time, after[self.speed_place]
         change = ca.SX(braked_speed(self.plant.friction, time)(before)) - before
-        after = list(state)
         after[self.angle_place] += time / 2.0 * change
         after[self.speed_place] += change
         return after
@@ -284,12 +290,7 @@ class _Writer:
         return tuple(states)
 
     def _inputs(self) -> tuple[Variable, ...]:
-        grid, size = self.compact.angles, float(self.plant.sizes[self.angle_place])
-        angle = Variable(
-            self.angle.name, self.angle.unit, f"measured {self.angle.name}; the table reaches from "
-            f"{grid[0]:.4g} to {grid[-1]:.4g} rad and holds its ends beyond", nominal=size,
-        )  # fmt: skip
-        return (angle, *self.plant.inputs)
+        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
 
     def _outputs(self) -> tuple[Variable, ...]:
         plant = self.plant
