@@ -20,9 +20,11 @@ from ...model.flat import FlatModel
 from ...writing import draft
 from ..c.c_text import identifier
 from ..c.smooth_only import refuse_jumps
-from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
+from ..compilation.cross_compiler import Platform, chosen_platforms
 from ..files import shell
 from .authorship import Authorship
+from .compiled_binaries import compiled_binaries
+from .compiled_binaries import fmi_headers as fmi_headers
 from .fmu_documentation import icon, page
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
@@ -160,31 +162,20 @@ def _token(texts: Mapping[str, str]) -> str:
 def _binaries(
     contents: Mapping[str, bytes], folder: Path, name: str, version: str, platforms: Sequence[Platform]
 ) -> dict[str, bytes]:
-    for path, content in contents.items():
-        if path.startswith("sources/"):
-            (folder / path).parent.mkdir(exist_ok=True)
-            (folder / path).write_bytes(content)
-    source = folder / "sources" / main_source(version)
+    prefix = "sources/"
+    sources = {
+        path.removeprefix(prefix): content for path, content in contents.items() if path.startswith(prefix)
+    }
+    sources.pop("buildDescription.xml", None)
+    libraries = compiled_binaries(sources, main_source(version), folder, name=name, platforms=platforms)
     built: dict[str, dict[str, bytes]] = {}
     for each in platforms:
-        place = folder / each.name
-        place.mkdir()
-        library = compile_library(
-            [source], place / f"{name}{each.extension}", platform=each, include=[fmi_headers()]
-        )
         where = each.name if version == "3.0" else each.fmi2
-        built.setdefault(f"binaries/{where}/{library.name}", {})[each.name] = library.read_bytes()
+        built.setdefault(f"binaries/{where}/{name}{each.extension}", {})[each.name] = libraries[each.name]
     return {
         path: next(iter(parts.values())) if len(parts) == 1 else universal_binary(parts)
         for path, parts in built.items()
     }
-
-
-def fmi_headers() -> Path:
-    """Return the folder of the headers of the FMI standard, which come with fmpy."""
-    import fmpy
-
-    return Path(fmpy.__file__).parent / "c-code"
 
 
 def universal_binary(parts: Mapping[str, bytes]) -> bytes:
