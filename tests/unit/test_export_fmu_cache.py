@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.errors import ExportError
+from nlsdesign.errors import ExportError, UnknownNameError
 from nlsdesign.export import export_fmu
 from nlsdesign.export.compilation import cross_compiler
 from nlsdesign.export.fmi import compiled_binaries
@@ -100,3 +100,23 @@ def test_without_a_cache_there_is_an_fmu_all_the_same(compiled, tmp_path, monkey
     with zipfile.ZipFile(unit) as archive:
         assert len([n for n in archive.namelist() if n.startswith("binaries/")]) == 2
     assert len(compiled) == 4
+
+
+@pytest.mark.parametrize(
+    ("named", "expected"), [("all", 5), ("x86_64-windows, aarch64-linux", 2), ("", 1), (None, 1)]
+)
+def test_the_environment_names_the_platforms_where_nobody_else_does(
+    compiled, tmp_path, monkeypatch, named, expected
+):
+    if named is None:
+        monkeypatch.delenv("NLSDESIGN_PLATFORMS", raising=False)
+    else:
+        monkeypatch.setenv("NLSDESIGN_PLATFORMS", named)
+    export_fmu(controller(), tmp_path / "a.fmu")
+    assert len(compiled) == expected
+    export_fmu(controller().with_values({"gain.integral": 41.0}), tmp_path / "a.fmu", platforms=PLATFORMS)
+    assert len(compiled) == expected + 2
+    monkeypatch.setenv("NLSDESIGN_PLATFORMS", "amiga")
+    with pytest.raises(UnknownNameError, match="amiga"):
+        export_fmu(controller(), tmp_path / "b.fmu")
+    assert not (tmp_path / "b.fmu").exists()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import struct
 import tempfile
 import zipfile
@@ -20,7 +21,7 @@ from ...model.flat import FlatModel
 from ...writing import draft
 from ..c.c_text import identifier
 from ..c.smooth_only import refuse_jumps
-from ..compilation.cross_compiler import Platform, chosen_platforms
+from ..compilation.cross_compiler import ALL_PLATFORMS, Platform, chosen_platforms
 from ..files import shell
 from .authorship import Authorship
 from .compiled_binaries import compiled_binaries
@@ -55,8 +56,9 @@ def export_fmu(
     version
         ``"3.0"`` or ``"2.0"``.
     platforms
-        Names from :data:`~nlsdesign.export.compilation.cross_compiler.PLATFORMS`; by default only that of
-        the machine this runs on.
+        Names from :data:`~nlsdesign.export.compilation.cross_compiler.PLATFORMS`. By default those that the
+        environment variable ``NLSDESIGN_PLATFORMS`` names, separated by commas or as ``all``; without it that
+        of the machine this runs on.
     step
         Communication step of the default experiment in s; 1 ms or the sample time by default.
     authorship
@@ -93,7 +95,7 @@ def export_fmu(
     length = step if step is not None else (model.sample_time or 1e-3)
     if not (math.isfinite(length) and length > 0.0):
         raise ValueRangeError(f"step={length}", "must be a positive number of seconds")
-    chosen = chosen_platforms(platforms)
+    chosen = chosen_platforms(platforms if platforms is not None else _platforms_of_environment())
     contents = fmu_texts(model, version=version, step=length, authorship=(authorship or Authorship()).dated())
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
@@ -101,6 +103,11 @@ def export_fmu(
     with draft(target) as file:
         _write_archive(file, contents | binaries)
     return target
+
+
+def _platforms_of_environment() -> Sequence[str] | None:
+    named = [name.strip() for name in os.environ.get("NLSDESIGN_PLATFORMS", "").split(",") if name.strip()]
+    return (ALL_PLATFORMS if "all" in named else named) or None
 
 
 def fmu_texts(
