@@ -246,8 +246,8 @@ a count.
 
 
 def _notes() -> Iterator[str]:
-    yield """fmpy runs in the environment of nlsdesign; cofmupy brings an older release of it and shows outputs
-alone, of the plant the counts of the encoder. ecospy needs the wheel `tbb` beside it. libcosim has no FMI
+    yield """fmpy runs in the environment of nlsdesign; cofmupy brings an older release of it and shows
+outputs alone, of the plant the counts of the encoder. ecospy needs the wheel `tbb` beside it. libcosim has no FMI
 3.0.
 
 VDMCheck is not on PyPI. It is a Java program of the INTO-CPS association

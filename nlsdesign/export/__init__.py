@@ -1,6 +1,7 @@
 """C code for the controller, FMUs for everybody else, and co-simulation of FMUs."""
 
 from .c.controller_code import CSource, export_c
+from .c.examples import write_examples
 from .compilation.compiled_step import natively
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
@@ -23,5 +24,6 @@ __all__ = [
     "export_fmu",
     "host_platform",
     "natively",
+    "write_examples",
     "write_reference",
 ]

@@ -50,7 +50,9 @@ def declared_reading(model: FlatModel, measured: str) -> DeclaredReading:
 
 
 def with_declared_reading(variable: Variable, model: FlatModel, measured: str) -> Variable:
-    """Return an input that is measured, with what the deck declares of its readings.
+    """Return an input that is measured, with range and largest rate that the deck declares of its readings.
+
+    Not the stale time: without knowing what drives the machine a sensor that is dead looks like one at rest.
 
     Parameters
     ----------
@@ -64,6 +66,6 @@ def with_declared_reading(variable: Variable, model: FlatModel, measured: str) -
     declared = declared_reading(model, measured)
     if declared.limits is None:
         return variable
-    lowest, highest, rate, stale = declared.limits
-    can = Plausibility(largest_rate=rate, resolution=2.0 * declared.quantum, stale_time=stale)
+    lowest, highest, rate, _ = declared.limits
+    can = Plausibility(largest_rate=rate, resolution=2.0 * declared.quantum)
     return replace(variable, minimum=lowest, maximum=highest, plausibility=can)

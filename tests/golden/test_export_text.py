@@ -11,11 +11,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from nlsdesign.deck import ParentDeck
 from nlsdesign.export.c.c_text import real_type
 from nlsdesign.export.c.controller_code import header_text, source_text
 from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.model import Plausibility
 from nlsdesign.model.flat import FlatModel, Table, Variable
+from nlsdesign.model.origin import Origin
+from nlsdesign.quantity import quantity
 from tests.hand_built import plant
 
 STORED = Path(__file__).with_name("export")
@@ -36,6 +39,7 @@ def damper() -> FlatModel:
     table = Table(
         "piston.speed", -1.0, 1.0, (Variable("viscosity", "N*s/m", "Viscosity"),), np.array([[3.0], [2], [4]])
     )
+    gain = quantity(0.75, "N*s/m", source="bench 2024-05-01", spread=0.1)
     return FlatModel(
         "scheduled damper",
         "Force of a damper whose viscosity depends on speed",
@@ -56,6 +60,9 @@ def damper() -> FlatModel:
         (table,),
         begin=begin,
         expected=expected,
+        origin=Origin(
+            "damper", "1" * 64, ParentDeck("older_damper", "0" * 64, "diagnosed"), (), {"gain": gain}
+        ),
     )
 
 

@@ -7,7 +7,7 @@ import math
 import casadi as ca
 
 from ...errors import ArrangementError
-from ...model import FlatModel, Table, Variable
+from ...model import FlatModel, Origin, Table, Variable
 from ...symbolic import Expression
 
 _DEPTH = 3
@@ -24,10 +24,12 @@ class LawWriter:
     ----------
     sample_time
         In s.
+    origin
+        The deck of the plant that the controller is for.
     """
 
-    def __init__(self, sample_time: float) -> None:
-        self.sample_time = sample_time
+    def __init__(self, sample_time: float, origin: Origin | None = None) -> None:
+        self.sample_time, self.origin = sample_time, origin
         self._states: dict[str, tuple[Variable, Expression]] = {}
         self._following: dict[str, Expression] = {}
         self._beginning: dict[str, Expression] = {}
@@ -200,6 +202,7 @@ class LawWriter:
                 ["derivative", "output", "signal", "residual"],
             ),
             sample_time=self.sample_time,
+            origin=self.origin,
             tables=tuple(table for table, _ in self._tables),
             begin=self._begun(x, u, p, ca.vertcat(*w) if w else ca.SX(0, 1)),
         )

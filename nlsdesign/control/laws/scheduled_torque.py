@@ -194,7 +194,7 @@ class ScheduledTorque(TorqueLaw):
         secant, smallest = _secant(table), int(np.argmin(table.values[:, 0]))
         value = FLOOR_SHARE * secant if self.stiffness_floor is None else self.stiffness_floor
         least = LEAST_FLOOR * secant if table.values[smallest, 0] <= LEAST_FLOOR * secant else 0.0
-        angle = round(table.lower + smallest * table.step, 9) + 0.0
+        angle = round(float(table.grid[smallest]), 9) + 0.0
         if value < least or secant <= 0.0:
             raise ValueRangeError(
                 f"stiffness_floor {value:g} N·m/rad",
@@ -283,7 +283,7 @@ def _secant(table: Table) -> float:
 
     A mean of the slopes, so that a corner of the law at one angle does not decide.
     """
-    grid = table.lower + table.step * np.arange(len(table.values))
+    grid = table.grid
     slope = table.values[:, 0]
     sides = [(grid >= 0.0), (grid <= 0.0)]
     return max(float(np.mean(slope[side])) for side in sides if np.any(side))

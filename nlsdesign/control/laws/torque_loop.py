@@ -142,7 +142,7 @@ def torque_controller(
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
     outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
     _check_bandwidths(outer, inner, sample_time)
-    drive, writer = KnownDrive(plant), LawWriter(sample_time)
+    drive, writer = KnownDrive(plant), LawWriter(sample_time, plant.origin)
     names = drive.names
     heard = Heard(
         writer.input(names.desired, "N*m", "torque that the spring should have"),

@@ -1,8 +1,7 @@
 """C99 for the controller: a discrete model as ``init`` and ``step`` on a structure that the caller owns.
 
-No heap, no recursion, no mutable data outside the caller's structure, tables ``static const``, no loop: a
-step is straight-line code. For any input states and outputs stay finite, and the status word tells what was
-held or saturated. CasADi generates the arithmetic (see :mod:`.instructions`).
+No heap, recursion, loop, or mutable data outside the caller's structure: a step is straight-line code. States
+and outputs stay finite, the status word says what was held. The arithmetic is CasADi's, see ``instructions``.
 """
 
 from __future__ import annotations
@@ -18,7 +17,9 @@ from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
 from .controller_step import measured_inputs, reading_constants, settled_body, step_body, take_body
+from .elementary import elementary_functions, portable
 from .guarded_step import first_outputs
+from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
 from .reading_guard import AGREEING, GAP, MOST
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
@@ -93,7 +94,7 @@ def export_c(
         source.source: source_text(model, prefix, number),
         source.selftest: selftest_source(model, prefix, number),
     }
-    write_all(texts)
+    write_all({path: stamped(text, model) for path, text in texts.items()})
     return source
 
 
@@ -159,13 +160,17 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
         else [],
         "readings": [f"{name}_reading readings[{count}]; /* in the order of the inputs */"] if count else [],
     }
-    return filled("controller.h", values | _heads(name) | structures | readings)
+    texts = values | _heads(name) | structures | readings
+    texts |= {"provenance": origin_macros(model, name), "numbers": number_lines(model)}
+    text = filled("controller.h", texts | {"interface": "0u"})
+    return filled("controller.h", texts | {"interface": interface_version(text, model)})
 
 
 def _title(model: FlatModel) -> list[str]:
     return [
         f"/* {comment(model.name)}: {comment(model.description)}",
         f"   Sample time {model.sample_time!r} s; all numbers in SI units, given in brackets.",
+        *origin_lines(model),
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]
 
@@ -194,14 +199,19 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     real
         Number type.
     """
+    real = portable(real)
     body, used = step_body(model, name, real)
+    settled = _settled(model, name, real)
     tables = [table_data(each, real) for each in indexed_tables(model) if each.columns(used)]
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
     names = {"real": real.name, "zero": real.literal(0.0), "name": name, "NAME": name.upper()}
     values = {
         "title": _title(model),
-        "tables": [line for table in tables for line in (*table, "")],
+        "tables": [
+            *elementary_functions(real, [*body, *settled]),
+            *(line for table in tables for line in (*table, "")),
+        ],
         "start_parameters": initialiser(model.parameters, real),
         "start_states": initialiser(model.states, real),
         "start_inputs": initialiser(inputs, real),
@@ -209,7 +219,7 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
         "guards": _guards(model, real, names),
         "assignments": _assignments(model, real),
         "start_readings": _start_readings(model, name, real),
-        "settled": _settled(model, name, real),
+        "settled": settled,
         "take": [*take_body(model, name, real), *_beginning(model, name)],
         "body": body,
     }
@@ -246,7 +256,8 @@ def _settled(model: FlatModel, name: str, real: Real) -> list[str]:
     if model.begin is None:
         return []
     lines: list[str] = []
-    for which, verb in enumerate(("begin", "resume")):
+    # Without a measured input there are no gaps after which to resume.
+    for which, verb in enumerate(("begin", "resume") if measured_inputs(model) else ("begin",)):
         words = "rests at its first readings" if which == 0 else "goes on after a gap in its readings"
         lines += [f"/* Sets the states of a machine that {words}. */"]
         lines += [f"static void {name}_{verb}({name}_state *state)", "{"]

@@ -81,9 +81,9 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
     values = {
         "name": name,
         "samples": str(len(results)),
-        "given": _rows("given", inputs.tolist(), real),
-        "expected": _rows("expected", outputs.tolist(), real),
-        "tolerance": _rows("tolerance", [tolerance], real),
+        "given": number_rows("given", inputs.tolist(), real),
+        "expected": number_rows("expected", outputs.tolist(), real),
+        "tolerance": number_rows("tolerance", [tolerance], real),
         "status": ", ".join(f"0x{s:x}u" for _, s in results),
         "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
         "comparisons": [_comparison(real, path, i) for i, path in enumerate(y)],
@@ -96,7 +96,18 @@ def _comparison(real: Real, path: str, i: int) -> str:
     return f"differs |= !({difference} <= tolerance[0][{i}]);"
 
 
-def _rows(name: str, rows: Sequence[Sequence[float]], real: Real) -> list[str]:
+def number_rows(name: str, rows: Sequence[Sequence[float]], real: Real) -> list[str]:
+    """Return the definition of a table of constants.
+
+    Parameters
+    ----------
+    name
+        Name of the array.
+    rows
+        Numbers, NaN too.
+    real
+        Number type.
+    """
     width = len(rows[0]) if rows else 0
     if not width:
         return []

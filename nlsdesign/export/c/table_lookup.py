@@ -1,10 +1,15 @@
-"""Table look-up in C: linear, held at the ends, without search on a uniform grid, defined for NaN."""
+"""Table look-up in C: linear, held at the ends, in a fixed number of operations, defined for NaN.
+
+A uniform grid needs no search; breakpoints are searched in halves, always the same number of times.
+"""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ...errors import ExportError
 from ...model.flat import FlatModel, Table
 from .c_text import Real, wrapped
 
@@ -28,9 +33,13 @@ class IndexedTable:
     first: int
 
     @property
-    def grid(self) -> tuple[str, float, float, int]:
-        """Argument, lower end, step and number of points; tables that share them share one index."""
-        return (self.table.argument, self.table.lower, self.table.step, self.table.values.shape[0])
+    def grid(self) -> tuple[str, float, float, int, int | None]:
+        """Argument, lower end, step and number of points; tables that share them share one index.
+
+        Breakpoints belong to one table: its number is the last item.
+        """
+        table, own = self.table, None if self.table.breakpoints is None else self.number
+        return (table.argument, table.lower, table.step, table.values.shape[0], own)
 
     def columns(self, used: set[int]) -> list[int]:
         """Return the columns that are used.
@@ -59,7 +68,7 @@ def indexed_tables(model: FlatModel) -> list[IndexedTable]:
 
 
 def table_data(each: IndexedTable, real: Real) -> list[str]:
-    """Return the definition of one table, row by row.
+    """Return the definition of one table, row by row, and of its breakpoints where it has some.
 
     Parameters
     ----------
@@ -67,11 +76,20 @@ def table_data(each: IndexedTable, real: Real) -> list[str]:
         The table.
     real
         Number type.
+
+    Raises
+    ------
+    ExportError
+        If two breakpoints are the same number in this type.
     """
     rows, columns = each.table.values.shape
     names = ", ".join(f"{variable.name} [{variable.unit}]" for variable in each.table.columns)
-    title = f"Over {each.table.argument} from {each.table.lower!r} by {each.table.step!r}: {names}"
+    if each.table.breakpoints is None:
+        title = f"Over {each.table.argument} from {each.table.lower!r} by {each.table.step!r}: {names}"
+    else:
+        title = f"Over {each.table.argument} at breakpoints_{each.number}: {names}"
     lines = [
+        *_breakpoints(each, real),
         *wrapped(title),
         f"static const {real.name} table_{each.number}[{rows}][{columns}] = {{",
     ]
@@ -94,7 +112,7 @@ def look_up(model: FlatModel, real: Real, arguments: Mapping[str, str], used: se
         Indices into w.
     """
     lines: list[str] = []
-    indexed: dict[tuple[str, float, float, int], int] = {}
+    indexed: dict[tuple[str, float, float, int, int | None], int] = {}
     for each in indexed_tables(model):
         columns = each.columns(used)
         if not columns:
@@ -113,7 +131,63 @@ def look_up(model: FlatModel, real: Real, arguments: Mapping[str, str], used: se
     return lines
 
 
+def table_bytes(model: FlatModel, real: Real) -> int:
+    """Return the flash that the tables of a model take in C, in bytes: numbers and breakpoints.
+
+    Parameters
+    ----------
+    model
+        Any model.
+    real
+        Number type.
+    """
+    size = 4 if real.name == "float" else 8
+    numbers = [t.values.size + (0 if t.breakpoints is None else len(t.breakpoints)) for t in model.tables]
+    return size * sum(numbers)
+
+
+def _breakpoints(each: IndexedTable, real: Real) -> list[str]:
+    points = each.table.breakpoints
+    if points is None:
+        return []
+    kept = [real.round(float(v)) for v in points]
+    for one, other, point in zip(kept, kept[1:], points[1:], strict=False):
+        if not one < other:
+            raise ExportError(
+                f"table over '{each.table.argument}'",
+                f"two breakpoints near {point:.9g} are one number in {real.name}",
+                next_step="export with real='double', or keep breakpoints further apart",
+            )
+    rows = textwrap.wrap(", ".join(real.literal(v) for v in kept) + ",", 100, break_on_hyphens=False)
+    numbers = [f"    {row}" for row in rows]
+    title = f"Grid points of table_{each.number} over {each.table.argument}"
+    head = f"static const {real.name} breakpoints_{each.number}[{len(kept)}] = {{"
+    return [*wrapped(title), head, *numbers, "};"]
+
+
 def _index(each: IndexedTable, real: Real, argument: str) -> list[str]:
+    return _searched(each, real, argument) if each.table.step == 0.0 else _placed(each, real, argument)
+
+
+def _searched(each: IndexedTable, real: Real, argument: str) -> list[str]:
+    """Return the statements that find the cell among breakpoints, by the same halvings for every argument."""
+    k, cells = each.number, each.table.values.shape[0] - 1
+    b = f"breakpoints_{k}"
+    lines = [
+        f"const {real.name} above_{k} = {argument} > {b}[0] ? {argument} : {b}[0]; "
+        "/* NaN becomes the lower end */",
+        f"const {real.name} place_{k} = above_{k} < {b}[{cells}] ? above_{k} : {b}[{cells}];",
+        f"int32_t left_{k} = 0;",
+    ]
+    while cells > 1:
+        half = cells // 2
+        lines.append(f"left_{k} += (place_{k} >= {b}[left_{k} + {half}]) ? {half} : 0;")
+        cells -= half
+    width = f"({b}[left_{k} + 1] - {b}[left_{k}])"
+    return [*lines, f"const {real.name} share_{k} = (place_{k} - {b}[left_{k}]) / {width};"]
+
+
+def _placed(each: IndexedTable, real: Real, argument: str) -> list[str]:
     k, last = each.number, each.table.values.shape[0] - 1
     low, high = real.literal(0.0), real.literal(float(last))
     lower = each.table.lower

@@ -20,13 +20,13 @@ from ...errors import ExportError, ValueRangeError, nearest
 from ...model.flat import FlatModel
 from ...writing import draft
 from ..c.c_text import identifier
-from ..c.smooth_only import refuse_jumps
 from ..compilation.cross_compiler import ALL_PLATFORMS, Platform, chosen_platforms
 from ..files import shell
 from .authorship import Authorship
 from .compiled_binaries import compiled_binaries
 from .compiled_binaries import fmi_headers as fmi_headers
 from .fmu_documentation import icon, page
+from .fmu_origin import with_origin
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
@@ -101,7 +101,7 @@ def export_fmu(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
     with draft(target) as file:
-        _write_archive(file, contents | binaries)
+        _write_archive(file, with_origin(model, contents | binaries))
     return target
 
 
@@ -131,7 +131,6 @@ def fmu_texts(
     dict
         Content by path within the FMU.
     """
-    refuse_jumps(model)
     variables, about = layout(model), authorship or Authorship()
 
     def description(token: str, shown: Authorship) -> str:

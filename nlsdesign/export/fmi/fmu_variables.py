@@ -1,8 +1,8 @@
 """The variables of an FMU: their order, causality and variability.
 
 A value reference is an index into one array; the groups are in the order time, states, derivatives,
-inputs, parameters, outputs, signals, one extra, and behind them the status word. An output that is a state is
-one variable, as is a signal that is an output.
+inputs, parameters, outputs, signals, event indicators, modes, one extra, and behind them the status word.
+An output that is a state is one variable, as is a signal that is an output.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
 from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
+from .event_variables import indicator_variables, mode_variables
 from .expression_walk import EVERYTHING, Interval, ranges
 from .terminals import with_flange_outputs
 from .typical_sizes import typical_sizes, with_sizes
@@ -69,7 +70,7 @@ class FmuLayout:
     ----------
     model
         The model.
-    time, states, derivatives, inputs, parameters, outputs, signals, extra, status
+    time, states, derivatives, inputs, parameters, outputs, signals, indicators, modes, extra, status
         The groups in the order of the value references. ``outputs`` and ``signals`` leave out states and
         variables named before; ``extra`` is the tolerance of the integrator, or the sample time.
     """
@@ -82,6 +83,8 @@ class FmuLayout:
     parameters: tuple[FmuVariable, ...]
     outputs: tuple[FmuVariable, ...]
     signals: tuple[FmuVariable, ...]
+    indicators: tuple[FmuVariable, ...]
+    modes: tuple[FmuVariable, ...]
     extra: FmuVariable
     status: tuple[FmuVariable, ...]
 
@@ -89,7 +92,8 @@ class FmuLayout:
     def reals(self) -> tuple[FmuVariable, ...]:
         """All but the status word; the position is the value reference."""
         groups = (self.states, self.derivatives, self.inputs, self.parameters, self.outputs, self.signals)
-        return (self.time, *[each for group in groups for each in group], self.extra)
+        inside = [each for group in (*groups, self.indicators, self.modes) for each in group]
+        return (self.time, *inside, self.extra)
 
     @property
     def everything(self) -> tuple[FmuVariable, ...]:
@@ -150,6 +154,8 @@ def layout(model: FlatModel) -> FmuLayout:
         group(model.parameters, "parameter", "fixed" if continuous else "tunable", None),
         group(outputs, "output", changing, "calculated"),
         group(signals, "local", changing, "calculated"),
+        group(indicator_variables(model), "local", changing, "calculated"),
+        group(mode_variables(model), "local", "discrete", "calculated"),
         _extra(model, next(number)),
         () if continuous else (_status(next(number)),),
     )
@@ -222,6 +228,7 @@ def _check_names(model: FlatModel) -> None:
         else ("time", "sample.time", "sample.status")
     )
     taken = dict.fromkeys(own, "variable of every FMU")
+    known = {v.name for v in (*model.outputs, *model.signals)}
     for kind, group in (("state", model.states), ("input", model.inputs), ("parameter", model.parameters)):
         for variable in group:
             if not _NAME.fullmatch(variable.name):
@@ -235,6 +242,10 @@ def _check_names(model: FlatModel) -> None:
                     next_step="rename one of them",
                 )
             taken[variable.name] = kind
+    for variable in (*indicator_variables(model), *mode_variables(model)):
+        if not _NAME.fullmatch(variable.name) or variable.name in known | taken.keys():
+            raise ExportError(f"switch '{variable.name}'", "its name is taken", next_step="rename a part")
+        taken[variable.name] = "switch"
     for variable in model.outputs:
         if taken.get(variable.name, "state") != "state":
             raise ExportError(

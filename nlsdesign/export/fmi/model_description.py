@@ -53,7 +53,10 @@ def model_description(
         **(authorship or Authorship()).attributes(model.origin),
         generationTool=f"nlsdesign {own_version()}",
         variableNamingConvention="structured",
+        **({"numberOfEventIndicators": len(layout.indicators)} if two else {}),
     )
+    if model.sample_time is None:
+        _model_exchange(root, layout, two)
     _co_simulation(root, layout, two)
     _units(root, layout)
     categories = ElementTree.SubElement(root, "LogCategories")
@@ -69,9 +72,10 @@ def model_description(
     variables = ElementTree.SubElement(root, "ModelVariables")
     for each in layout.everything:
         (_variable2 if two else _variable3)(variables, each)
-    (_structure2 if two else _structure3)(
-        ElementTree.SubElement(root, "ModelStructure"), model_structure(layout)
-    )
+    structure = ElementTree.SubElement(root, "ModelStructure")
+    (_structure2 if two else _structure3)(structure, model_structure(layout))
+    for each in () if two else layout.indicators:
+        _element(structure, "EventIndicator", valueReference=each.reference)
     if not two and model.origin:
         notes = ElementTree.SubElement(root, "Annotations")
         note = _element(notes, "Annotation", type="nlsdesign.deck")
@@ -135,6 +139,27 @@ def _terminal(parent: ElementTree.Element, each: Terminal, place: tuple[float, f
     _element(terminal, "TerminalGraphicalRepresentation", **corners, iconBaseName=each.picture)
 
 
+def _model_exchange(root: ElementTree.Element, layout: FmuLayout, two: bool) -> None:
+    located = bool(layout.indicators)
+    kind = _element(
+        root,
+        "ModelExchange",
+        modelIdentifier=identifier(layout.model.name),
+        **({"canGetAndSetFMUstate" if two else "canGetAndSetFMUState": True}),
+        **({"canSerializeFMUstate" if two else "canSerializeFMUState": True}),
+        **({"providesDirectionalDerivative" if two else "providesDirectionalDerivatives": True}),
+        # A step may have gone past an event that its integrator has not seen.
+        **(
+            {"completedIntegratorStepNotNeeded": not located}
+            if two
+            else {"needsCompletedIntegratorStep": located}
+        ),
+    )
+    if two:
+        kind.set("canNotUseMemoryManagementFunctions", "true")
+        _element(_element(kind, "SourceFiles"), "File", name=main_source("2.0"))
+
+
 def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> None:
     continuous = layout.model.sample_time is None
     kind = _element(
@@ -149,6 +174,9 @@ def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> N
     if two:
         kind.set("canNotUseMemoryManagementFunctions", "true")
         _element(_element(kind, "SourceFiles"), "File", name=main_source("2.0"))
+    elif layout.indicators:
+        kind.set("hasEventMode", "true")
+        kind.set("mightReturnEarlyFromDoStep", "true")
     elif not continuous:
         kind.set("fixedInternalStepSize", _text(layout.model.sample_time))
 

@@ -9,6 +9,8 @@ extern "C" {
 #endif
 
 #define @NAME@_SAMPLE_TIME @sample_time@ /* s */
+@provenance@
+#define @NAME@_INTERFACE_VERSION @interface@ /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
    set_parameters) as numbered below; bit 30 stands for all from 14 on. */
@@ -49,5 +51,6 @@ void @name@_defaults(@name@_parameters *parameters);
 #ifdef __cplusplus
 }
 #endif
+@numbers@
 
 #endif

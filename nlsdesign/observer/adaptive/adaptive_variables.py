@@ -130,12 +130,5 @@ class _Variables:
 
     def tables(self) -> tuple[Table, ...]:
         """Return the table over the angle."""
-        if not self.compact.columns:
-            return ()
-        grid = self.compact.angles
-        columns = tuple(
-            Variable(c.name, c.unit, f"entry {c.key} of the step, in the sum of {c.row}")
-            for c in self.compact.columns
-        )
-        step = float(grid[1] - grid[0])
-        return (Table(self.plant.angle, float(grid[0]), step, columns, self.compact.values),)
+        table = self.compact.table(self.plant.angle)
+        return () if table is None else (table,)

@@ -16,12 +16,15 @@ from ...model.roles import measured_motion, spring_torque
 from ...quantity import typeset_unit
 from ...symbolic import Expression
 from .braking import braked_speed
+from .breakpoints import FineEntries
 from .first_reading import FirstReading
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, FittedGain, GainRule
 from .measured_angle import measured_angle, with_plausible_inputs
 from .step import ObserverStep
-from .table import Compact, Grid, GridByTolerance
+from .table import Compact, Draft, Grid, TableTorqueError
+from .table_trial import TableTrial
+from .torque_grid import RESOLUTION, GridByTorqueError
 
 Array = NDArray[np.float64]
 
@@ -55,6 +58,15 @@ class ObserverDesign:
         """
         return dict(self.compact.error)
 
+    @property
+    def table_torque_error(self) -> TableTorqueError:
+        """What the table does to the estimated torque, measured on motions over its range."""
+        if self.compact.torque_error is not None:
+            return self.compact.torque_error
+        grid = self.compact.angles
+        fine = FineEntries.of(self.step.entries, float(grid[0]), float(grid[-1]), RESOLUTION)
+        return TableTrial(Draft(self.step.plant, lambda c: _written(self, c)), fine).error(self.compact)
+
     def start(self, angle: float) -> dict[str, float]:
         """Return the start values of an observer that begins while the actuator rests at an angle.
 
@@ -76,13 +88,19 @@ class ObserverDesign:
         lines = [
             f"Observer of {self.step.plant.estimate.name} every {self.step.sample_time:g} s",
             f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
-            f"{len(self.compact.columns)} columns",
+            f"{len(self.compact.columns)} columns{self.compact.cost(self.step.plant.estimate.unit)}",
             f"  estimate is linear in the inner states to {self.step.plant.affine_error:.2g} of its size",
         ]
         lines += [
             f"  table error of {row}: {error:.2g}" for row, error in self.compact.error.items() if error
         ]
         return "\n".join(lines)
+
+
+def _written(design: ObserverDesign, compact: Compact) -> ObserverDesign:
+    """Return the observer with another table."""
+    model = replace(_Writer(design.step, compact).model(), bodies=design.model.bodies)
+    return ObserverDesign(model, design.step, compact)
 
 
 def design_observer_with_details(
@@ -133,10 +151,13 @@ def design_observer_with_details(
     plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
     fitted = rule.fitted(plant, sample_time, reference) if isinstance(rule, FittedGain) else rule
     step = ObserverStep(plant, fitted, sample_time, reference)
-    compact = over.compact(step.entries)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    written = replace(_Writer(step, compact).model(), bodies=observed)
-    design = ObserverDesign(with_plausible_inputs(written, model, plant, compact.angles), step, compact)
+
+    def written(compact: Compact) -> ObserverDesign:
+        flat = replace(_Writer(step, compact).model(), bodies=observed, origin=model.origin)
+        return ObserverDesign(with_plausible_inputs(flat, model, plant, compact.angles), step, compact)
+
+    design = written(over.compact(step.entries, Draft(plant, written)))
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 
@@ -161,7 +182,7 @@ def check_sampling(model: FlatModel, sample_time: float) -> None:
         raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
 
 
-def whole_contour(model: FlatModel) -> GridByTolerance:
+def whole_contour(model: FlatModel) -> GridByTorqueError:
     """Return a grid that reaches to the ends of the cam's contour, or ±90° where there is none.
 
     Parameters
@@ -171,7 +192,7 @@ def whole_contour(model: FlatModel) -> GridByTolerance:
     """
     cams = [cam for spring in model.springs for cam in spring.cams]
     end = min((model.values[cam.last_angle] for cam in cams if cam.last_angle), default=math.pi / 2.0)
-    return GridByTolerance(-end, end)
+    return GridByTorqueError(-end, end)
 
 
 class _Writer:
@@ -309,16 +330,8 @@ class _Writer:
         return tuple(outputs)
 
     def _tables(self) -> tuple[Table, ...]:
-        if not self.compact.columns:
-            return ()
-        grid = self.compact.angles
-        columns = tuple(
-            Variable(c.name, c.unit, f"entry {c.key} of the step, in the sum of {c.row}")
-            for c in self.compact.columns
-        )
-        return (
-            Table(self.angle.name, float(grid[0]), float(grid[1] - grid[0]), columns, self.compact.values),
-        )
+        table = self.compact.table(self.angle.name)
+        return () if table is None else (table,)
 
 
 def _column(items: Sequence[Expression]) -> Expression:

@@ -16,6 +16,9 @@
 #define MODEL_P 4
 #define MODEL_Y 5
 #define MODEL_S 6
+#define MODEL_Z 7
+#define MODEL_M 7
+#define MODEL_SWITCHES 0
 #define MODEL_EXTRA 7
 #define MODEL_VALUES 8
 #define MODEL_SAMPLE_TIME 0.01

@@ -1,5 +1,7 @@
 /* scheduled damper: Force of a damper whose viscosity depends on speed
    Sample time 0.01 s; all numbers in SI units, given in brackets.
+   Deck damper, 111111111111 (SHA-256 of its parts).
+   From older_damper, 000000000000 (diagnosed).
    Written by nlsdesign (version) with CasADi (version); do not edit. */
 #include <float.h>
 #include <math.h>
@@ -10,6 +12,52 @@
 #ifdef __FAST_MATH__
 #error "the guards need IEEE arithmetic: compile without -ffast-math"
 #endif
+
+/* Elementary functions of our own: the same bits on every processor with IEEE arithmetic, as long as the compiler
+   forms no fused multiply-add (-ffp-contract=off). An ulp is a unit of the last place. */
+#include <string.h>
+
+/* 2^(exponent - bias) from its biased exponent, which lies in the lowest bits. */
+static double portable_power_of_two(uint64_t biased)
+{
+    const uint64_t bits = biased << 52u;
+    double power;
+
+    (void)memcpy(&power, &bits, sizeof power);
+    return power;
+}
+
+/* exp(r) - 1 for |r| up to half of ln 2. */
+static double portable_expm1_kernel(double r)
+{
+    const double polynomial = 0.5000000000000016 + r * (0.16666666666666707 + r * (0.04166666666648961 + r * (0.008333333333302679 + r * (0.0013888888954309993 + r * (0.00019841269927075347 + r * (2.480148195553756e-05 + r * (2.755720774317938e-06 + r * (2.7634255816265273e-07 + r * (2.5120538967661165e-08)))))))));
+
+    return r + r * r * polynomial;
+}
+
+/* x / ln 2, rounded to an integer that stands in the lowest bits; other bits are those of 6755399441055744.0. */
+static double portable_binary_exponent(double x, uint64_t *bits)
+{
+    const double shifted = x * 1.4426950408889634 + 6755399441055744.0;
+
+    (void)memcpy(bits, &shifted, sizeof shifted);
+    return shifted - 6755399441055744.0;
+}
+
+/* exp(x); at most 1.1 ulp. NaN stays NaN, what is too large becomes infinite, what is too small zero. */
+static double portable_exp(double x)
+{
+    const double above = x < -746.0 ? -746.0 : x;
+    const double inside = above > 710.0 ? 710.0 : above;
+    uint64_t bits;
+    const double n = portable_binary_exponent(inside, &bits);
+    const double r = (inside - n * 0.693147180559663) - n * 2.8235290563031577e-13;
+    const double result = 1.0 + portable_expm1_kernel(r);
+    const uint64_t both = bits - 4843621399236966402u;
+    const uint64_t half = both >> 1;
+
+    return result * portable_power_of_two(half) * portable_power_of_two(both - half);
+}
 
 /* Over piston.speed from -1.0 by 1.0: viscosity [N*s/m] */
 static const double table_0[3][1] = {
@@ -205,7 +253,7 @@ static uint32_t scheduled_damper_advance(scheduled_damper_state *state, schedule
     const double a10 = (0.5 < q0) ? x0 : u0;
     const double a21 = u1 * (w0 * a10 + p0 * x0);
     const double f0 = 0.5 * x0 + 0.25 * a10;
-    const double y0 = (a10 < 0.0) ? (a21 < 2.0 ? a21 : 2.0) : exp(-a10) * a21;
+    const double y0 = (a10 < 0.0) ? (a21 < 2.0 ? a21 : 2.0) : portable_exp(-a10) * a21;
 
     if ((f0 - f0) >= 0.0) {
         state->states.piston.filtered = f0;

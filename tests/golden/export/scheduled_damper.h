@@ -1,5 +1,7 @@
 /* scheduled damper: Force of a damper whose viscosity depends on speed
    Sample time 0.01 s; all numbers in SI units, given in brackets.
+   Deck damper, 111111111111 (SHA-256 of its parts).
+   From older_damper, 000000000000 (diagnosed).
    Written by nlsdesign (version) with CasADi (version); do not edit. */
 #ifndef SCHEDULED_DAMPER_H
 #define SCHEDULED_DAMPER_H
@@ -11,6 +13,10 @@ extern "C" {
 #endif
 
 #define SCHEDULED_DAMPER_SAMPLE_TIME 0.01 /* s */
+#define SCHEDULED_DAMPER_DECK "damper"
+#define SCHEDULED_DAMPER_DECK_DIGEST "1111111111111111111111111111111111111111111111111111111111111111"
+#define SCHEDULED_DAMPER_PARENT_DIGEST "0000000000000000000000000000000000000000000000000000000000000000"
+#define SCHEDULED_DAMPER_INTERFACE_VERSION 0x770cc7a2u /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
    set_parameters) as numbered below; bit 30 stands for all from 14 on. */
@@ -101,5 +107,8 @@ uint32_t scheduled_damper_step(
 #ifdef __cplusplus
 }
 #endif
+
+/* Numbers of the deck, each with its source.
+   gain = 0.75 N*s/m +- 10 % (bench 2024-05-01) */
 
 #endif

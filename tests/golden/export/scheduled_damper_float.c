@@ -1,5 +1,7 @@
 /* scheduled damper: Force of a damper whose viscosity depends on speed
    Sample time 0.01 s; all numbers in SI units, given in brackets.
+   Deck damper, 111111111111 (SHA-256 of its parts).
+   From older_damper, 000000000000 (diagnosed).
    Written by nlsdesign (version) with CasADi (version); do not edit. */
 #include <float.h>
 #include <math.h>
@@ -10,6 +12,52 @@
 #ifdef __FAST_MATH__
 #error "the guards need IEEE arithmetic: compile without -ffast-math"
 #endif
+
+/* Elementary functions of our own: the same bits on every processor with IEEE arithmetic, as long as the compiler
+   forms no fused multiply-add (-ffp-contract=off). An ulp is a unit of the last place. */
+#include <string.h>
+
+/* 2^(exponent - bias) from its biased exponent, which lies in the lowest bits. */
+static float portable_power_of_twof(uint32_t biased)
+{
+    const uint32_t bits = biased << 23u;
+    float power;
+
+    (void)memcpy(&power, &bits, sizeof power);
+    return power;
+}
+
+/* exp(r) - 1 for |r| up to half of ln 2. */
+static float portable_expm1_kernelf(float r)
+{
+    const float polynomial = 0.5f + r * (0.16666506f + r * (0.041666165f + r * (0.008370322f + r * (0.0013953072f))));
+
+    return r + r * r * polynomial;
+}
+
+/* x / ln 2, rounded to an integer that stands in the lowest bits; other bits are those of 1.2582912e+07f. */
+static float portable_binary_exponentf(float x, uint32_t *bits)
+{
+    const float shifted = x * 1.442695f + 1.2582912e+07f;
+
+    (void)memcpy(bits, &shifted, sizeof shifted);
+    return shifted - 1.2582912e+07f;
+}
+
+/* exp(x); at most 1.1 ulp. NaN stays NaN, what is too large becomes infinite, what is too small zero. */
+static float portable_expf(float x)
+{
+    const float above = x < -104.0f ? -104.0f : x;
+    const float inside = above > 89.0f ? 89.0f : above;
+    uint32_t bits;
+    const float n = portable_binary_exponentf(inside, &bits);
+    const float r = (inside - n * 0.69314575f) - n * 1.4286068e-06f;
+    const float result = 1.0f + portable_expm1_kernelf(r);
+    const uint32_t both = bits - 1262485250u;
+    const uint32_t half = both >> 1;
+
+    return result * portable_power_of_twof(half) * portable_power_of_twof(both - half);
+}
 
 /* Over piston.speed from -1.0 by 1.0: viscosity [N*s/m] */
 static const float table_0[3][1] = {
@@ -205,7 +253,7 @@ static uint32_t scheduled_damper_advance(scheduled_damper_state *state, schedule
     const float a10 = (0.5f < q0) ? x0 : u0;
     const float a21 = u1 * (w0 * a10 + p0 * x0);
     const float f0 = 0.5f * x0 + 0.25f * a10;
-    const float y0 = (a10 < 0.0f) ? (a21 < 2.0f ? a21 : 2.0f) : expf(-a10) * a21;
+    const float y0 = (a10 < 0.0f) ? (a21 < 2.0f ? a21 : 2.0f) : portable_expf(-a10) * a21;
 
     if ((f0 - f0) >= 0.0f) {
         state->states.piston.filtered = f0;
