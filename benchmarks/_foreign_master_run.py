@@ -11,6 +11,7 @@ import csv
 import ctypes
 import importlib.metadata
 import sys
+import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -131,8 +132,28 @@ def cofmupy(fmu: Described, time: Row, inputs: Mapping[str, Row], names: Sequenc
         yield [float(shown[name][0]) if name in fmu.outputs else float("nan") for name in names]
 
 
+def casadi(fmu: Described, time: Row, inputs: Mapping[str, Row], names: Sequence[str]) -> Iterator[Row]:
+    """Integrate the states of a model-exchange FMU with the derivatives that it offers."""
+    import casadi as ca
+
+    folder = tempfile.mkdtemp()
+    with zipfile.ZipFile(fmu.path) as archive:
+        archive.extractall(folder)
+    model = ca.DaeBuilder("unit", folder)
+    rate = model.create("rate", ["x", "u"], ["ode"])
+    states = model.x()
+    x, u = ca.MX.sym("x", len(states)), ca.MX.sym("u", len(model.u()))
+    tight = {"abstol": 1e-12, "reltol": 1e-10, "max_num_steps": 100000}
+    step = ca.integrator("step", "cvodes", {"x": x, "u": u, "ode": rate(x, u)}, 0.0, time[1], tight)
+    at = [float(model.start(name)[0]) for name in states]
+    for k in range(len(time) - 1):
+        at = step(x0=at, u=[inputs[name][k] for name in model.u()])["xf"]
+        shown = dict(zip(states, at.full().ravel().tolist(), strict=True))
+        yield [shown.get(name, float("nan")) for name in names]
+
+
 MASTERS: Mapping[str, Callable[..., Iterator[Row]]] = {
-    each.__name__: each for each in (fmpy, ecospy, libcosimpy, fmuloader, cofmupy)
+    each.__name__: each for each in (fmpy, ecospy, libcosimpy, fmuloader, cofmupy, casadi)
 }
 
 

@@ -33,7 +33,8 @@ from nlsdesign.model.flat import FlatModel
 DECK = "austin2015_figure_consistent"
 RUNNER = Path(__file__).with_name("_foreign_master_run.py")
 PACKAGES = ("ecospy", "tbb", "libcosimpy", "fmuloader", "cofmupy", "fmu-manipulation-toolbox")
-MASTERS = ("fmpy", "ecospy", "libcosimpy", "fmuloader", "cofmupy")
+MASTERS = ("fmpy", "ecospy", "libcosimpy", "fmuloader", "cofmupy", "casadi")
+OUR_OWN = ("fmpy", "casadi")  # they come with nlsdesign
 VERSIONS = ("3.0", "2.0")
 AGREES = 1e-6
 """Of the range of a variable: the tolerance that the reference results state."""
@@ -128,7 +129,7 @@ def cell(python: Path, master: str, fmu: Path, model: FlatModel) -> Cell:
         died = done.returncode < 0
         # Without folders, which differ from run to run, and without the name of the model.
         message = re.sub(r"\S*/(\S+?)(?=[\s:]|$)", "...", last).replace("|", "/")[:160]
-        return Cell(np.nan, f"dies of signal {-done.returncode}" if died else message)
+        return Cell(np.nan, f"the master dies of signal {-done.returncode}" if died else message)
     with results.open(encoding="utf-8", newline="") as stream:
         head, *rows = list(csv.reader(stream))
     shown = dict(zip(head, np.array(rows, dtype=float).T, strict=True))
@@ -184,7 +185,8 @@ def releases(python: Path) -> dict[str, str]:
     ).stdout
     listed = dict(line.split("==", 1) for line in said.splitlines() if "==" in line)
     return {name.lower().replace("_", "-"): release for name, release in listed.items()} | {
-        "fmpy": fmpy.__version__
+        "fmpy": fmpy.__version__,
+        "casadi": ca.CasadiMeta.version(),
     }
 
 
@@ -236,8 +238,8 @@ def _introduction(found: Mapping[str, str]) -> Iterator[str]:
 Written by `python -m benchmarks.foreign_masters --write docs/fmi_masters.md` on {today}
 (nlsdesign {version()}, CasADi {casadi}, {machine}).
 The command makes an environment of its own under `out/masters`, takes the masters from PyPI, exports plant,
-observer and controller of the deck `{DECK}` with their reference results, and runs 1000 samples
-of 1 ms in each master. It changes nothing else.
+observer and controller of the deck `{DECK}` with their reference results, and
+runs 1000 samples of 1 ms in each master. It changes nothing else.
 
 Each cell is the worst deviation from the package's own simulation, of any variable that the master shows,
 over the range of that variable; a reading in counts may be one count off where the angle lies on the edge of
@@ -246,9 +248,10 @@ a count.
 
 
 def _notes() -> Iterator[str]:
-    yield """fmpy runs in the environment of nlsdesign; cofmupy brings an older release of it and shows
-outputs alone, of the plant the counts of the encoder. ecospy needs the wheel `tbb` beside it. libcosim has no FMI
-3.0.
+    yield """fmpy and CasADi run in the environment of nlsdesign; cofmupy brings an older fmpy and shows
+outputs alone, of the plant the counts of the encoder. ecospy needs the wheel `tbb` beside it. libcosim has no
+FMI 3.0 and dies of it. CasADi imports model exchange, so the plant alone; its states are those of CVODES with
+the derivatives of the FMU.
 
 VDMCheck is not on PyPI. It is a Java program of the INTO-CPS association
 (github.com/INTO-CPS-Association/FMI-VDM-Model); with its jar and a Java runtime:
@@ -267,7 +270,7 @@ def main() -> int:
     cells = {}
     for master in MASTERS:
         for (name, kind), (fmu, model) in made.items():
-            here = Path(sys.executable) if master == "fmpy" else python
+            here = Path(sys.executable) if master in OUR_OWN else python
             cells[master, name, kind] = each = cell(here, master, fmu, model)
             print(f"{master:12} {name:12} FMI {kind}: {each}", flush=True)
     tool = {fmu.stem: checked(python, fmu) for fmu, _ in made.values()}
