@@ -253,9 +253,9 @@ outputs alone, of the plant the counts of the encoder. ecospy needs the wheel `t
 FMI 3.0 and dies of it. CasADi imports model exchange, so the plant alone; its states are those of CVODES with
 the derivatives of the FMU.
 
-VDMCheck is not on PyPI. It is a Java program of the INTO-CPS association
-(github.com/INTO-CPS-Association/FMI-VDM-Model); with its jar and a Java runtime:
-`java -jar vdmcheck3.jar plant.fmu` for FMI 3.0 and `java -jar vdmcheck2.jar plant.fmu` for FMI 2.0."""
+VDMCheck is not on PyPI. It is a Java program, to be had from the releases of
+github.com/INTO-CPS-Association/FMI-VDM-Model: `VDMCheck3.sh plant_3.fmu` checks an FMU of FMI 3.0,
+`VDMCheck2.sh plant_2.fmu` one of FMI 2.0."""
 
 
 def main() -> int:

@@ -14,6 +14,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.control import torque_controller
 from nlsdesign.deck import load_deck
 from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.export.fmi.terminals import with_flange_outputs
 from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel
 from nlsdesign.observer import CascadeGain, design_observer
@@ -141,3 +142,20 @@ def test_fmi_2_has_no_terminals(version):
     root = etree.fromstring(texts["modelDescription.xml"])
     given = {v.get("name") for v in root.find("ModelVariables") if v.get("causality") == "output"}
     assert {"drum.angle", "drum.speed"} <= given
+
+
+def test_outputs_of_flanges_are_shown_whatever_the_mode_of_a_switch():
+    plant = with_flange_outputs(plant_of("one_sided_cable_drive"))
+    assert plant.switching is not None
+    count = len(plant.outputs)
+    assert plant.switching.shown.size1_out(0) == plant.equations.size1_out(1) == count
+    state = plant.start(plant.states) + 0.2
+    parameters, inputs = plant.start(plant.parameters), [1.0, 0.5]
+    modes = plant.switching.natural(0.0, state, inputs, parameters)
+    shown = np.array(plant.switching.shown(0.0, state, inputs, parameters, modes)[0]).ravel()
+    expected = np.array(plant.equations(0.0, state, inputs, parameters, [])[1]).ravel()
+    np.testing.assert_allclose(shown, expected, rtol=1e-12)
+    names = [v.name for v in plant.outputs]
+    at = plant.evaluate(state, inputs)
+    for name in ("drum.angle", "drum.speed"):
+        assert shown[names.index(name)] == pytest.approx(at[name]) != 0.0

@@ -8,7 +8,7 @@ are wired by equal names. A *flange* is what a load is attached to, with the nam
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -144,14 +144,22 @@ def with_flange_outputs(model: FlatModel) -> FlatModel:
     if not missing:
         return model
     s = model.symbols()
-    names = [v.name for v in (*model.states, *model.signals)]
-    places = [names.index(name) for name in missing]
-    given = ca.densify(ca.vertcat(s.state, s.signal))
-    outputs = ca.vertcat(ca.densify(s.output), *[given[i] for i in places])
-    equations = ca.Function(
-        "equations",
-        [s.time, s.state, s.input, s.parameter, s.table],
-        [s.derivative, outputs, s.signal, s.residual],
-    )
     variables = (*model.states, *model.signals)
-    return replace(model, outputs=(*model.outputs, *[variables[i] for i in places]), equations=equations)
+    places = [[v.name for v in variables].index(name) for name in missing]
+    outputs = _extended(s.output, s.state, s.signal, places)
+    groups = [s.time, s.state, s.input, s.parameter, s.table]
+    equations = ca.Function("equations", groups, [s.derivative, outputs, s.signal, s.residual])
+    switching = model.switching
+    if switching is not None:
+        modes = ca.SX.sym("m", switching.shown.size1_in(4))
+        held, signals = switching.shown(*groups[:4], modes)
+        extended = _extended(held, s.state, signals, places)
+        switching = replace(switching, shown=ca.Function("shown", [*groups[:4], modes], [extended, signals]))
+    added = tuple(variables[i] for i in places)
+    return replace(model, outputs=(*model.outputs, *added), equations=equations, switching=switching)
+
+
+def _extended(outputs: ca.SX, states: ca.SX, signals: ca.SX, places: Sequence[int]) -> ca.SX:
+    """Return outputs with further ones, chosen from states and signals."""
+    given = ca.densify(ca.vertcat(states, signals))
+    return ca.vertcat(ca.densify(outputs), *[given[i] for i in places])
