@@ -169,7 +169,7 @@ def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> N
         canHandleVariableCommunicationStepSize=True,
         **({"canGetAndSetFMUstate" if two else "canGetAndSetFMUState": True}),
         **({"canSerializeFMUstate" if two else "canSerializeFMUState": True}),
-        **({"providesDirectionalDerivative" if two else "providesDirectionalDerivatives": continuous}),
+        **({"providesDirectionalDerivative" if two else "providesDirectionalDerivatives": True}),
     )
     if two:
         kind.set("canNotUseMemoryManagementFunctions", "true")
