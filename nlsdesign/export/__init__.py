@@ -4,8 +4,9 @@ from .c.controller_code import CSource, export_c
 from .compilation.compiled_step import natively
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
-from .cosimulation.cosimulate import CoSimulation, cosimulate
-from .cosimulation.master import Late
+from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
+from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
+from .cosimulation.wires import Late, SamplesOf, Wire
 from .fmi.fmu import export_fmu
 
 __all__ = [
@@ -14,7 +15,14 @@ __all__ = [
     "CSource",
     "CoSimulation",
     "CompiledStep",
+    "Extrapolated",
+    "FmuSystem",
+    "Held",
+    "Iterated",
     "Late",
+    "SamplesOf",
+    "Stepping",
+    "Wire",
     "cosimulate",
     "export_c",
     "export_fmu",

@@ -4,78 +4,71 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import fmpy
 import fmpy.fmi2
 import fmpy.fmi3
+import numpy as np
 from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, ExportError
+from .fmu_description import FmuDescription, FmuVariable
+from .isolation import Activity, Watch
 
-_REAL, _INTEGER = ("Real", "Float64"), ("Integer", "Int32")
+Array = NDArray[np.float64]
+_WARNING = 1
+"""The highest status with which both versions of FMI go on."""
 
 
 class FmuInstance:
-    """An FMU that has been unpacked, loaded and instantiated.
+    """An FMU that has been loaded and instantiated.
 
     Parameters
     ----------
-    name
-        Name of the instance, for messages.
-    path
-        The FMU.
-    folder
-        Folder for its files; the owner of the folder removes it after :meth:`close`.
+    description
+        Of the FMU.
+    watch
+        Told what is called, so that a crash can be explained.
 
     Raises
     ------
     ExportError
-        If the file is no valid co-simulation FMU or has no binary for this machine.
+        If its library cannot be loaded or instantiated.
     """
 
-    def __init__(self, name: str, path: Path, folder: Path) -> None:
-        self.name = name
+    def __init__(self, description: FmuDescription, watch: Watch) -> None:
+        self.name = description.instance
+        self.description = description
         self.messages: list[str] = []
-        description = _description(name, path)
-        self.variables: Mapping[str, Any] = {
-            v.name: v
-            for v in description.modelVariables
-            if v.type in _REAL + _INTEGER and not getattr(v, "dimensions", None)
-        }
-        self._two = description.fmiVersion == "2.0"
+        self._watch = watch
+        self._two = description.version == "2.0"
         self._running = False
-        fmpy.extract(str(path), unzipdir=str(folder))
-        kind = fmpy.fmi2.FMU2Slave if self._two else fmpy.fmi3.FMU3Slave
-        self._fmu = self._load(kind, description, folder)
+        watch(self.name, Activity.LOADING)
+        self._fmu = self._load()
+        watch(self.name, Activity.INSTANTIATING)
         try:
             self._instantiate()
+            self._step = self._step_function()
         except Exception as error:
             self._fmu.freeLibrary()
             raise ExportError(
-                f"instance '{name}'", f"could not be made: {_why(self.messages, error)}"
+                f"instance '{self.name}'", f"could not be made: {_why(self.messages, error)}"
             ) from error
 
-    def _load(self, kind: Any, description: Any, folder: Path) -> Any:
-        identifier = description.coSimulation.modelIdentifier
-        where = "binaries/" + (fmpy.platform if self._two else fmpy.platform_tuple)
-        library = folder / where / (identifier + fmpy.sharedLibraryExtension)
-        if not library.is_file():
-            raise ExportError(
-                f"instance '{self.name}'",
-                f"the FMU has no binary for this machine ({where})",
-                next_step="export it with platforms=None on this machine, or name the platform",
-            )
+    def _load(self) -> Any:
         here = os.getcwd()
+        kind = fmpy.fmi2.FMU2Slave if self._two else fmpy.fmi3.FMU3Slave
         try:
             return kind(
-                guid=description.guid,
-                modelIdentifier=identifier,
-                unzipDirectory=str(folder),
+                guid=self.description.token,
+                modelIdentifier=self.description.identifier,
+                unzipDirectory=str(self.description.folder),
                 instanceName=self.name,
+                libraryPath=str(self.description.library),
             )
         except Exception as error:
             raise ExportError(f"instance '{self.name}'", f"its library does not load: {error}") from error
@@ -110,31 +103,15 @@ class FmuInstance:
         except FMICallException as error:
             raise kind(f"instance '{self.name}', {what}", _why(self.messages, error)) from error
 
-    @property
-    def sample_time(self) -> float | None:
-        """Sample time in s that the FMU states, ``None`` for a continuous one."""
-        period = self.variables.get("sample.time")
-        return float(period.start) if period is not None and period.variability == "constant" else None
-
-    def unit(self, variable: str) -> str | None:
-        """Return the unit of a variable, ``None`` if the FMU gives none.
-
-        Parameters
-        ----------
-        variable
-            Name of a variable.
-        """
-        described = self.variables[variable]
-        return described.unit or (described.declaredType.unit if described.declaredType else None)
-
-    def begin(self, start: float, stop: float) -> None:
+    def begin(self, start: float, stop: float | None) -> None:
         """Enter the initialization mode.
 
         Parameters
         ----------
         start, stop
-            Times in s.
+            Times in s; ``None`` without an end.
         """
+        self._watch(self.name, Activity.INITIALIZING)
         with self._explained("initialization"):
             if self._two:
                 self._fmu.setupExperiment(startTime=start, stopTime=stop)
@@ -144,6 +121,7 @@ class FmuInstance:
 
     def run(self) -> None:
         """Leave the initialization mode."""
+        self._watch(self.name, Activity.INITIALIZING)
         with self._explained("initialization"):
             self._fmu.exitInitializationMode()
         self._running = True
@@ -154,42 +132,107 @@ class FmuInstance:
         Parameters
         ----------
         values
-            Numbers in SI by name.
+            Numbers by name.
 
         Raises
         ------
         ExportError
             With the message of the FMU if it refuses.
         """
-        if values:
-            references = [self.variables[name].valueReference for name in values]
-            with self._explained(f"setting {', '.join(values)}"):
-                (self._fmu.setReal if self._two else self._fmu.setFloat64)(references, list(values.values()))
+        for name, value in values.items():
+            variable = self.description.variables[name]
+            self._watch(self.name, Activity.SETTING)
+            with self._explained(f"setting {name}"):
+                if variable.kind == "real":
+                    (self._fmu.setReal if self._two else self._fmu.setFloat64)([variable.reference], [value])
+                else:
+                    (self._fmu.setInteger if self._two else self._fmu.setInt32)(
+                        [variable.reference], [int(value)]
+                    )
 
-    def get(self, names: Sequence[str]) -> dict[str, float]:
-        """Return the values of variables.
+    def setter(self, names: Sequence[str], values: Array) -> Callable[[], None]:
+        """Return a function that sets real variables to what an array holds when it is called.
 
         Parameters
         ----------
         names
-            Names of real or integer variables.
-
-        Raises
-        ------
-        ExportError
-            With the message of the FMU if it refuses.
+            Of real variables.
+        values
+            Shape (n,), contiguous; the function reads it.
         """
-        values: dict[str, float] = {}
-        real, integer = (self._fmu.getReal, self._fmu.getInteger) if self._two else (
-            self._fmu.getFloat64, self._fmu.getInt32,
-        )  # fmt: skip
-        for types, read in ((_REAL, real), (_INTEGER, integer)):
-            chosen = [name for name in names if self.variables[name].type in types]
-            if chosen:
-                with self._explained("reading"):
-                    numbers = read([self.variables[name].valueReference for name in chosen])
-                values |= {name: float(number) for name, number in zip(chosen, numbers, strict=True)}
-        return values
+        variables = [self.description.variables[name] for name in names]
+        call = self._access("fmi2SetReal" if self._two else "fmi3SetFloat64", variables, values.ctypes.data)
+        return self._checked(call, Activity.SETTING, f"setting {', '.join(names)}", values)
+
+    def reader(self, variables: Sequence[FmuVariable], values: Array) -> Callable[[], None]:
+        """Return a function that reads variables into an array when it is called.
+
+        Parameters
+        ----------
+        variables
+            Reals first, then integers.
+        values
+            Shape (n,), contiguous; the function writes it.
+        """
+        reals = [v for v in variables if v.kind == "real"]
+        integers = [v for v in variables if v.kind != "real"]
+        numbers = np.zeros(len(integers), dtype=np.int32)
+        real = self._access("fmi2GetReal" if self._two else "fmi3GetFloat64", reals, values.ctypes.data)
+        read = self._checked(real, Activity.READING, "reading", values)
+        if not integers:
+            return read
+        whole = self._access("fmi2GetInteger" if self._two else "fmi3GetInt32", integers, numbers.ctypes.data)
+        read_whole = self._checked(whole, Activity.READING, "reading", numbers)
+
+        def read_all() -> None:
+            if reals:
+                read()
+            read_whole()
+            values[len(reals) :] = numbers
+
+        return read_all
+
+    def _access(self, function: str, variables: Sequence[FmuVariable], place: int) -> Callable[[], int]:
+        """Return a call that sets or reads variables at one place in memory."""
+        references = (ctypes.c_uint32 * max(1, len(variables)))(*[v.reference for v in variables])
+        native = self._fmu.dll[function]
+        component, count, at = self._fmu.component, len(variables), ctypes.addressof(references)
+        void, size = ctypes.c_void_p, ctypes.c_size_t
+        if self._two:
+            native.argtypes = [void, void, size, void]
+            # The default keeps the references alive as long as the call.
+            return lambda _kept=references: int(native(component, at, count, place))  # type: ignore[misc]
+        native.argtypes = [void, void, size, void, size]
+        return lambda _kept=references: int(native(component, at, count, place, count))  # type: ignore[misc]
+
+    def _checked(self, call: Callable[[], int], activity: int, what: str, kept: Any) -> Callable[[], None]:
+        """Return a call that raises where the FMU refuses; ``kept`` stays alive as long as it."""
+        watch, name = self._watch, self.name
+
+        def checked(_kept: Any = kept) -> None:
+            watch(name, activity)
+            status = call()
+            if status > _WARNING:
+                raise ExportError(f"instance '{name}', {what}", _why(self.messages, f"status {status}"))
+
+        return checked
+
+    def _step_function(self) -> Callable[[float, float], int]:
+        native, component = self._fmu.dll["fmi2DoStep" if self._two else "fmi3DoStep"], self._fmu.component
+        void, double, flag = ctypes.c_void_p, ctypes.c_double, ctypes.c_int if self._two else ctypes.c_bool
+        if self._two:
+            native.argtypes = [void, double, double, flag]
+            return lambda time, length: int(native(component, time, length, 0))
+        native.argtypes = [void, double, double, flag, void, void, void, void]
+        flags = [ctypes.c_bool() for _ in range(3)]
+        last = ctypes.c_double()
+        event, end, early = (ctypes.addressof(flag) for flag in flags)
+        reached = ctypes.addressof(last)
+
+        def step(time: float, length: float, _kept: Any = (flags, last)) -> int:
+            return int(native(component, time, length, False, event, end, early, reached))
+
+        return step
 
     def step(self, time: float, length: float) -> None:
         """Advance by one communication step.
@@ -204,11 +247,46 @@ class FmuInstance:
         ConvergenceError
             With the message of the FMU if it cannot.
         """
-        with self._explained(f"step from {time:g} s", ConvergenceError):
-            self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=length)
+        self._watch(self.name, Activity.STEPPING)
+        status = self._step(time, length)
+        if status > _WARNING:
+            raise ConvergenceError(
+                f"instance '{self.name}', step from {time:g} s", _why(self.messages, f"status {status}")
+            )
+
+    def keep_state(self) -> Any:
+        """Return a copy of the state, to be given back to :meth:`forget_state`."""
+        self._watch(self.name, Activity.ROLLING_BACK)
+        with self._explained("keeping its state"):
+            return self._fmu.getFMUstate() if self._two else self._fmu.getFMUState()
+
+    def restore_state(self, state: Any) -> None:
+        """Go back to a state that was kept.
+
+        Parameters
+        ----------
+        state
+            From :meth:`keep_state`.
+        """
+        self._watch(self.name, Activity.ROLLING_BACK)
+        with self._explained("going back to an earlier state"):
+            (self._fmu.setFMUstate if self._two else self._fmu.setFMUState)(state)
+
+    def forget_state(self, state: Any) -> None:
+        """Free a state that was kept.
+
+        Parameters
+        ----------
+        state
+            From :meth:`keep_state`.
+        """
+        self._watch(self.name, Activity.ROLLING_BACK)
+        with self._explained("freeing a state"):
+            (self._fmu.freeFMUstate if self._two else self._fmu.freeFMUState)(state)
 
     def close(self) -> None:
         """Terminate, free the instance and unload its library; never fails."""
+        self._watch(self.name, Activity.ENDING)
         try:
             if self._running:
                 self._fmu.terminate()
@@ -218,16 +296,6 @@ class FmuInstance:
             self._fmu.freeInstance()
 
 
-def _why(messages: Sequence[str], error: BaseException) -> str:
+def _why(messages: Sequence[str], error: object) -> str:
     """Return the last message of the FMU, or that of fmpy without one."""
     return messages[-1] if messages else str(error)
-
-
-def _description(name: str, path: Path) -> Any:
-    try:
-        description = fmpy.read_model_description(str(path))
-    except Exception as error:
-        raise ExportError(f"instance '{name}' ({path})", f"is not a valid FMU: {error}") from error
-    if description.coSimulation is None or description.fmiVersion == "1.0":
-        raise ExportError(f"instance '{name}' ({path})", "is not a co-simulation FMU of FMI 2.0 or 3.0")
-    return description
