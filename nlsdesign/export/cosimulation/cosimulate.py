@@ -24,14 +24,15 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import ExportError, ValueRangeError, unknown_name
+from ...errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
 from ...simulation.trace import Trace
 from .coupling import Stepping
 from .fmu_archive import unpack
 from .fmu_description import DESCRIPTION_FILE, FmuDescription, read_description
 from .fmu_instance import FmuInstance
 from .isolation import IsolatedWork, Watch
-from .master import Given, Link, Master, Plan, points_of
+from .master import Master
+from .run_plan import Given, Link, Plan, points_of
 from .wires import Wire, as_wire, check_wires, delay_of, ends, gain_to, split_name
 
 Array = NDArray[np.float64]
@@ -121,6 +122,11 @@ class FmuSystem:
             End in s.
         stepping
             Step, coupling, and limits.
+
+        Raises
+        ------
+        ValueRangeError
+            If the end is not a positive number of seconds.
         """
         if not (math.isfinite(stop) and stop > 0.0):
             raise ValueRangeError(f"stop={stop}", "must be a positive number of seconds")
@@ -213,6 +219,7 @@ class _Run:
         if plan.coupled and self._stepping.coupling.rolls_back:
             self._check_roll_back(plan)
         rows = self._rows(plan)
+        self._check_finite(plan, rows)
         columns = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(plan.columns)}
         trace = Trace(plan.points, columns, {name: self._unit(name) for name in columns}, "co-simulation")
         errors: dict[str, float] = {}
@@ -264,19 +271,25 @@ class _Run:
         }
 
     def _check_roll_back(self, plan: Plan) -> None:
-        for link in self._links:
-            for end in (link.target, link.source):
-                name = split_name(end)[0]
-                if (
-                    plan.curved(link)
-                    and not plan.sampled(link.target)
-                    and not plan.descriptions[name].rolls_back
-                ):
-                    raise ExportError(
-                        f"instance '{name}'",
-                        "cannot keep and restore its state, which this coupling needs",
-                        next_step="take coupling=Extrapolated()",
-                    )
+        ends_of = [end for link in plan.coupling_links for end in (link.target, link.source)]
+        for name in dict.fromkeys(split_name(end)[0] for end in ends_of):
+            if not plan.descriptions[name].rolls_back:
+                raise ExportError(
+                    f"instance '{name}'",
+                    "cannot keep and restore its state, which this coupling needs",
+                    next_step="take coupling=Extrapolated()",
+                )
+
+    def _check_finite(self, plan: Plan, rows: Array) -> None:
+        """Refuse a run in which an output is no number."""
+        for column, name in enumerate(plan.columns):
+            instance, variable = split_name(name)
+            lost = np.flatnonzero(~np.isfinite(rows[:, column]))
+            if len(lost) and self._descriptions[instance].variables[variable].causality == "output":
+                raise ConvergenceError(
+                    f"instance '{instance}' at {plan.points[lost[0]]:g} s",
+                    f"its output {variable} is no number",
+                )
 
     def _unit(self, name: str) -> str:
         instance, variable = split_name(name)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,11 @@ _ROUNDING = 1e-6
 class Feed(Protocol):
     """Source of one input."""
 
-    @property
-    def moves(self) -> bool:
-        """Whether the value changes between samples."""
+    moves: ClassVar[bool]
+    """Whether the value changes between samples."""
+
+    def initial(self) -> float:
+        """Return the value during initialization."""
         ...
 
     def at(self, row: int, time: float) -> float:
@@ -53,7 +55,11 @@ class GivenFeed:
     values: Array
     left: Array
     middle: Array
-    moves: bool = True
+    moves: ClassVar[bool] = True
+
+    def initial(self) -> float:
+        """Return the first value."""
+        return float(self.values[0])
 
     def at(self, row: int, time: float) -> float:
         """Return the value at a communication point."""
@@ -91,7 +97,11 @@ class HeldFeed:
     gain: float
     samples: list[float] | None = None
     first: float = 0.0
-    moves: bool = False
+    moves: ClassVar[bool] = False
+
+    def initial(self) -> float:
+        """Return the present value."""
+        return self.at(0, 0.0)
 
     def at(self, row: int, time: float) -> float:
         """Return the present value."""
@@ -129,7 +139,11 @@ class LateFeed:
     period: float
     delay: float
     first: float | None
-    moves: bool = False
+    moves: ClassVar[bool] = False
+
+    def initial(self) -> float:
+        """Return the value before the first sample."""
+        return self.at(0, 0.0)
 
     def begin(self) -> None:
         """Keep what the source shows before its first sample."""
@@ -167,13 +181,13 @@ class Curve:
 
     column: int
     smooth: bool
-    times: list[float] = field(default_factory=list)
-    ends: list[float] = field(default_factory=list)
+    times: list[float] = field(default_factory=list, init=False)
+    ends: list[float] = field(default_factory=list, init=False)
     """Values at the end of the step that leads to each time."""
-    begins: list[float] = field(default_factory=list)
+    begins: list[float] = field(default_factory=list, init=False)
     """Values at each time after inputs have jumped there."""
-    slope: float = 0.0
-    size: float = 0.0
+    slope: float = field(default=0.0, init=False)
+    size: float = field(default=0.0, init=False)
     """Largest absolute value so far."""
 
     def arrive(self, time: float, value: float) -> None:
@@ -244,7 +258,11 @@ class CurveFeed:
     gain: float
     delay: float
     first: float
-    moves: bool = True
+    moves: ClassVar[bool] = True
+
+    def initial(self) -> float:
+        """Return the present value, or that before one arrives through a delay."""
+        return self.first if self.delay else self.gain * float(self.now[self.curve.column])
 
     def at(self, row: int, time: float) -> float:
         """Return the value at a communication point that the source has reached."""

@@ -17,7 +17,7 @@ _KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "int
 
 
 @dataclass(frozen=True)
-class FmuVariable:
+class FmuScalar:
     """A scalar variable of an FMU.
 
     Parameters
@@ -71,7 +71,7 @@ class FmuDescription:
     identifier: str
     token: str
     rolls_back: bool
-    variables: Mapping[str, FmuVariable]
+    variables: Mapping[str, FmuScalar]
 
     @property
     def sample_time(self) -> float | None:
@@ -80,7 +80,7 @@ class FmuDescription:
         return period.start if period is not None and period.variability == "constant" else None
 
     @property
-    def shown(self) -> tuple[FmuVariable, ...]:
+    def shown(self) -> tuple[FmuScalar, ...]:
         """Outputs and inner signals, reals first."""
         chosen = [v for v in self.variables.values() if v.causality in ("output", "local")]
         return tuple(sorted(chosen, key=lambda v: v.kind != "real"))
@@ -124,21 +124,22 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
         raise ExportError(what, f"is not a valid FMU: '{offered.modelIdentifier}' is no model identifier")
     version = "2.0" if read.fmiVersion == "2.0" else "3.0"
     rolls_back = bool(offered.canGetAndSetFMUstate)
-    found = FmuDescription(
+    description = FmuDescription(
         instance, folder, version, offered.modelIdentifier, read.guid, rolls_back, variables
     )
-    _check_sample_time(what, found)
-    if not found.library.is_file():
+    _check_sample_time(what, description)
+    if not description.library.is_file():
+        place = description.library.parent.relative_to(folder).as_posix()
         raise ExportError(
             f"instance '{instance}'",
-            f"the FMU has no binary for this machine ({found.library.parent.relative_to(folder).as_posix()})",
+            f"the FMU has no binary for this machine ({place})",
             next_step="export it with platforms=None on this machine, or name the platform",
         )
-    return found
+    return description
 
 
-def _check_sample_time(what: str, found: FmuDescription) -> None:
-    stated = found.variables.get("sample.time")
+def _check_sample_time(what: str, description: FmuDescription) -> None:
+    stated = description.variables.get("sample.time")
     if stated is None or stated.variability != "constant":
         return
     if stated.start is None or not (math.isfinite(stated.start) and stated.start > 0.0):
@@ -149,14 +150,16 @@ def _usable(variable: Any) -> bool:
     return variable.type in _KINDS and not getattr(variable, "dimensions", None)
 
 
-def _variable(read: Any) -> FmuVariable:
+def _variable(read: Any) -> FmuScalar:
     unit = read.unit or (read.declaredType.unit if read.declaredType else None)
     start = None if read.start is None else float(read.start)
-    return FmuVariable(
+    return FmuScalar(
         read.name, int(read.valueReference), read.causality, read.variability, _KINDS[read.type], unit, start
     )
 
 
 def _brief(error: BaseException) -> str:
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(str(error).split())
+    # What Python raises where something is missing names only that.
+    text = f"{type(error).__name__} {text}" if isinstance(error, LookupError) or not text else text
     return text if len(text) <= 300 else text[:300] + " ..."

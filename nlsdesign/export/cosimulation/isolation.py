@@ -85,18 +85,18 @@ class Watch:
     names: tuple[str, ...]
     cells: Any = field(default_factory=lambda: memoryview(mmap.mmap(-1, 32)).cast("q"))
 
-    def __call__(self, instance: str, activity: int) -> None:
+    def __call__(self, instance: int, activity: int) -> None:
         """Note a call that begins.
 
         Parameters
         ----------
         instance
-            Name.
+            Its number in the names.
         activity
             An :class:`Activity`.
         """
         cells = self.cells
-        cells[0] = self.names.index(instance)
+        cells[0] = instance
         cells[1] = activity
         cells[3] += 1
 
@@ -172,17 +172,17 @@ class IsolatedWork:
         try:
             with signals_held():
                 ours, child = self._started(array)
-            told = self._wait(child, ours)
+            answer = self._wait(child, ours)
         finally:
             # An interrupt that comes here waits until nothing of the process is left.
             with signals_held():
                 if child is not None:
                     child.end()
                     os.close(ours)
-        if told is None:
+        if answer is None:
             raise self._crashed(child)
-        if told:
-            raise _error(json.loads(told))
+        if answer:
+            _reraise(json.loads(answer))
         return array
 
     def _started(self, array: Array) -> tuple[int, _Child]:
@@ -197,14 +197,14 @@ class IsolatedWork:
             os.setpgid(process, process)
         return ours, _Child(process)
 
-    def _wait(self, child: _Child, told: int) -> bytes | None:
+    def _wait(self, child: _Child, pipe: int) -> bytes | None:
         """Return what the process says at its end, ``None`` if it says nothing or not in time."""
         text = b""
         calls, since = -1, time.monotonic()
         while True:
-            ready, _, _ = select.select([told], [], [], _LOOK)
+            ready, _, _ = select.select([pipe], [], [], _LOOK)
             if ready:
-                piece = os.read(told, 65536)
+                piece = os.read(pipe, 65536)
                 text += piece
                 if not piece:
                     break
@@ -258,7 +258,7 @@ class IsolatedWork:
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         return f"; it printed: {last[:200]}" if last else ""
 
-    def _work_and_end(self, array: Array, told: int) -> NoReturn:
+    def _work_and_end(self, array: Array, pipe: int) -> NoReturn:
         """Work in the new process, say at the end how it went, and never return."""
         answer: dict[str, Any] | None
         try:
@@ -275,7 +275,7 @@ class IsolatedWork:
             answer = {"kind": "", "words": [traceback.format_exc()]}
         try:
             text = b"" if answer is None else json.dumps(answer).encode()
-            os.write(told, text + b"\n")
+            os.write(pipe, text + b"\n")
         finally:
             os._exit(0)
 
@@ -337,9 +337,9 @@ def _made_ready(folder: Path) -> None:
         os.dup2(place, descriptor)
 
 
-def _error(told: dict[str, Any]) -> Exception:
-    words: Sequence[Any] = told["words"]
-    if not told["kind"]:
-        return RuntimeError(f"in the process of the FMUs:\n{words[0]}")
-    kind: type[NlsError] = getattr(errors, told["kind"])
-    return kind(words[0], words[1], did_you_mean=words[2], next_step=words[3])
+def _reraise(answer: dict[str, Any]) -> NoReturn:
+    words: Sequence[Any] = answer["words"]
+    if not answer["kind"]:
+        raise RuntimeError(f"in the process of the FMUs:\n{words[0]}")
+    kind: type[NlsError] = getattr(errors, answer["kind"])
+    raise kind(words[0], words[1], did_you_mean=words[2], next_step=words[3])
