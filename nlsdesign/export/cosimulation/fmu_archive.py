@@ -11,6 +11,7 @@ import zlib
 from pathlib import Path, PurePosixPath
 
 from ...errors import ExportError
+from .foreign_text import fit_to_show
 
 MOST_ENTRIES = 10_000
 """Entries of an archive; assumed: fifty times those of an FMU with sources and documentation."""
@@ -54,7 +55,9 @@ def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
         raise ExportError(what, f"cannot be read ({error.strerror or error})") from error
     except _BROKEN as error:
         raise ExportError(
-            what, f"is not a valid archive, or damaged: {error}", next_step="get or export it again"
+            what,
+            f"is not a valid archive, or damaged: {fit_to_show(error)}",
+            next_step="get or export it again",
         ) from error
 
 
@@ -64,13 +67,13 @@ def _judge(what: str, entries: list[zipfile.ZipInfo], needs: str) -> None:
     size = sum(entry.file_size for entry in entries)
     if size > MOST_BYTES:
         raise ExportError(
-            what, f"would unpack to {size / 2**20:.0f} MiB, at most {MOST_BYTES // 2**20} are allowed"
+            what, f"would unpack to {size / 2**20:.0f} MiB, at most {MOST_BYTES // 2**20} MiB are taken"
         )
     names: set[str] = set()
     for entry in entries:
         objection = _objection(entry, names)
         if objection:
-            raise ExportError(f"{what}, entry '{entry.filename[:80]}'", objection)
+            raise ExportError(f"{what}, entry '{fit_to_show(entry.filename)}'", objection)
         names.add(entry.filename)
     if needs not in names:
         raise ExportError(what, f"has no {needs}")

@@ -11,6 +11,7 @@ from typing import Any
 import fmpy
 
 from ...errors import ExportError
+from .foreign_text import fit_to_show
 
 DESCRIPTION_FILE = "modelDescription.xml"
 _KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "integer"}
@@ -121,7 +122,9 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
     if offered is None or read.fmiVersion == "1.0":
         raise ExportError(what, "is not a co-simulation FMU of FMI 2.0 or 3.0")
     if not str(offered.modelIdentifier).isidentifier():
-        raise ExportError(what, f"is not a valid FMU: '{offered.modelIdentifier}' is no model identifier")
+        raise ExportError(
+            what, f"is not a valid FMU: '{fit_to_show(offered.modelIdentifier)}' is no model identifier"
+        )
     version = "2.0" if read.fmiVersion == "2.0" else "3.0"
     rolls_back = bool(offered.canGetAndSetFMUstate)
     description = FmuDescription(
@@ -159,7 +162,6 @@ def _variable(read: Any) -> FmuScalar:
 
 
 def _brief(error: BaseException) -> str:
-    text = " ".join(str(error).split())
     # What Python raises where something is missing names only that.
-    text = f"{type(error).__name__} {text}" if isinstance(error, LookupError) or not text else text
-    return text if len(text) <= 300 else text[:300] + " ..."
+    named = isinstance(error, LookupError) or not str(error).strip()
+    return fit_to_show(f"{type(error).__name__} {error}" if named else error)

@@ -31,6 +31,7 @@ from ... import errors
 from ...errors import ExportError, NlsError
 from ...processes import signals_held
 from ...progress import Progress
+from .foreign_text import fit_to_show
 
 Array = NDArray[np.float64]
 _LOOK = 0.05
@@ -106,7 +107,7 @@ class Watch:
         Parameters
         ----------
         row
-            Rows that are filled.
+            Number of the row that is being filled.
         """
         self.cells[2] = row
 
@@ -256,7 +257,7 @@ class IsolatedWork:
         except OSError:
             return ""  # the process ended before it had opened the file
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-        return f"; it printed: {last[:200]}" if last else ""
+        return f"; it printed: {fit_to_show(last)}" if last else ""
 
     def _work_and_end(self, array: Array, pipe: int) -> NoReturn:
         """Work in the new process, say at the end how it went, and never return."""

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, ExportError
 from .fmu_description import FmuDescription
+from .foreign_text import fit_to_show
 from .isolation import Activity, Watch
 
 Array = NDArray[np.float64]
-_LONGEST = 400
-"""Characters of a message that are shown."""
 
 
 class LoadedFmu:
@@ -158,6 +157,4 @@ def why(messages: Sequence[str], error: object) -> str:
     error
         What is said without any.
     """
-    text = messages[-1] if messages else str(error)
-    shown = "".join(each if each.isprintable() else " " for each in text[:_LONGEST])
-    return shown if len(text) <= _LONGEST else f"{shown} ..."
+    return fit_to_show(messages[-1] if messages else error)

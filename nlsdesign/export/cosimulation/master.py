@@ -81,6 +81,7 @@ class Master:
         curves, coupling = self._connected.curves.values(), self._plan.coupling
         for row, time in enumerate(self._points):
             self._row = row
+            self._watch.at_row(row)
             for curve in curves:
                 curve.arrive(time, float(self.now[curve.column]))
             present = partial(InstanceInputs.present, row=row, time=time)
@@ -94,7 +95,6 @@ class Master:
             for name in self._driven:
                 self._show(name, self._inputs[name].present(row, time))
             rows[row] = self.now
-            self._watch.at_row(row)
             if row + 1 < len(self._points):
                 coupling.step(self, time, self._points[row + 1] - time)
 
