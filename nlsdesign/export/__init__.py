@@ -4,6 +4,7 @@ from .c.controller_code import CSource, export_c
 from .compilation.compiled_step import natively
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
+from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
 from .cosimulation.wires import Late, SamplesOf, Wire
@@ -15,6 +16,7 @@ __all__ = [
     "CSource",
     "CoSimulation",
     "CompiledStep",
+    "Convergence",
     "Extrapolated",
     "FmuSystem",
     "Held",
@@ -23,6 +25,7 @@ __all__ = [
     "SamplesOf",
     "Stepping",
     "Wire",
+    "convergence",
     "cosimulate",
     "export_c",
     "export_fmu",

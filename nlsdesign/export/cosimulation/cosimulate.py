@@ -40,6 +40,10 @@ Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
 """A function of time in s, or times and values between which it is linear and beyond which it is held."""
 DEFAULT_STEP = 1e-3
 """Communication step in s where no instance is sampled."""
+_MOST_ERROR = 0.5
+"""Share of the extent of a coupled signal above which its estimated error makes a run no result."""
+_AT_REST = 1e-9
+"""Extent below which a signal rests, whatever its unit; there the error is rounding."""
 _JUST_BEFORE = 1e-6
 """Part of a step: signals from outside that jump at a communication point are also read so long before it."""
 
@@ -110,7 +114,12 @@ class FmuSystem:
     order: tuple[str, ...] = ()
 
     def run(
-        self, *, inputs: Mapping[str, Signal], stop: float, stepping: Stepping | None = None
+        self,
+        *,
+        inputs: Mapping[str, Signal],
+        stop: float,
+        stepping: Stepping | None = None,
+        parts: int = 1,
     ) -> CoSimulation:
         """Simulate; see :func:`cosimulate`.
 
@@ -122,6 +131,8 @@ class FmuSystem:
             End in s.
         stepping
             Step, coupling, and limits.
+        parts
+            Parts into which each step is divided once more.
 
         Raises
         ------
@@ -135,7 +146,7 @@ class FmuSystem:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-")))
             descriptions = _unpacked(self.fmus, folder)
             run = _Run(self, descriptions, inputs, stop, stepping or Stepping(), folder)
-            return run.result()
+            return run.result(parts)
 
 
 def cosimulate(
@@ -184,7 +195,7 @@ def cosimulate(
     ValueRangeError
         If step or stop is not possible.
     ConvergenceError
-        If an instance cannot take a step, with its own words, or a coupling does not settle.
+        If an instance cannot take a step, with its own words, or a coupling does not settle or converge.
     """
     system = FmuSystem(fmus=fmus, wires=wires, parameters=parameters or {}, order=tuple(order))
     return system.run(
@@ -213,9 +224,9 @@ class _Run:
         times = [each.sample_time for each in descriptions.values() if each.sample_time is not None]
         self._step = min(times, default=DEFAULT_STEP) if stepping.step is None else stepping.step
 
-    def result(self) -> CoSimulation:
+    def result(self, parts: int) -> CoSimulation:
         """Run, and once more with half the step where that tells an error."""
-        plan = self._plan(parts=1)
+        plan = self._plan(parts)
         if plan.coupled and self._stepping.coupling.rolls_back:
             self._check_roll_back(plan)
         rows = self._rows(plan)
@@ -224,10 +235,11 @@ class _Run:
         trace = Trace(plan.points, columns, {name: self._unit(name) for name in columns}, "co-simulation")
         errors: dict[str, float] = {}
         if plan.coupled and self._stepping.estimate:
-            finer = self._rows(self._plan(parts=2))[::2]
+            finer = self._rows(self._plan(2 * parts))[::2]
             order = self._stepping.coupling.order
             largest = np.max(np.abs(rows - finer), axis=0) * 2**order / (2**order - 1)
             errors = dict(zip(plan.columns, largest.tolist(), strict=True))
+            self._check_converges(plan, errors, rows)
         return CoSimulation(trace, self._step, self._system.order, self._delays(), errors)
 
     def _plan(self, parts: int) -> Plan:
@@ -278,6 +290,18 @@ class _Run:
                     f"instance '{name}'",
                     "cannot keep and restore its state, which this coupling needs",
                     next_step="take coupling=Extrapolated()",
+                )
+
+    def _check_converges(self, plan: Plan, errors: Mapping[str, float], rows: Array) -> None:
+        """Refuse a run whose wires between continuous instances are mostly error."""
+        for link in plan.coupling_links:
+            extent = float(np.ptp(rows[:, plan.columns.index(link.source)]))
+            if errors[link.source] > _MOST_ERROR * extent and extent > _AT_REST:
+                raise ConvergenceError(
+                    f"wire from '{link.source}'",
+                    f"half the step changes it by about {errors[link.source]:.2g} of its {extent:.2g}: the "
+                    f"coupling does not converge in steps of {plan.points[1]:.3g} s",
+                    next_step="take a shorter step, or coupling=Iterated()",
                 )
 
     def _check_finite(self, plan: Plan, rows: Array) -> None:
