@@ -9,6 +9,8 @@ from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
 from .cosimulation.wires import Late, SamplesOf, Wire
 from .fmi.fmu import export_fmu
+from .ssp.read_ssp import read_ssp
+from .ssp.write_ssp import WrittenSystem, write_ssp
 
 __all__ = [
     "ALL_PLATFORMS",
@@ -25,10 +27,13 @@ __all__ = [
     "SamplesOf",
     "Stepping",
     "Wire",
+    "WrittenSystem",
     "convergence",
     "cosimulate",
     "export_c",
     "export_fmu",
     "host_platform",
     "natively",
+    "read_ssp",
+    "write_ssp",
 ]

@@ -28,7 +28,7 @@ from ...errors import ConvergenceError, ExportError, ValueRangeError, unknown_na
 from ...simulation.trace import Trace
 from .coupling import Stepping
 from .fmu_archive import unpack
-from .fmu_description import DESCRIPTION_FILE, FmuDescription, read_description
+from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description
 from .fmu_instance import FmuInstance
 from .isolation import IsolatedWork, Watch
 from .master import Master
@@ -141,10 +141,12 @@ class FmuSystem:
         """
         if not (math.isfinite(stop) and stop > 0.0):
             raise ValueRangeError(f"stop={stop}", "must be a positive number of seconds")
-        _check_order(self.order, self.fmus)
+        check_order(self.order, self.fmus)
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-")))
-            descriptions = _unpacked(self.fmus, folder)
+            descriptions = unpacked_fmus(self.fmus, folder)
+            for description in descriptions.values():
+                check_library(description)
             run = _Run(self, descriptions, inputs, stop, stepping or Stepping(), folder)
             return run.result(parts)
 
@@ -219,7 +221,7 @@ class _Run:
         self._system, self._stepping, self._stop = system, stepping, stop
         wires = {target: as_wire(source) for target, source in system.wires.items()}
         check_wires(descriptions, wires)
-        _check_signals(descriptions, wires, inputs, system.parameters)
+        check_signals(descriptions, wires, inputs, system.parameters)
         self._links = tuple(self._link(target, wire) for target, wire in wires.items())
         times = [each.sample_time for each in descriptions.values() if each.sample_time is not None]
         self._step = min(times, default=DEFAULT_STEP) if stepping.step is None else stepping.step
@@ -320,8 +322,21 @@ class _Run:
         return self._descriptions[instance].variables[variable].unit or "1"
 
 
-def _unpacked(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDescription]:
-    """Unpack all archives and read their descriptions."""
+def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDescription]:
+    """Unpack all archives and read their descriptions.
+
+    Parameters
+    ----------
+    fmus
+        FMU by name of the instance.
+    folder
+        Gets a folder for each; its owner removes it.
+
+    Raises
+    ------
+    ExportError
+        If an FMU is damaged, or the name of an instance is not one word.
+    """
     descriptions: dict[str, FmuDescription] = {}
     for number, (name, path) in enumerate(fmus.items()):
         if not name.isidentifier():
@@ -332,7 +347,23 @@ def _unpacked(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDesc
     return descriptions
 
 
-def _check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
+def check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
+    """Check that an order is empty or names each instance once.
+
+    Parameters
+    ----------
+    order
+        Names of instances.
+    fmus
+        By name of the instance.
+
+    Raises
+    ------
+    UnknownNameError
+        If an instance does not exist, with the nearest that does.
+    ValueRangeError
+        If some are missing or named twice.
+    """
     for name in order:
         if name not in fmus:
             raise unknown_name("instance in order", name, fmus)
@@ -340,12 +371,30 @@ def _check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
         raise ValueRangeError(f"order={tuple(order)}", f"must name each of {', '.join(fmus)} once")
 
 
-def _check_signals(
+def check_signals(
     descriptions: Mapping[str, FmuDescription],
     wires: Mapping[str, Wire],
     inputs: Mapping[str, Signal],
     parameters: Mapping[str, float],
 ) -> None:
+    """Check that what is given from outside exists and is driven once.
+
+    Parameters
+    ----------
+    descriptions
+        By instance.
+    wires, inputs
+        Wires and signals by target.
+    parameters
+        By ``instance.variable``.
+
+    Raises
+    ------
+    UnknownNameError
+        If an input or parameter does not exist, with the nearest that does.
+    ExportError
+        If an input is driven twice.
+    """
     valid = {
         "signal for input": (inputs, ends(descriptions, "input")),
         "parameter": (parameters, ends(descriptions)),

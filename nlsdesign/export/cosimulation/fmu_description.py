@@ -108,8 +108,7 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
     Raises
     ------
     ExportError
-        If it is no valid co-simulation FMU of FMI 2.0 or 3.0, states no possible sample time, or has no
-        binary for this machine.
+        If it is no valid co-simulation FMU of FMI 2.0 or 3.0, or states no possible sample time.
     """
     what = f"instance '{instance}' ({archive})"
     try:
@@ -131,14 +130,29 @@ def read_description(instance: str, archive: Path, folder: Path) -> FmuDescripti
         instance, folder, version, offered.modelIdentifier, read.guid, rolls_back, variables
     )
     _check_sample_time(what, description)
+    return description
+
+
+def check_library(description: FmuDescription) -> None:
+    """Check that there is a binary for this machine.
+
+    Parameters
+    ----------
+    description
+        Of the FMU.
+
+    Raises
+    ------
+    ExportError
+        If there is none.
+    """
     if not description.library.is_file():
-        place = description.library.parent.relative_to(folder).as_posix()
+        place = description.library.parent.relative_to(description.folder).as_posix()
         raise ExportError(
-            f"instance '{instance}'",
+            f"instance '{description.instance}'",
             f"the FMU has no binary for this machine ({place})",
             next_step="export it with platforms=None on this machine, or name the platform",
         )
-    return description
 
 
 def _check_sample_time(what: str, description: FmuDescription) -> None:
