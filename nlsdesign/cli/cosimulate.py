@@ -16,7 +16,7 @@ from .output import json_option, show_json, show_table
 from .units import Number, parse_number
 
 if TYPE_CHECKING:
-    from ..export import Convergence, CoSimulation, SamplesOf, Stepping, Wire
+    from ..export import Convergence, CoSimulation, FmuSystem, SamplesOf, Stepping, Wire
     from ..export.cosimulation.coupling import Coupling
     from ..progress import Progress
     from ..simulation import Sine
@@ -27,13 +27,19 @@ _SAMPLES = re.compile(r"(?P<count>[^a-z:]*)samples?(:(?P<instance>\w+))?$")
 _NUMBER = re.compile(r"(?P<number>[-+]?[\d.]+([eE][-+]?\d+)?)\s*(?P<unit>.*)$")
 
 
+WIRE_HELP = (
+    "Input and output as instance.variable. GAIN is a number, with a unit where both ends have different "
+    "ones: '*-1', '*0.02 m/rad'. DELAY is a time or a number of samples of the instance that computes the "
+    "value, or of another: '@2ms', '@1sample', '@1sample:controller'. TO=late:FROM is TO=FROM@1sample. "
+    "Repeatable."
+)
+
+
 @click.command("cosimulate")
-@click.option("--fmu", "fmus", multiple=True, required=True, metavar="INSTANCE=FILE", help="Repeatable.")
-@click.option("--wire", "wires", multiple=True, metavar="TO=FROM[*GAIN][@DELAY]",
-              help="Input and output as instance.variable. GAIN is a number, with a unit where both ends "
-                   "have different ones: '*-1', '*0.02 m/rad'. DELAY is a time or a number of samples of the "
-                   "instance that computes the value or of another: '@2ms', '@1sample', "
-                   "'@1sample:controller'. TO=late:FROM is TO=FROM@1sample. Repeatable.")  # fmt: skip
+@click.option("--fmu", "fmus", multiple=True, metavar="INSTANCE=FILE", help="Repeatable.")
+@click.option("--system", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE.ssp",
+              help="An SSP archive instead of --fmu; wires and parameters are added to its own.")  # fmt: skip
+@click.option("--wire", "wires", multiple=True, metavar="TO=FROM[*GAIN][@DELAY]", help=WIRE_HELP)
 @click.option("--input", "inputs", multiple=True, metavar="INPUT=NUMBER|AMPLITUDE@HERTZ",
               help="A constant or a sine; repeatable.")  # fmt: skip
 @click.option("--set", "parameters", multiple=True, metavar="PARAMETER=NUMBER", help="Repeatable.")
@@ -60,30 +66,54 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
     The FMUs run in a process of their own. Row k of the file shows what holds at its time. Where continuous
     FMUs are coupled or driven, the error of coupling is estimated by a second run with half the step.
     """
-    from ..export import FmuSystem, convergence
+    import tempfile
+
+    from ..export import convergence
     from ..progress import Steps
 
     steps = Steps()
-    system = FmuSystem(
-        fmus=_pairs("--fmu", given["fmus"], Path),
-        wires=_pairs("--wire", given["wires"], _wire),
-        parameters=_pairs("--set", given["parameters"], float),
-        order=given["order"],
-    )
-    inputs = _pairs("--input", given["inputs"], _signal)
-    stepping = _stepping(given["step"], given["coupling"], given["patience"], steps)
-    with steps.step("co-simulation"):
-        run = system.run(inputs=inputs, stop=stop, stepping=stepping)
-    study = None
-    if halvings is not None:
-        with steps.step("halving the step"):
-            study = convergence(system, inputs=inputs, stop=stop, stepping=stepping, halvings=halvings)
+    with tempfile.TemporaryDirectory(prefix="nlsdesign-system-") as folder:
+        system = _system(given, Path(folder))
+        inputs = pairs("--input", given["inputs"], _signal)
+        stepping = _stepping(given["step"], given["coupling"], given["patience"], steps)
+        with steps.step("co-simulation"):
+            run = system.run(inputs=inputs, stop=stop, stepping=stepping)
+        study = None
+        if halvings is not None:
+            with steps.step("halving the step"):
+                study = convergence(system, inputs=inputs, stop=stop, stepping=stepping, halvings=halvings)
     run.trace.write_csv(out)
     if as_json:
         show_json(_as_json(run, study, out))
         return
     _show(run, study, system.wires)
     click.echo(f"written: {out}, {len(run.time)} rows at most {1e3 * run.step:g} ms apart")
+
+
+def _system(given: Mapping[str, Any], folder: Path) -> FmuSystem:
+    """Return the FMUs and wires that are given, or those of an archive and what is added to it."""
+    from ..export import FmuSystem, read_ssp
+
+    own = FmuSystem(
+        fmus=pairs("--fmu", given["fmus"], Path),
+        wires=pairs("--wire", given["wires"], read_wire),
+        parameters=pairs("--set", given["parameters"], float),
+        order=given["order"],
+    )
+    if given["system"] is None:
+        if not own.fmus:
+            hint = "write --fmu INSTANCE=FILE or --system FILE.ssp"
+            raise ValueRangeError("no FMU", "is given", next_step=hint)
+        return own
+    if own.fmus:
+        raise ValueRangeError("--system", "holds the FMUs already", next_step="leave --fmu out")
+    read = read_ssp(given["system"], folder)
+    return FmuSystem(
+        fmus=read.fmus,
+        wires={**read.wires, **own.wires},
+        parameters={**read.parameters, **own.parameters},
+        order=own.order or read.order,
+    )
 
 
 def _stepping(step: float | None, coupling: str, patience: float, progress: Progress) -> Stepping:
@@ -140,7 +170,23 @@ def _show(run: CoSimulation, study: Convergence | None, wires: Mapping[str, str 
     show_table("Change when the step is halved", ("name", *heads), changes)
 
 
-def _pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
+def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
+    """Return what ``NAME=VALUE`` options give, by name.
+
+    Parameters
+    ----------
+    option
+        Its name, for messages.
+    given
+        What was written.
+    read
+        Reads a value.
+
+    Raises
+    ------
+    ValueRangeError
+        If one is not ``NAME=VALUE``, is given twice, or its value cannot be read.
+    """
     values: dict[str, T] = {}
     for text in given:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -156,8 +202,19 @@ def _pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dic
     return values
 
 
-def _wire(text: str) -> Wire:
-    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``."""
+def read_wire(text: str) -> Wire:
+    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``.
+
+    Parameters
+    ----------
+    text
+        What was written.
+
+    Raises
+    ------
+    ValueRangeError
+        If it cannot be read so.
+    """
     from ..export import SamplesOf, Wire
 
     late = text.startswith(_LATE)

@@ -45,13 +45,14 @@ def write_ssp(
     wires: Mapping[str, str | Wire],
     parameters: Mapping[str, float] | None = None,
     order: Sequence[str] = (),
+    inputs: Sequence[str] = (),
     version: str = "1.0",
 ) -> WrittenSystem:
     """Write FMUs and their wires as one archive of the standard System Structure and Parameterization.
 
-    Gains are linear transformations of the connections, parameters a file of values per FMU. Inputs that no
-    wire drives are inputs of the system, called ``instance.variable``. Delays and the order of sampled
-    instances have no place in the standard: they are written as annotations, which :func:`read_ssp` reads.
+    Gains are linear transformations of the connections, parameters a file of values per FMU. Delays and the
+    order of sampled instances have no place in the standard: they are written as annotations, which
+    :func:`read_ssp` reads.
 
     Parameters
     ----------
@@ -59,6 +60,9 @@ def write_ssp(
         File to write, usually ``.ssp``.
     fmus, wires, parameters, order
         As in :func:`~nlsdesign.export.cosimulate`.
+    inputs
+        Inputs of FMUs that become inputs of the system, called ``instance_variable``, for other tools to
+        drive. The others keep their start values, or those in ``parameters``.
     version
         ``"1.0"`` or ``"2.0"``.
 
@@ -81,8 +85,8 @@ def write_ssp(
     with tempfile.TemporaryDirectory(prefix="nlsdesign-ssp-") as folder:
         descriptions = unpacked_fmus(fmus, Path(folder))
         check_wires(descriptions, joined)
-        check_signals(descriptions, joined, {}, given)
-        writer = _Structure(descriptions, joined, given, tuple(order), version)
+        check_signals(descriptions, joined, dict.fromkeys(inputs, _undriven), given)
+        writer = _Structure(descriptions, joined, given, (tuple(order), tuple(inputs)), version)
         entries: dict[str, bytes] = {STRUCTURE_FILE: writer.structure(Path(path).stem)}
         entries |= writer.values()
         for name, file in fmus.items():
@@ -95,6 +99,10 @@ def write_ssp(
             entry.compress_type = zipfile.ZIP_STORED if name.endswith(".fmu") else zipfile.ZIP_DEFLATED
             archive.writestr(entry, content)
     return WrittenSystem(Path(path), tuple(writer.notes))
+
+
+def _undriven(time: float) -> float:
+    return 0.0
 
 
 def _content(file: Path) -> bytes:
@@ -112,10 +120,11 @@ class _Structure:
         descriptions: Mapping[str, FmuDescription],
         wires: Mapping[str, Wire],
         parameters: Mapping[str, float],
-        order: tuple[str, ...],
+        order_and_inputs: tuple[tuple[str, ...], tuple[str, ...]],
         version: str,
     ) -> None:
-        self._descriptions, self._wires, self._order = descriptions, wires, order
+        self._descriptions, self._wires = descriptions, wires
+        self._order, self._inputs = order_and_inputs
         self._parameters, self._version = parameters, version
         self.notes: list[str] = []
         for prefix, address in NAMESPACES.items():
@@ -181,13 +190,13 @@ class _Structure:
         return {variable: value for (instance, variable), value in found if instance == name}
 
     def _open_inputs(self) -> list[tuple[str, FmuDescription, FmuScalar]]:
-        inputs = [
-            (f"{description.instance}.{variable.name}", description, variable)
-            for description in self._descriptions.values()
-            for variable in description.variables.values()
-            if variable.causality == "input"
-        ]
-        return [each for each in inputs if each[0] not in self._wires]
+        opened = []
+        for full in self._inputs:
+            instance, variable = split_name(full)
+            description = self._descriptions[instance]
+            # Not with a dot: tools that name a connector by its path would have the name twice.
+            opened.append((f"{instance}_{variable}", description, description.variables[variable]))
+        return opened
 
     def _type(self, description: FmuDescription, variable: FmuScalar) -> str:
         """Return the type of a variable: SSP 2.0 has those of FMI 3."""
