@@ -245,11 +245,7 @@ def _derive(statements: list[str], name: str) -> list[str]:
     """Return the function that computes what follows from the parameters, where anything does."""
     if not statements:
         return []
-    head = [
-        "/* Computes what follows from the parameters alone. */",
-        f"static void {name}_derive({name}_state *state)",
-    ]
-    return [*head, "{", *(f"    {line}" for line in statements), "}", ""]
+    return [*filled("controller_derive.c", {"name": name, "statements": statements}).splitlines(), ""]
 
 
 def _guards(model: FlatModel, real: Real, names: dict[str, str]) -> list[str]:
