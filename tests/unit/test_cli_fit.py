@@ -17,9 +17,9 @@ from nlsdesign.discrepancy import refit
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Column, RecordSet, load_records
 from nlsdesign.model import flatten
+from tests.command_line import Run, run
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, truth, write_declaration, write_records
-from tests.unit.test_cli import Run, run
 from tests.unit.test_identification_shooting import NOISE, TRUE
 from tests.unit.test_identification_shooting import truth as slide_record
 
