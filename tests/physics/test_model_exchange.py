@@ -341,3 +341,31 @@ def test_a_restored_copy_of_a_sharp_model_goes_on_bit_by_bit(name, version, shar
             other.raw.freeFMUState(read)
             other.time = time
             assert stepped(other) == first
+
+
+@pytest.mark.parametrize(("kind", "version"), [("ModelExchange", "3.0"), ("CoSimulation", "2.0")])
+def test_the_published_actuator_with_dry_friction_that_sticks(kind, version, tmp_path):
+    actuator = cam_rubber_actuator(load_deck("austin2015_figure_consistent"))
+    law = CoulombFriction(sliding_effort=0.1)
+    rubs = [
+        name for name, part in actuator.parts if isinstance(getattr(part, "element", None), CoulombFriction)
+    ]
+    actuator = actuator.with_part(rubs[0], law)
+    model = flatten(actuator, inputs=["motor.current"], outputs=["motor.angle"])
+    times = STEP * np.arange(401)
+    current = 1.0 * np.sin(12.0 * 0.02 * np.floor(times / 0.02 + 1e-9))
+    own = simulate(model, times, inputs={"motor.current": current}, hold=True, tolerance=1e-10)
+    assert sum(e.what == "sticks" for e in own.events) >= 2
+    shown = ["motor.angle", "motor.speed"]
+    run = fmpy.simulate_fmu(
+        str(export_fmu(model, tmp_path / "sharp.fmu", version=version)), fmi_type=kind, stop_time=times[-1],
+        output_interval=STEP, relative_tolerance=1e-9, output=shown, record_events=False,
+        input=stairs(times, current, "motor.current"),
+    )  # fmt: skip
+    for name in shown:
+        assert np.abs(run[name] - own[name]).max() < 1e-6 * np.abs(own[name]).max(), name
+    stuck = own["motor.speed"] == 0.0
+    assert stuck.sum() > 20
+    # Apart from the samples next to an event.
+    inside = stuck & np.roll(stuck, 1) & np.roll(stuck, -1)
+    assert np.all(run["motor.speed"][inside] == 0.0)
