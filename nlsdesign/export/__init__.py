@@ -8,18 +8,26 @@ from .compilation.running_c import CompiledStep
 from .cosimulation.cosimulate import CoSimulation, cosimulate
 from .cosimulation.master import Late
 from .fmi.fmu import export_fmu
+from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
+from .target.target_run import TargetMeasurement, TargetRun, measure_on_target
 
 __all__ = [
     "ALL_PLATFORMS",
+    "CORTEX_M4F",
+    "CORTEX_M7",
     "PLATFORMS",
     "CSource",
     "CoSimulation",
     "CompiledStep",
     "Late",
+    "Processor",
+    "TargetMeasurement",
+    "TargetRun",
     "cosimulate",
     "export_c",
     "export_fmu",
     "host_platform",
+    "measure_on_target",
     "natively",
     "write_examples",
 ]

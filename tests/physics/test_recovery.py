@@ -123,6 +123,28 @@ def test_the_fuzz_would_notice(tmp_path: Path) -> None:
     assert fuzzed(cascade(), tmp_path, wait=0.2)[2] > 0.01
 
 
+def test_the_default_observer_recovers_on_a_motion_that_its_current_makes(tmp_path: Path) -> None:
+    """The adaptive observer has a memory of seconds; what it learns must not come from a named fault."""
+    outputs = ["motor.angle", "motor_encoder.reading", "spring.torque"]
+    machine = nls.flatten(nls.declare(nls.load_deck(DECK)), outputs=outputs)
+    time = 1e-3 * np.arange(5000.0)
+    current = 6.0 * np.sin(2.0 * np.pi * 1.3 * time) + 2.0 * np.sin(2.0 * np.pi * 0.37 * time)
+    readings = nls.simulate(machine, time, inputs={"motor.current": current})["motor_encoder.reading"]
+    source = nls.export_c(design_adaptive_observer(plant()).model, tmp_path, real="float")
+
+    def estimates(seen: np.ndarray) -> np.ndarray:
+        step = CompiledStep(source)
+        return np.array([step([angle, amperes])[0][0] for angle, amperes in zip(seen, current, strict=True)])
+
+    undisturbed = estimates(readings)
+    settled = math.ceil(5.0 * time_constant(cascade()) / 1e-3)
+    for first, length, wrong in ((2500, 1, 1e30), (3100, 40, math.nan), (2777, 1, 0.6), (3000, 900, None)):
+        seen = readings.copy()
+        seen[first : first + length] = readings[first] if wrong is None else wrong
+        apart = np.abs(estimates(seen) - undisturbed)
+        assert np.max(apart[first + length + settled :]) <= 0.01 * 5.0, (first, wrong)
+
+
 @pytest.mark.parametrize(("real", "huge"), [("float", 7.1e36), ("float", 1.15e37), ("double", 5e306)])
 def test_a_huge_sample_does_not_lock_an_observer_without_any_range(
     real: str, huge: float, tmp_path: Path
