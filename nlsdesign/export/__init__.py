@@ -7,7 +7,9 @@ from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
 from .cosimulation.cosimulate import CoSimulation, cosimulate
 from .cosimulation.master import Late
+from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
+from .fmi.reference_results import write_reference
 from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
 from .target.target_run import TargetMeasurement, TargetRun, measure_on_target
 
@@ -16,6 +18,7 @@ __all__ = [
     "CORTEX_M4F",
     "CORTEX_M7",
     "PLATFORMS",
+    "Authorship",
     "CSource",
     "CoSimulation",
     "CompiledStep",
@@ -30,4 +33,5 @@ __all__ = [
     "measure_on_target",
     "natively",
     "write_examples",
+    "write_reference",
 ]

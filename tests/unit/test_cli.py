@@ -171,24 +171,27 @@ def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_
     status, out, err = run("export", "fmu", "--deck", deck, "--out", "fmu")
     assert (status, err) == (0, ""), err
     assert "plant.fmu" in out
+    assert out.count("left out: ") == 3
     assert [file.name for file in (tmp_path / "fmu").iterdir()] == ["plant.fmu"]
     status, _, err = run("export", "c", "--deck", deck, "--out", "c")
     assert status == 2
     assert "needs the series spring" in err or "needs the driven body" in err
-    assert "export fmu --plant-only writes the plant alone" in err
+    assert "export fmu --what plant writes the plant alone" in err
     assert not (tmp_path / "c").exists()
 
 
 def test_a_drive_without_an_observer_is_exported_as_its_plant_alone(run: Run, tmp_path: Path) -> None:
     words = ("export", "fmu", "--deck", "one_sided_cable_drive", "--out", "o")
-    status, _, err = run(*words)
+    status, _, err = run(*words, "--what", "plant", "--what", "observer")
     assert status != 0
     assert "has no observer" in err
     assert not (tmp_path / "o").exists(), "nothing half-written"
-    status, out, _ = run(*words, "--plant-only")
+    status, out, _ = run(*words)
     assert status == 0
-    assert "plant.fmu" in out
-    assert [path.name for path in (tmp_path / "o").iterdir()] == ["plant.fmu"]
+    assert "left out: observer" in out
+    assert "has no observer" in out
+    assert (tmp_path / "o" / "plant.fmu").exists()
+    assert not (tmp_path / "o" / "observer.fmu").exists()
 
 
 def test_a_drive_with_a_gear_is_analysed_over_the_angle_of_its_motor(run: Run, tmp_path: Path) -> None:
