@@ -51,8 +51,9 @@ def test_good_deck_passes(run: Run) -> None:
     status, out, err = run("deck", "check", DECK, "--json")
     assert (status, err) == (0, "")
     found = json.loads(out)
-    assert found["numbers"] == 25
-    assert 0.0 < found["assumed"] < 0.5
+    assert found["numbers"] == 29
+    # Twelve numbers of the drive, and the four limits of the readings.
+    assert found["assumed"] == pytest.approx(16 / 29)
 
 
 def test_unknown_deck_names_the_nearest(run: Run) -> None:

@@ -278,6 +278,8 @@ def _beginning(model: FlatModel, name: str) -> list[str]:
             *lines,
             "} else if (state->begun != 0u && resuming != 0u) {",
             f"    {name}_resume(state);",
+            "} else {",
+            "    /* goes on, or waits for the first readings */",
             "}",
         ]
     return [*lines, "}"]

@@ -230,7 +230,8 @@ def _stores(model: FlatModel, name: str, real: Real) -> list[str]:
     if not outputs:
         return [*lines, "(void)state, (void)outputs;"]
     lines += [f"if ({_finite('y', len(outputs), real)}) {{"]
-    lines += [f"    outputs->{p} = state->outputs.{p} = y{i};" for i, p in enumerate(outputs.values())]
+    for i, path in enumerate(outputs.values()):
+        lines += [f"    state->outputs.{path} = y{i};", f"    outputs->{path} = y{i};"]
     lines += ["} else {", f"    status |= {name.upper()}_OUTPUT_HELD;"]
     return [*lines, "    *outputs = state->outputs;", "}"]
 

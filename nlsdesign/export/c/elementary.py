@@ -189,7 +189,6 @@ def _numbers(name: str) -> dict[str, str]:
     half_pi = _parts(_PI / 2, 12 if single else 32, parts=4)
     integers = {
         "digits": digits,
-        "bias": bias,
         "shift_less_two_biases": _bits(shift, single) - 2 * bias,
         "shift_less_bias_below": _bits(shift, single) - (bias - 1),
         "one_bits": _bits(1.0, single),
@@ -199,6 +198,7 @@ def _numbers(name: str) -> dict[str, str]:
     pi = _parts(_PI, digits + 1, parts=2)
     reals = {
         "zero": 0.0,
+        "bias": float(bias),
         "half": 0.5,
         "one": 1.0,
         "two": 2.0,

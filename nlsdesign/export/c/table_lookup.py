@@ -1,6 +1,7 @@
 """Table look-up in C: linear, held at the ends, in a fixed number of operations, defined for NaN.
 
-A uniform grid needs no search; breakpoints are searched in halves, always the same number of times.
+A uniform grid needs no search. Of breakpoints, those near the argument are known by its part of the range;
+they are searched in halves, always the same number of times.
 """
 
 from __future__ import annotations
@@ -9,9 +10,17 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...errors import ExportError
 from ...model.flat import FlatModel, Table
 from .c_text import Real, wrapped
+
+_FEW = 4
+"""Cells up to which all are searched."""
+_PARTS = (16, 32, 64, 128, 256)
+"""Equal parts of a range, each of which knows its first cell."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +198,10 @@ def table_bytes(model: FlatModel, real: Real) -> int:
     """
     size = 4 if real.name == "float" else 8
     numbers = [t.values.size + (0 if t.breakpoints is None else len(t.breakpoints)) for t in model.tables]
-    return size * sum(numbers)
+    searched = [
+        _starts(each, real)[0] for each in indexed_tables(model) if each.table.breakpoints is not None
+    ]
+    return size * sum(numbers) + sum(len(starts) * _start_bytes(starts) for starts in searched)
 
 
 def _breakpoints(each: IndexedTable, real: Real) -> list[str]:
@@ -208,7 +220,17 @@ def _breakpoints(each: IndexedTable, real: Real) -> list[str]:
     numbers = [f"    {row}" for row in rows]
     title = f"Grid points of table_{each.number} over {each.table.argument}"
     head = f"static const {real.name} breakpoints_{each.number}[{len(kept)}] = {{"
-    return [*wrapped(title), head, *numbers, "};"]
+    lines = [*wrapped(title), head, *numbers, "};"]
+    starts, _ = _starts(each, real)
+    if starts:
+        kind = f"uint{8 * _start_bytes(starts)}_t"
+        rows = textwrap.wrap(", ".join(f"{v}u" for v in starts) + ",", 100)
+        lines += [
+            *wrapped(f"First of the cells that meet equal parts of the range of breakpoints_{each.number}")
+        ]
+        lines += [f"static const {kind} start_{each.number}[{len(starts)}] = {{"]
+        lines += [*(f"    {row}" for row in rows), "};"]
+    return lines
 
 
 def _index(each: IndexedTable, real: Real, argument: str) -> list[str]:
@@ -218,19 +240,60 @@ def _index(each: IndexedTable, real: Real, argument: str) -> list[str]:
 def _searched(each: IndexedTable, real: Real, argument: str) -> list[str]:
     """Return the statements that find the cell among breakpoints, by the same halvings for every argument."""
     k, cells = each.number, each.table.values.shape[0] - 1
-    b = f"breakpoints_{k}"
+    b, (starts, span) = f"breakpoints_{k}", _starts(each, real)
     lines = [
         f"const {real.name} above_{k} = {argument} > {b}[0] ? {argument} : {b}[0]; "
         "/* NaN becomes the lower end */",
         f"const {real.name} place_{k} = above_{k} < {b}[{cells}] ? above_{k} : {b}[{cells}];",
-        f"int32_t left_{k} = 0;",
     ]
-    while cells > 1:
-        half = cells // 2
+    if starts:
+        scale = real.literal(_scale(each, real, len(starts) - 1))
+        lines.append(f"int32_t left_{k} = start_{k}[(int32_t)((place_{k} - {b}[0]) * {scale})];")
+    else:
+        lines.append(f"int32_t left_{k} = 0;")
+    while span > 1:
+        half = span // 2
         lines.append(f"left_{k} += (place_{k} >= {b}[left_{k} + {half}]) ? {half} : 0;")
-        cells -= half
+        span -= half
     width = f"({b}[left_{k} + 1] - {b}[left_{k}])"
     return [*lines, f"const {real.name} share_{k} = (place_{k} - {b}[left_{k}]) / {width};"]
+
+
+def _start_bytes(starts: list[int]) -> int:
+    return 1 if max(starts, default=0) < 256 else 2
+
+
+def _scale(each: IndexedTable, real: Real, parts: int) -> float:
+    """Return parts per unit of the argument, such that the last point falls into the last part."""
+    points = each.table.breakpoints
+    assert points is not None
+    first, last = real.round(float(points[0])), real.round(float(points[-1]))
+    return real.round(parts / (last - first))
+
+
+def _starts(each: IndexedTable, real: Real) -> tuple[list[int], int]:
+    """Return the first cell to be searched for equal parts of the range, and how many cells may follow it.
+
+    As few parts are taken as leave the fewest halvings; a few cells are searched without.
+    """
+    points = each.table.breakpoints
+    assert points is not None
+    kept = np.array([real.round(float(v)) for v in points])
+    cells = len(kept) - 1
+    trials = [([], cells)] if cells <= _FEW else [_parted(kept, each, real, parts) for parts in _PARTS]
+    return min(trials, key=lambda trial: ((trial[1] - 1).bit_length(), len(trial[0])))
+
+
+def _parted(kept: NDArray[np.float64], each: IndexedTable, real: Real, parts: int) -> tuple[list[int], int]:
+    cells = len(kept) - 1
+    edges = np.arange(-1, parts + 2) / _scale(each, real, parts) + kept[0]
+    # Rounding may place an argument into the neighbouring part: one thousandth of a part is allowed for.
+    slack = 1e-3 * (edges[1] - edges[0])
+    lower = np.searchsorted(kept, edges[1:-1] - slack, side="right") - 1
+    upper = np.searchsorted(kept, edges[2:] + slack, side="right") - 1
+    lower, upper = np.clip(lower, 0, cells - 1), np.clip(upper, 0, cells - 1)
+    span = int((upper - lower).max()) + 1
+    return [int(v) for v in np.minimum(lower, cells - span)], span
 
 
 def _placed(each: IndexedTable, real: Real, argument: str) -> list[str]:

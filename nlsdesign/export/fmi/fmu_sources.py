@@ -148,7 +148,12 @@ def _held(layout: FmuLayout) -> tuple[Symbols, ca.SX, ca.SX]:
     given = [s.time, s.state, s.input, s.parameter, mode]
     derivative, indicators, _ = switching.branch.call(given)
     output, signal = switching.shown.call(given)
-    return s._replace(derivative=derivative, output=output, signal=signal), mode, ca.densify(indicators)
+    # An output that is a state or a signal is that one; so outputs may have been added to the model.
+    named = {v.name: s.state[i] for i, v in enumerate(layout.model.states)}
+    named |= {v.name: signal[i] for i, v in enumerate(layout.model.signals)}
+    outputs = [named[v.name] if v.name in named else output[i] for i, v in enumerate(layout.model.outputs)]
+    held = s._replace(derivative=derivative, output=ca.SX(ca.vertcat(*outputs)), signal=signal)
+    return held, mode, ca.densify(indicators)
 
 
 def _switched(layout: FmuLayout, s: Symbols, mode: ca.SX, indicators: ca.SX) -> str:

@@ -72,11 +72,13 @@ static uint32_t @name@_advance(@name@_state *state, @name@_outputs *outputs)
 
 @step@
 {
-    const uint32_t status = @name@_take(state, inputs);
+    uint32_t status = @name@_take(state, inputs);
 
     if (state->begun == 0u) {
         *outputs = state->outputs;
-        return status | @NAME@_WAITING;
+        status |= @NAME@_WAITING;
+    } else {
+        status |= @name@_advance(state, outputs);
     }
-    return status | @name@_advance(state, outputs);
+    return status;
 }

@@ -19,14 +19,21 @@ static uint32_t plausible(@real@ given, @real@ mover, const reading_limits *can,
 
     if (!(given >= can->lowest && given <= can->highest)) {
         seen->agreeing = 0u;
-        flaw = (given >= -@LARGEST@ && given <= @LARGEST@) ? @NAME@_INPUT_OUT_OF_RANGE : @NAME@_INPUT_HELD;
-    } else if (seen->seen == 0u || @fabs@(given - seen->last) <= can->change * (@real@)(seen->missed + 1u)) {
+        flaw = @NAME@_INPUT_HELD;
+        if (given >= -@LARGEST@ && given <= @LARGEST@) {
+            flaw = @NAME@_INPUT_OUT_OF_RANGE;
+        }
+    } else if (seen->seen == 0u || @fabs@(given - seen->last) <= can->change * ((@real@)seen->missed + (@real@)1)) {
         seen->agreeing = 0u;
     } else {
-        const uint32_t agrees = (seen->agreeing > 0u && @fabs@(given - seen->candidate) <= can->change) ? 1u : 0u;
-        seen->agreeing = agrees != 0u ? seen->agreeing + 1u : 1u;
+        if (!(@fabs@(given - seen->candidate) <= can->change)) {
+            seen->agreeing = 0u;
+        }
+        seen->agreeing = seen->agreeing + 1u;
         seen->candidate = given;
-        flaw = seen->agreeing >= @AGREEING@u ? 0u : @NAME@_INPUT_JUMPED;
+        if (seen->agreeing < @AGREEING@u) {
+            flaw = @NAME@_INPUT_JUMPED;
+        }
     }
     if (flaw != 0u) {
         seen->missed = seen->missed < @MOST@u ? seen->missed + 1u : @MOST@u;
@@ -34,12 +41,16 @@ static uint32_t plausible(@real@ given, @real@ mover, const reading_limits *can,
         *used = ahead < can->lowest ? can->lowest : (ahead > can->highest ? can->highest : ahead);
         *status |= flaw | which;
     } else {
-        const uint32_t stale = (seen->moved != 0u && seen->unchanged >= can->patience) ? 1u : 0u;
-        const uint32_t same = (seen->seen != 0u && given >= seen->last && given <= seen->last) ? 1u : 0u;
-        if (seen->missed > 0u || (stale != 0u && same == 0u)) {
+        uint32_t same = 0u;
+        if (seen->seen != 0u && given >= seen->last && given <= seen->last) {
+            same = 1u;
+        }
+        if (seen->missed > 0u || (same == 0u && seen->moved != 0u && seen->unchanged >= can->patience)) {
             *status |= @NAME@_RECOVERED | which;
         }
-        resuming = (seen->agreeing >= @AGREEING@u || seen->missed >= @GAP@u) ? 1u : 0u;
+        if (seen->agreeing >= @AGREEING@u || seen->missed >= @GAP@u) {
+            resuming = 1u;
+        }
         seen->slope = (seen->seen != 0u && seen->missed == 0u && seen->agreeing == 0u) ? given - seen->last : @zero@;
         if (same == 0u) {
             seen->unchanged = 0u;

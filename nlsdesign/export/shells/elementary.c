@@ -1,15 +1,17 @@
 /* Elementary functions of our own: the same bits on every processor with IEEE arithmetic, as long as the compiler
    forms no fused multiply-add (-ffp-contract=off). An ulp is a unit of the last place. */
-#include <string.h>
+typedef union {
+    @real@ number;
+    @word@ bits;
+} portable_number;
 
 /* 2^(exponent - bias) from its biased exponent, which lies in the lowest bits. */
 static @real@ portable_power_of_two@f@(@word@ biased)
 {
-    const @word@ bits = biased << @digits@u;
-    @real@ power;
+    portable_number power;
 
-    (void)memcpy(&power, &bits, sizeof power);
-    return power;
+    power.bits = biased << @digits@u;
+    return power.number;
 }
 
 /* exp(r) - 1 for |r| up to half of ln 2. */
@@ -23,10 +25,11 @@ static @real@ portable_expm1_kernel@f@(@real@ r)
 /* x / ln 2, rounded to an integer that stands in the lowest bits; other bits are those of @shift@. */
 static @real@ portable_binary_exponent@f@(@real@ x, @word@ *bits)
 {
-    const @real@ shifted = x * @per_ln2@ + @shift@;
+    portable_number shifted;
 
-    (void)memcpy(bits, &shifted, sizeof shifted);
-    return shifted - @shift@;
+    shifted.number = x * @per_ln2@ + @shift@;
+    *bits = shifted.bits;
+    return shifted.number - @shift@;
 }
 
 /* exp(x); at most 1.1 ulp. NaN stays NaN, what is too large becomes infinite, what is too small zero. */
@@ -44,18 +47,24 @@ static @real@ portable_exp@f@(@real@ x)
     return result * portable_power_of_two@f@(half) * portable_power_of_two@f@(both - half);
 }
 
-/* exp(x) - 1; at most 2.2 ulp. NaN stays NaN, what is too large becomes infinite, and -0 becomes 0. */
-static @real@ portable_expm1@f@(@real@ x)
+/* exp(x) - 1 where it is finite and more than -1. */
+static @real@ portable_expm1_inside@f@(@real@ x)
 {
-    const @real@ above = x < @expm1_lowest@ ? @expm1_lowest@ : x;
-    const @real@ inside = above > @exp_highest@ ? @exp_highest@ : above;
     @word@ bits;
-    const @real@ n = portable_binary_exponent@f@(inside, &bits);
-    const @real@ r = (inside - n * @ln2_high@) - n * @ln2_low@;
+    const @real@ n = portable_binary_exponent@f@(x, &bits);
+    const @real@ r = (x - n * @ln2_high@) - n * @ln2_low@;
     const @real@ half_power = portable_power_of_two@f@(bits - @shift_less_bias_below@u);
     const @real@ half_result = half_power * portable_expm1_kernel@f@(r) + (half_power - @half@);
 
     return half_result + half_result;
+}
+
+/* exp(x) - 1; at most 2.2 ulp. NaN stays NaN, what is too large becomes infinite, and -0 becomes 0. */
+static @real@ portable_expm1@f@(@real@ x)
+{
+    const @real@ above = x < @expm1_lowest@ ? @expm1_lowest@ : x;
+
+    return portable_expm1_inside@f@(above > @exp_highest@ ? @exp_highest@ : above);
 }
 
 /* tanh(x); at most 3 ulp. NaN stays NaN. */
@@ -63,7 +72,7 @@ static @real@ portable_tanh@f@(@real@ x)
 {
     const @real@ size = fabs@f@(x);
     const @real@ inside = size > @tanh_one@ ? @tanh_one@ : size;
-    const @real@ t = portable_expm1@f@(inside + inside);
+    const @real@ t = portable_expm1_inside@f@(inside + inside);
 
     return copysign@f@(t / (t + @two@), x);
 }
@@ -109,16 +118,14 @@ static @real@ portable_fraction@f@(@real@ x, @real@ *k)
 {
     const @real@ normal = x < @least_normal@ ? x * @denormal_scale@ : x;
     const @real@ lost = x < @least_normal@ ? @denormal_power@ : @zero@;
+    portable_number part;
     @word@ bits;
-    @word@ fraction;
-    @real@ mantissa;
 
-    (void)memcpy(&bits, &normal, sizeof normal);
-    bits += @one_bits@u - @root_half_bits@u;
-    fraction = (bits & @fraction_mask@u) + @root_half_bits@u;
-    (void)memcpy(&mantissa, &fraction, sizeof mantissa);
-    *k = (@real@)((int32_t)(bits >> @digits@u) - @bias@) - lost;
-    return mantissa - @one@;
+    part.number = normal;
+    bits = part.bits + (@one_bits@u - @root_half_bits@u);
+    part.bits = (bits & @fraction_mask@u) + @root_half_bits@u;
+    *k = ((@real@)(int32_t)(bits >> @digits@u) - @bias@) - lost;
+    return part.number - @one@;
 }
 
 /* log(2^k (1 + f)) with a small correction of the result. */
@@ -239,10 +246,12 @@ static @real@ portable_pow@f@(@real@ x, @real@ y)
 static @real@ portable_quarter@f@(@real@ x, @word@ *quarter)
 {
     const @real@ inside = fabs@f@(x) > @circle_limit@ ? fmod@f@(x, @two_pi@) : x;
-    const @real@ shifted = inside * @per_half_pi@ + @shift@;
-    const @real@ n = shifted - @shift@;
+    portable_number shifted;
+    @real@ n;
 
-    (void)memcpy(quarter, &shifted, sizeof shifted);
+    shifted.number = inside * @per_half_pi@ + @shift@;
+    n = shifted.number - @shift@;
+    *quarter = shifted.bits;
     return (((inside - n * @half_pi_1@) - n * @half_pi_2@) - n * @half_pi_3@) - n * @half_pi_4@;
 }
 

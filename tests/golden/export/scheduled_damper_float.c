@@ -15,16 +15,18 @@
 
 /* Elementary functions of our own: the same bits on every processor with IEEE arithmetic, as long as the compiler
    forms no fused multiply-add (-ffp-contract=off). An ulp is a unit of the last place. */
-#include <string.h>
+typedef union {
+    float number;
+    uint32_t bits;
+} portable_number;
 
 /* 2^(exponent - bias) from its biased exponent, which lies in the lowest bits. */
 static float portable_power_of_twof(uint32_t biased)
 {
-    const uint32_t bits = biased << 23u;
-    float power;
+    portable_number power;
 
-    (void)memcpy(&power, &bits, sizeof power);
-    return power;
+    power.bits = biased << 23u;
+    return power.number;
 }
 
 /* exp(r) - 1 for |r| up to half of ln 2. */
@@ -38,10 +40,11 @@ static float portable_expm1_kernelf(float r)
 /* x / ln 2, rounded to an integer that stands in the lowest bits; other bits are those of 1.2582912e+07f. */
 static float portable_binary_exponentf(float x, uint32_t *bits)
 {
-    const float shifted = x * 1.442695f + 1.2582912e+07f;
+    portable_number shifted;
 
-    (void)memcpy(bits, &shifted, sizeof shifted);
-    return shifted - 1.2582912e+07f;
+    shifted.number = x * 1.442695f + 1.2582912e+07f;
+    *bits = shifted.bits;
+    return shifted.number - 1.2582912e+07f;
 }
 
 /* exp(x); at most 1.1 ulp. NaN stays NaN, what is too large becomes infinite, what is too small zero. */
@@ -117,14 +120,21 @@ static uint32_t plausible(float given, float mover, const reading_limits *can, s
 
     if (!(given >= can->lowest && given <= can->highest)) {
         seen->agreeing = 0u;
-        flaw = (given >= -FLT_MAX && given <= FLT_MAX) ? SCHEDULED_DAMPER_INPUT_OUT_OF_RANGE : SCHEDULED_DAMPER_INPUT_HELD;
-    } else if (seen->seen == 0u || fabsf(given - seen->last) <= can->change * (float)(seen->missed + 1u)) {
+        flaw = SCHEDULED_DAMPER_INPUT_HELD;
+        if (given >= -FLT_MAX && given <= FLT_MAX) {
+            flaw = SCHEDULED_DAMPER_INPUT_OUT_OF_RANGE;
+        }
+    } else if (seen->seen == 0u || fabsf(given - seen->last) <= can->change * ((float)seen->missed + (float)1)) {
         seen->agreeing = 0u;
     } else {
-        const uint32_t agrees = (seen->agreeing > 0u && fabsf(given - seen->candidate) <= can->change) ? 1u : 0u;
-        seen->agreeing = agrees != 0u ? seen->agreeing + 1u : 1u;
+        if (!(fabsf(given - seen->candidate) <= can->change)) {
+            seen->agreeing = 0u;
+        }
+        seen->agreeing = seen->agreeing + 1u;
         seen->candidate = given;
-        flaw = seen->agreeing >= 3u ? 0u : SCHEDULED_DAMPER_INPUT_JUMPED;
+        if (seen->agreeing < 3u) {
+            flaw = SCHEDULED_DAMPER_INPUT_JUMPED;
+        }
     }
     if (flaw != 0u) {
         seen->missed = seen->missed < 1000000u ? seen->missed + 1u : 1000000u;
@@ -132,12 +142,16 @@ static uint32_t plausible(float given, float mover, const reading_limits *can, s
         *used = ahead < can->lowest ? can->lowest : (ahead > can->highest ? can->highest : ahead);
         *status |= flaw | which;
     } else {
-        const uint32_t stale = (seen->moved != 0u && seen->unchanged >= can->patience) ? 1u : 0u;
-        const uint32_t same = (seen->seen != 0u && given >= seen->last && given <= seen->last) ? 1u : 0u;
-        if (seen->missed > 0u || (stale != 0u && same == 0u)) {
+        uint32_t same = 0u;
+        if (seen->seen != 0u && given >= seen->last && given <= seen->last) {
+            same = 1u;
+        }
+        if (seen->missed > 0u || (same == 0u && seen->moved != 0u && seen->unchanged >= can->patience)) {
             *status |= SCHEDULED_DAMPER_RECOVERED | which;
         }
-        resuming = (seen->agreeing >= 3u || seen->missed >= 3u) ? 1u : 0u;
+        if (seen->agreeing >= 3u || seen->missed >= 3u) {
+            resuming = 1u;
+        }
         seen->slope = (seen->seen != 0u && seen->missed == 0u && seen->agreeing == 0u) ? given - seen->last : 0.0f;
         if (same == 0u) {
             seen->unchanged = 0u;
@@ -226,6 +240,8 @@ static uint32_t scheduled_damper_take(scheduled_damper_state *state, const sched
         state->begun = 1u;
     } else if (state->begun != 0u && resuming != 0u) {
         scheduled_damper_resume(state);
+    } else {
+        /* goes on, or waits for the first readings */
     }
     return status;
 }
@@ -263,7 +279,8 @@ static uint32_t scheduled_damper_advance(scheduled_damper_state *state, schedule
         status |= SCHEDULED_DAMPER_STATE_RESTARTED;
     }
     if ((y0 - y0) >= 0.0f) {
-        outputs->piston.force = state->outputs.piston.force = y0;
+        state->outputs.piston.force = y0;
+        outputs->piston.force = y0;
     } else {
         status |= SCHEDULED_DAMPER_OUTPUT_HELD;
         *outputs = state->outputs;
@@ -276,11 +293,13 @@ uint32_t scheduled_damper_step(
     const scheduled_damper_inputs *inputs,
     scheduled_damper_outputs *outputs)
 {
-    const uint32_t status = scheduled_damper_take(state, inputs);
+    uint32_t status = scheduled_damper_take(state, inputs);
 
     if (state->begun == 0u) {
         *outputs = state->outputs;
-        return status | SCHEDULED_DAMPER_WAITING;
+        status |= SCHEDULED_DAMPER_WAITING;
+    } else {
+        status |= scheduled_damper_advance(state, outputs);
     }
-    return status | scheduled_damper_advance(state, outputs);
+    return status;
 }
