@@ -16,7 +16,6 @@ import importlib
 import importlib.util
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -31,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.optimize import BFGS, Bounds, NonlinearConstraint, minimize
 
 import nlsdesign as nls
+from benchmarks._tools import run_tool
 from nlsdesign import components as parts
 from nlsdesign import design as design_room
 from nlsdesign.components.assembly.deck_writer import declare
@@ -409,9 +409,7 @@ def _compiled(function: ca.Function) -> ca.Function:
     function.generate("values.c")
     Path("values.c").replace(folder / "values.c")
     library = folder / "values.so"
-    subprocess.run(
-        [*command, "-O2", "-shared", "-fPIC", "-o", str(library), str(folder / "values.c"), "-lm"], check=True
-    )
+    run_tool([*command, "-O2", "-shared", "-fPIC", "-o", str(library), str(folder / "values.c"), "-lm"])
     return ca.external(function.name(), str(library))
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from dataclasses import replace
@@ -18,9 +17,10 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from benchmarks._tools import run_tool
 from nlsdesign.export import export_c
 from nlsdesign.export.c.controller_code import CSource
-from nlsdesign.export.compilation.cross_compiler import compiler
+from nlsdesign.export.compilation.cross_compiler import BASELINE, compiler
 from nlsdesign.model.flat import FlatModel, Variable
 from tests.hand_built import observer
 
@@ -123,8 +123,8 @@ def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) 
     program = folder / "program"
     flags = ["-std=c99", "-ffp-contract=off", f"-DGUARDED={int(guarded)}", f"-DBAD={int(guarded)}"]
     files = [str(folder / f"main_{side}.c"), str(folder / step_file)]
-    subprocess.run([*command, *flags, *files, "-lm", "-o", str(program)], check=True, cwd=folder)
-    report = subprocess.run(
+    run_tool([*command, *flags, *files, "-lm", "-o", str(program)], folder)
+    report = run_tool(
         [
             "valgrind",
             "--tool=callgrind",
@@ -132,13 +132,19 @@ def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) 
             f"--callgrind-out-file={folder / 'out'}",
             str(program),
         ],
-        check=True,
-        capture_output=True,
-        text=True,
+        folder,
     )
     collected = re.search(r"Collected : (\d+)", report.stderr)
     assert collected is not None, report.stderr
     return int(collected[1]) / STEPS, float(report.stdout)
+
+
+def compilers() -> dict[str, list[str]]:
+    """Commands that compile for any processor of this kind: valgrind lacks the newest instructions."""
+    found = {"zig cc": [*compiler(), *BASELINE]}
+    if shutil.which("gcc"):
+        found["gcc"] = ["gcc"]
+    return found
 
 
 def main() -> int:
@@ -146,16 +152,13 @@ def main() -> int:
     if shutil.which("valgrind") is None:
         print("observer step: not measured, valgrind is not installed")
         return 0
-    compilers = {"zig cc": compiler()}
-    if shutil.which("gcc"):
-        compilers["gcc"] = ["gcc"]
     missed = False
     print("observer step, 4 states, one table of 61 x 31: instructions per step by callgrind")
     print(f"{'compiler':14}{'guards':>8}{'by hand':>10}{'generated':>11}{'ratio':>8}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         prepare(folder)
-        for label, command in compilers.items():
+        for label, command in compilers().items():
             for optimised in ("-O2", "-O3"):
                 both = {}
                 for guarded in (True, False):

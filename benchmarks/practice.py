@@ -12,12 +12,12 @@ import argparse
 import json
 import os
 import resource
-import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks._tools import run_tool
 from nlsdesign.discrepancy.effects import ALL
 
 CATALOGUE = {effect.__name__ for effect in ALL}
@@ -38,7 +38,7 @@ def main() -> int:
     given.out.mkdir(parents=True, exist_ok=True)
     deck = given.out / "rig.toml"
     make_deck = [*COMMAND, "deck", "from-rig", str(folder / "rig.toml"), str(folder / "cam.csv")]
-    subprocess.run([*make_deck, "--out", str(deck)], check=True, stdout=subprocess.DEVNULL)
+    run_tool([*make_deck, "--out", str(deck)])
     rows = [_diagnosed(deck, folder / name, given.out / name) for name in names]
     labels = json.loads((folder / "labels.json").read_text(encoding="utf8"))
     text, wrong = _table(rows, labels)
@@ -51,7 +51,7 @@ def main() -> int:
 def _diagnosed(deck: Path, records: Path, out: Path) -> dict[str, Any]:
     begin = time.perf_counter()
     asked = [*COMMAND, "diagnose", "--deck", str(deck), "--records", str(records), "--out", str(out)]
-    subprocess.run(asked, check=True, stdout=subprocess.DEVNULL)
+    run_tool(asked)
     seconds = time.perf_counter() - begin
     found = json.loads((out / "verdict.json").read_text(encoding="utf8"))
     return {"set": records.name, "seconds": seconds, **found}

@@ -47,6 +47,32 @@ class Written(float):
 
 
 @dataclass(frozen=True)
+class ParentDeck:
+    """The deck that another deck was made from, as ``[deck]`` names it.
+
+    Parameters
+    ----------
+    name
+        Of the earlier deck.
+    digest
+        SHA-256 of its parts, 64 hexadecimal digits.
+    change
+        What was done to it, such as ``"diagnosed"``.
+    parent
+        The deck that it was made from itself.
+    """
+
+    name: str
+    digest: str
+    change: str = ""
+    parent: ParentDeck | None = None
+
+    def line(self) -> tuple[ParentDeck, ...]:
+        """Return this deck and those before it, the latest first."""
+        return (self, *(self.parent.line() if self.parent else ()))
+
+
+@dataclass(frozen=True)
 class Deck:
     """The tables of a deck as they were read, with the place of each name.
 

@@ -6,19 +6,23 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from ctypes import c_double
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import fmpy
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 Refused = FMICallException
+Kind = TypeVar("Kind", bound="Unit")
 
 
 class Unit:
     """One instance; what it logs is kept as (status, category, message)."""
+
+    kinds: tuple[Any, Any] = (FMU2Slave, FMU3Slave)
 
     def __init__(
         self, folder: str, name: str = "one", token: str | None = None, logging: bool = False
@@ -28,7 +32,7 @@ class Unit:
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
         self.log: list[tuple[int, str, str]] = []
         self.time = 0.0
-        self.raw: Any = (FMU2Slave if self.two else FMU3Slave)(
+        self.raw: Any = self.kinds[0 if self.two else 1](
             guid=token or self.description.guid,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             unzipDirectory=folder,
@@ -90,6 +94,58 @@ class Unit:
         return list(self.raw.getDirectionalDerivative(*of, seed))
 
 
+class ExchangeUnit(Unit):
+    """One instance for model exchange; its integrator is the test."""
+
+    kinds = (FMU2Model, FMU3Model)
+
+    def run(self) -> ExchangeUnit:
+        """Leave the initialization mode and the first event mode."""
+        super().run()
+        self.update()
+        self.raw.enterContinuousTimeMode()
+        return self
+
+    def update(self) -> bool:
+        """Update the discrete states and tell whether continuous states have changed."""
+        again, ends, nominals, changed, timed, _ = (
+            self.raw.newDiscreteStates() if self.two else self.raw.updateDiscreteStates()
+        )
+        assert (again, ends, nominals, timed) == (False, False, False, False)
+        return bool(changed)
+
+    def event(self) -> bool:
+        """Go through the event mode and tell whether continuous states have changed."""
+        self.raw.enterEventMode()
+        changed = self.update()
+        self.raw.enterContinuousTimeMode()
+        return changed
+
+    def place(self, time: float, states: list[float]) -> None:
+        """Set time and continuous states."""
+        self.raw.setTime(time)
+        self.time = time
+        self.raw.setContinuousStates((c_double * len(states))(*states), len(states))
+
+    def states(self) -> list[float]:
+        return self._row(self.raw.getContinuousStates, self.description.numberOfContinuousStates)
+
+    def nominals(self) -> list[float]:
+        return self._row(self.raw.getNominalsOfContinuousStates, self.description.numberOfContinuousStates)
+
+    def rates(self) -> list[float]:
+        asked = self.raw.getDerivatives if self.two else self.raw.getContinuousStateDerivatives
+        return self._row(asked, self.description.numberOfContinuousStates)
+
+    def indicators(self) -> list[float]:
+        return self._row(self.raw.getEventIndicators, self.description.numberOfEventIndicators)
+
+    def _row(self, asked: Any, count: int) -> list[float]:
+        row = (c_double * count)()
+        asked(row, count)
+        return list(row)
+
+
 @contextmanager
 def unpacked(path: Path) -> Iterator[str]:
     """Unpack an FMU into a folder that is removed again."""
@@ -103,9 +159,21 @@ def unpacked(path: Path) -> Iterator[str]:
 @contextmanager
 def opened(path: Path, **keywords: Any) -> Iterator[Unit]:
     """Load one instance and free it again."""
-    with unpacked(path) as folder:
-        unit = Unit(folder, **keywords)
-        try:
-            yield unit
-        finally:
-            unit.raw.freeInstance()
+    with unpacked(path) as folder, freed(Unit(folder, **keywords)) as unit:
+        yield unit
+
+
+@contextmanager
+def exchanging(path: Path, **keywords: Any) -> Iterator[ExchangeUnit]:
+    """Load one instance for model exchange and free it again."""
+    with unpacked(path) as folder, freed(ExchangeUnit(folder, **keywords)) as unit:
+        yield unit
+
+
+@contextmanager
+def freed(unit: Kind) -> Iterator[Kind]:
+    """Free an instance at the end."""
+    try:
+        yield unit
+    finally:
+        unit.raw.freeInstance()

@@ -15,12 +15,14 @@ import numpy as np
 from ..components.assembly.named_parts import Assembly
 from ..deck import Written
 from ..errors import ExportError, MeasurementError, NlsError
+from ..model.derived_deck import derived
 from ..quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
 from ..simulation import Prior
 from ..writing import write_text
 from .bench_response import shared_factors
 from .estimate import FITS, Estimate
 
+_CHANGE = "calibrated"
 _MOVED = 0.01
 """Standard deviations of the prior, or share of them, below which a number is left as it was declared."""
 _TOGETHER = 1.0 / 3.0
@@ -80,6 +82,12 @@ class CalibratedMachine:
     estimate: Estimate
     numbers: tuple[CalibratedNumber, ...]
     kept: tuple[str, ...] = ()
+
+    @property
+    def declared_name(self) -> str:
+        """Name of the deck that was calibrated."""
+        parent = self.actuator.parent
+        return parent.name if parent and parent.change == _CHANGE else self.actuator.name
 
     def together(self) -> tuple[str, ...]:
         """Return products and quotients that are known far better than either of their numbers."""
@@ -187,7 +195,7 @@ def calibrated(actuator: Assembly, found: Estimate, *, day: date | None = None) 
         )
         for k in taken
     )
-    return CalibratedMachine(machine, found, numbers, tuple(kept))
+    return CalibratedMachine(derived(machine, actuator, _CHANGE), found, numbers, tuple(kept))
 
 
 def _calibrated_row(old: Quantity, name: str, places: Sequence[int], found: Estimate, how: str) -> Quantity:
@@ -267,7 +275,7 @@ def write_calibration(
     from ..components.assembly.deck_writer import deck_text
 
     paths = {
-        "deck": folder / f"{result.actuator.name}_calibrated.toml",
+        "deck": folder / f"{result.declared_name}_calibrated.toml",
         "joint": folder / "joint_numbers.json",
         "result": folder / "calibration.json",
     }

@@ -2,59 +2,105 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from .output import deck_option, out_option
 from .units import Number
 
+if TYPE_CHECKING:
+    from ..model import FlatModel
 
-@click.command("controller")
-@deck_option
-@click.option(
+F = TypeVar("F", bound=Callable[..., Any])
+
+_LAW = click.option(
     "--law",
     type=click.Choice(["scheduled", "pid"]),
     default="scheduled",
     show_default=True,
-    help="Speed by tangent stiffness, or a PID.",
+    help="Of the controller: speed by tangent stiffness, or a PID.",
 )
-@click.option(
+_BANDWIDTH = click.option(
     "--bandwidth", type=Number("Hz"), default=None, help="Of the scheduled law; by default 12 Hz at 1 kHz."
 )
-@click.option(
+_VELOCITY_BANDWIDTH = click.option(
     "--velocity-bandwidth",
     type=Number("Hz"),
     default=None,
     help="Of the velocity loop inside; by default 45 Hz at 1 kHz.",
 )
+
+
+def law_options(command: F) -> F:
+    """Add the options that choose the law of a torque controller.
+
+    Parameters
+    ----------
+    command
+        Takes ``law``, ``bandwidth`` and ``velocity_bandwidth``.
+    """
+    return _LAW(_BANDWIDTH(_VELOCITY_BANDWIDTH(command)))
+
+
+def controller_of(
+    plant: FlatModel,
+    sample_time: float,
+    *,
+    law: str,
+    bandwidth: float | None,
+    velocity_bandwidth: float | None,
+) -> FlatModel:
+    """Return the torque controller that the options of a command ask for.
+
+    Parameters
+    ----------
+    plant
+        Flat model of an actuator.
+    sample_time
+        In s.
+    law
+        ``"scheduled"`` or ``"pid"``.
+    bandwidth
+        Of the scheduled law in Hz.
+    velocity_bandwidth
+        Of the velocity loop in Hz.
+
+    Raises
+    ------
+    BadParameter
+        If a bandwidth is given for a PID, which has gains.
+    """
+    from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
+
+    if law == "pid" and bandwidth is not None:
+        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
+    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
+    inner = VelocityLoop(bandwidth=velocity_bandwidth)
+    return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
+
+
+@click.command("controller")
+@deck_option
+@law_options
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
 @out_option("out/controller")
 @click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
 @click.option("--fmu", is_flag=True, help="Write an FMU for co-simulation (FMI 3.0) beside the C code.")
 def export_controller(
-    deck_name: str,
-    law: str,
-    sample_time: float,
-    out: Path,
-    real: str,
-    fmu: bool,
-    **bandwidths: float | None,
+    deck_name: str, sample_time: float, out: Path, real: str, fmu: bool, **chosen: Any
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
-    from ..control import PidTorque, ScheduledTorque, VelocityLoop, largest_torque, torque_controller
+    from ..control import largest_torque
     from ..deck import load_deck
     from ..export import export_c, export_fmu
     from ..model import flatten
 
-    bandwidth = bandwidths["bandwidth"]
-    if law == "pid" and bandwidth is not None:
-        raise click.BadParameter("a PID has gains and no bandwidth; leave it out, or take --law scheduled")
     plant = flatten(declare(load_deck(deck_name)))
-    outer = ScheduledTorque(bandwidth=bandwidth) if law == "scheduled" else PidTorque()
-    inner = VelocityLoop(bandwidth=bandwidths["velocity_bandwidth"])
-    model = torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
+    model = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
     written = [source.header, source.source, source.selftest]

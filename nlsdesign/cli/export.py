@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .controller import export_controller
+from .controller import controller_of, export_controller, law_options
+from .export_check import check_exports
+from .export_fmu import export_fmus
+from .flash import flash_options, sized_observer
 from .observer import real_option, sample_time_option
-from .observer_kinds import kind_option, observer_of
+from .observer_kinds import kind_option
 from .output import deck_option, measured_option, out_option, spring_option
+
+if TYPE_CHECKING:
+    from ..model import FlatModel
+
+OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 
 @click.group()
@@ -18,70 +28,76 @@ def export() -> None:
 
 
 export.add_command(export_controller)
+export.add_command(export_fmus)
+export.add_command(check_exports)
 
 
 @export.command("c")
 @deck_option
+@click.option(
+    "--what",
+    type=click.Choice([OBSERVER, CONTROLLER, BOTH]),
+    default=OBSERVER,
+    show_default=True,
+    help="both: observer and torque controller as one step, which keeps the current itself.",
+)
 @kind_option
+@law_options
 @sample_time_option
 @spring_option
 @measured_option
 @out_option("out/c")
 @real_option
-def export_observer(deck_name: str, sample_time: float, out: Path, real: str, **chosen: str | None) -> None:
-    """Write the torque observer as C99; by default the one that is best over the spread of the deck."""
-    from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..export import export_c
-    from ..model import flatten
-
-    model = observer_of(flatten(declare(load_deck(deck_name))), sample_time, **chosen)
-    source = export_c(model, out, real=real, name="observer")
-    click.echo(model.description)
-    click.echo(f"written: {source.header}, {source.source}, {source.selftest}")
-
-
-@export.command("fmu")
-@deck_option
-@kind_option
-@sample_time_option
-@spring_option
-@measured_option
-@out_option("out/fmu")
-@click.option(
-    "--version", type=click.Choice(["2.0", "3.0"]), default="3.0", show_default=True, help="FMI version."
-)
-@click.option(
-    "--platform",
-    "platforms",
-    multiple=True,
-    help="For instance x86_64-windows; this machine by default; repeatable.",
-)
-@click.option("--plant-only", is_flag=True, help="Write the plant alone; for a system without an observer.")
-def export_fmus(
-    deck_name: str,
-    sample_time: float,
-    out: Path,
-    version: str,
-    platforms: tuple[str, ...],
-    plant_only: bool,
-    **chosen: str | None,
+@flash_options
+@click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")
+def export_code(
+    deck_name: str, what: str, sample_time: float, out: Path, real: str, examples: bool, **chosen: Any
 ) -> None:
-    """Write plant and, for an actuator, its observer as co-simulation FMUs."""
+    """Write the torque observer, the torque controller, or both as one step, as C99 with a self-test.
+
+    The observer is by default the one that is best over the spread of the deck.
+    """
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
-    from ..export import export_fmu
+    from ..export import export_c, write_examples
     from ..model import flatten
-    from ..model.roles import is_actuator
 
     plant = flatten(declare(load_deck(deck_name)))
-    models = {"plant": plant}
-    if is_actuator(plant) and not plant_only:
-        # Before anything is written: not every system has an observer.
-        models["observer"] = observer_of(plant, sample_time, **chosen)
-    systems = list(platforms) or None
-    written = [
-        export_fmu(model, out / f"{name}.fmu", version=version, platforms=systems)
-        for name, model in models.items()
-    ]
+    name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
+    source = export_c(model, out, real=real, name=name)
+    written = [source.header, source.source, source.selftest]
+    if examples:
+        written += write_examples(source)
+    for sentence in (model.description, *sentences):
+        click.echo(sentence)
     click.echo(f"written: {', '.join(str(path) for path in written)}")
+
+
+def sampled_part(
+    plant: FlatModel, what: str, sample_time: float, chosen: Mapping[str, Any]
+) -> tuple[str, FlatModel, tuple[str, ...]]:
+    """Return what a controller runs, what its files are called, and what is to be known of its size.
+
+    Parameters
+    ----------
+    plant
+        Flat model of an actuator.
+    what
+        ``"observer"``, ``"controller"`` or ``"both"``.
+    sample_time
+        In s.
+    chosen
+        Options of observer, law and size by name.
+    """
+    law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
+    others = {name: value for name, value in chosen.items() if name not in law}
+    if what == CONTROLLER:
+        return CONTROLLER, controller_of(plant, sample_time, **law), ()
+    if what == OBSERVER:
+        sized = sized_observer(plant, sample_time, **others)
+        return OBSERVER, sized.designed.model, sized.sentences
+    from ..control import joined
+
+    controller = controller_of(plant, sample_time, **law)
+    sized = sized_observer(plant, sample_time, part_of=lambda each: joined(each, controller), **others)
+    return "torque_loop", joined(sized.designed.model, controller), sized.sentences

@@ -12,7 +12,7 @@ from ..errors import ArrangementError
 
 if TYPE_CHECKING:
     from ..model import FlatModel
-    from ..observer import AdaptiveDesign, GainRule, ObserverDesign
+    from ..observer import AdaptiveDesign, GainRule, Grid, ObserverDesign
 
 BEST, CASCADE, CERTIFIED = "best", "cascade", "certified"
 KINDS = (BEST, "adaptive", CASCADE, CERTIFIED, "kalman", "published")
@@ -66,6 +66,7 @@ def designed_observer(
     sample_time: float = 1e-3,
     spring: str | None = None,
     measured: str | None = None,
+    grid: Grid | None = None,
 ) -> DesignedObserver:
     """Design an observer of the torque of a series spring.
 
@@ -83,6 +84,8 @@ def designed_observer(
         Path of the spring; decided from the structure if it is left out.
     measured
         State that is measured; decided from the structure if it is left out.
+    grid
+        Of its table; by the default torque error if it is left out.
 
     Raises
     ------
@@ -96,9 +99,14 @@ def designed_observer(
     try:
         torque, measured = series_spring(plant, spring).effort, measured_motion(plant, measured)
     except ArrangementError as error:
-        alone = "nlsdesign export fmu --plant-only writes the plant alone, with its C sources inside"
+        alone = "nlsdesign export fmu --what plant writes the plant alone, with its C sources inside"
         raise ArrangementError(error.thing, error.rule, next_step=f"{error.next_step}; {alone}") from None
-    named: dict[str, Any] = {"estimate": torque, "measured": measured, "sample_time": sample_time}
+    named: dict[str, Any] = {
+        "estimate": torque,
+        "measured": measured,
+        "sample_time": sample_time,
+        "grid": grid,
+    }
     kind = kind or BEST
     if kind == BEST:
         chosen = observer.choose_observer(plant, **named)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -36,13 +38,58 @@ class Number(_Kind):
         return parse_number(str(value), self.unit).number
 
 
-def parse_number(text: str, unit: str) -> Quantity:
-    """Read ``"5 N·m"`` or ``"5 N*m"``.
+if TYPE_CHECKING:
+    _Count = click.ParamType[int]
+else:
+    _Count = click.ParamType
+
+_BYTES = {"B": 1, "kB": 1000, "KiB": 1024, "MB": 1000**2, "MiB": 1024**2}
+
+
+class Bytes(_Count):
+    """A size of memory such as ``16kB``; gives bytes. A kB has 1000 of them, a KiB 1024."""
+
+    name = "size"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number of bytes."""
+        if isinstance(value, int):
+            return value
+        number, unit = split_number(str(value))
+        if unit not in _BYTES or not 0.0 < number < math.inf:
+            raise UnitError(
+                f"'{value}'", f"is no size of memory; units are {', '.join(_BYTES)}", next_step="write '16kB'"
+            )
+        return int(number * _BYTES[unit])
+
+
+def split_number(text: str) -> tuple[float, str]:
+    """Return number and unit of ``"5 N·m"``, ``"5N*m"`` or ``"5N.m"``; a full stop in a unit is a product.
 
     Parameters
     ----------
     text
-        Number, space, unit.
+        Number and unit.
+
+    Raises
+    ------
+    UnitError
+        If it does not begin with a number.
+    """
+    match = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
+    if match is None:
+        raise UnitError(f"'{text}'", "does not start with a number")
+    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
+    return float(match.group(1)), unit
+
+
+def parse_number(text: str, unit: str) -> Quantity:
+    """Read ``"5 N·m"``, ``"5 N*m"`` or ``"5N.m"``.
+
+    Parameters
+    ----------
+    text
+        Number and unit.
     unit
         A unit of the expected dimension.
 
@@ -51,14 +98,10 @@ def parse_number(text: str, unit: str) -> Quantity:
     UnitError
         If the unit is missing or measures something else.
     """
-    head, _, tail = text.strip().partition(" ")
     try:
-        number = float(head)
-    except ValueError:
-        raise UnitError(
-            f"'{text}'", "does not start with a number", next_step=f"write '{with_unit('1', unit)}'"
-        ) from None
-    given = tail.strip()
+        number, given = split_number(text)
+    except UnitError as error:
+        raise UnitError(error.thing, error.rule, next_step=f"write '{with_unit('1', unit)}'") from None
     if not given and unit != "1":
         raise UnitError(f"'{text}'", "has no unit", next_step=f"write '{with_unit(text.strip(), unit)}'")
     if not same_dimension(given or "1", unit):

@@ -77,7 +77,7 @@ from .mechanics.stops import EndStop, RigidStop
 from .mechanics.unnamed import UnnamedFriction, UnnamedSpring
 from .sensing.sampled_sensors import SampleAndHold, Tachometer
 from .sensing.sensor_faults import ClockDrift, Drift, Eccentricity, LoadNonlinearity, TransportDelay
-from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, Sensor, TorqueSensor
+from .sensing.sensors import CurrentSensor, Encoder, ForceSensor, ReadingLimits, Sensor, TorqueSensor
 from .transmission.cam import Cable, Cam, Pulley, TwoSidedCam, control_values
 from .transmission.cam_drive import Through, through
 from .transmission.cam_error import CamWithProfileError
@@ -173,6 +173,7 @@ __all__ = [
     "QuadraticDrag",
     "QuasilinearRelaxation",
     "RateFeedback",
+    "ReadingLimits",
     "Regularised",
     "Relaxation",
     "ResistiveMotor",

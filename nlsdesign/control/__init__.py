@@ -29,6 +29,7 @@ from .laws.velocity_loop import FrictionCompensation, VelocityLoop
 from .laws.windup import AntiWindup, BackCalculation, ConditionalIntegration
 from .loop.closed_loop import ClosedLoop
 from .loop.encoder_wiring import encoder_loop
+from .loop.joined import joined
 from .tuning.largest_gain import LoopLimits, TunedLoop, largest_gain
 from .tuning.spring_trade_off import LoopChoice, bandwidth_against_impedance, best_choices
 
@@ -76,6 +77,7 @@ __all__ = [
     "coupled_stability",
     "encoder_loop",
     "held_torque",
+    "joined",
     "largest_gain",
     "largest_torque",
     "linear_loop",

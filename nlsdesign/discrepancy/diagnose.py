@@ -24,6 +24,7 @@ from ..identification.equation_error.evidence import Bench
 from ..identification.estimation.least_squares import Fit
 from ..identification.records.measurement import RecordSet
 from ..model import flatten
+from ..model.derived_deck import derived
 from ..writing import make_folder, write_text
 from .blocks.tearing import blocks_of
 from .effects import ALL, Candidate, EffectFunction
@@ -223,7 +224,7 @@ def _verdict(
         gaps_of(base, better, every),
         worst,
         _runners_up(outcome, steps),
-        sourced(better),
+        derived(sourced(better), case.actuator, "diagnosed"),
         sourced(base),
         course_of(base, better, every, worst),
         tuple(text for fit in better.fits.values() for text in fit.unidentified()),

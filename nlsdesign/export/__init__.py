@@ -1,6 +1,7 @@
 """C code for the controller, FMUs for everybody else, and co-simulation of FMUs."""
 
 from .c.controller_code import CSource, export_c
+from .c.examples import write_examples
 from .compilation.compiled_step import natively
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
@@ -8,13 +9,20 @@ from .cosimulation.convergence import Convergence, convergence
 from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
 from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
 from .cosimulation.wires import Late, SamplesOf, Wire
+from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
+from .fmi.reference_results import write_reference
 from .ssp.read_ssp import read_ssp
 from .ssp.write_ssp import WrittenSystem, write_ssp
+from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
+from .target.target_run import TargetMeasurement, TargetRun, measure_on_target
 
 __all__ = [
     "ALL_PLATFORMS",
+    "CORTEX_M4F",
+    "CORTEX_M7",
     "PLATFORMS",
+    "Authorship",
     "CSource",
     "CoSimulation",
     "CompiledStep",
@@ -24,8 +32,11 @@ __all__ = [
     "Held",
     "Iterated",
     "Late",
+    "Processor",
     "SamplesOf",
     "Stepping",
+    "TargetMeasurement",
+    "TargetRun",
     "Wire",
     "WrittenSystem",
     "convergence",
@@ -33,7 +44,10 @@ __all__ = [
     "export_c",
     "export_fmu",
     "host_platform",
+    "measure_on_target",
     "natively",
     "read_ssp",
+    "write_examples",
+    "write_reference",
     "write_ssp",
 ]

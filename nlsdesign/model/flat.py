@@ -68,18 +68,25 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Numbers over a uniform grid of one argument, read by linear interpolation and held at the ends.
+    """Numbers over a grid of one argument, read by linear interpolation and held at the ends.
 
     Parameters
     ----------
     argument
         Name of the input or state that is looked up.
     lower, step
-        First grid point and distance of the grid points.
+        First grid point and distance of the grid points; the step is zero where breakpoints are given.
     columns
         The quantities that are looked up.
     values
         Array of shape (grid points, columns).
+    breakpoints
+        Grid points of a grid that is not uniform, ascending, shape (grid points,); see :meth:`over`.
+
+    Raises
+    ------
+    ValueRangeError
+        If breakpoints are not finite, ascending and one per row, beginning at ``lower``.
     """
 
     argument: str
@@ -87,6 +94,56 @@ class Table:
     step: float
     columns: tuple[Variable, ...]
     values: NDArray[np.float64]
+    breakpoints: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        if self.breakpoints is None:
+            return
+        points = np.asarray(self.breakpoints, dtype=np.float64)
+        fits = points.shape == (self.values.shape[0],) and points.size > 1 and points[0] == self.lower
+        if not (fits and self.step == 0.0 and np.all(np.isfinite(points)) and np.all(np.diff(points) > 0.0)):
+            raise ValueRangeError(
+                f"table over '{self.argument}'",
+                "needs finite, ascending breakpoints, one for each row of values and at least two",
+                next_step="build it with Table.over(argument, breakpoints, columns, values)",
+            )
+
+    @staticmethod
+    def over(
+        argument: str, points: NDArray[np.float64], columns: tuple[Variable, ...], values: NDArray[np.float64]
+    ) -> Table:
+        """Return a table over breakpoints, which need not be uniform.
+
+        Parameters
+        ----------
+        argument
+            Name of the input or state that is looked up.
+        points
+            Breakpoints, ascending, shape (n,).
+        columns
+            The quantities that are looked up.
+        values
+            Shape (n, columns).
+
+        Raises
+        ------
+        ValueRangeError
+            If the breakpoints are not finite, ascending and one per row.
+        """
+        return Table(argument, float(points[0]) if len(points) else 0.0, 0.0, columns, values, points)
+
+    @property
+    def grid(self) -> NDArray[np.float64]:
+        """All grid points, shape (grid points,)."""
+        if self.breakpoints is not None:
+            return self.breakpoints
+        return np.asarray(self.lower + self.step * np.arange(self.values.shape[0]), dtype=np.float64)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """First and last grid point."""
+        last = self.lower + self.step * (self.values.shape[0] - 1)
+        return self.lower, last if self.breakpoints is None else float(self.breakpoints[-1])
 
     def look_up(self, at: float) -> NDArray[np.float64]:
         """Return all columns at one argument; not a number where the argument is none.
@@ -104,6 +161,11 @@ class Table:
         if math.isnan(at):
             return np.full(self.values.shape[1], np.nan)
         last = self.values.shape[0] - 1
+        if (points := self.breakpoints) is not None:
+            held = min(max(at, float(points[0])), float(points[last]))
+            left = min(int(np.searchsorted(points, held, side="right")) - 1, last - 1)
+            share = float((held - points[left]) / (points[left + 1] - points[left]))
+            return np.asarray(self.values[left] + share * (self.values[left + 1] - self.values[left]))
         position = min(max((at - self.lower) / self.step, 0.0), float(last))
         left = min(int(position), last - 1)
         share = position - left
@@ -153,8 +215,12 @@ class FlatModel:
         What the model is made of: which variables belong together, in written order. Empty where that is
         not declared.
     begin
-        Of a sampled model: ``casadi.Function`` (u, p, w) -> x, the states that fit the first inputs of a
-        machine at rest; ``None`` where the start values fit any.
+        Of a sampled model: ``casadi.Function`` (x, u, p, w) -> (begun, resumed): from the start values the
+        states of a machine that rests at its first reading, and from the last states those with which it
+        goes on after a gap in its readings. ``None`` where the states fit any reading.
+    expected
+        Of a sampled model: ``casadi.Function`` (x, u, p, w) -> what it expects of each input, which takes the
+        place of a reading that cannot be used; ``None`` where it expects nothing.
     origin
         The deck behind the model, ``None`` where it was made otherwise.
     """
@@ -174,6 +240,7 @@ class FlatModel:
     springs: tuple[SpringNames, ...] = ()
     readings: tuple[ReadingNames, ...] = ()
     begin: ca.Function | None = None
+    expected: ca.Function | None = None
     origin: Origin | None = None
 
     def symbols(self) -> Symbols:

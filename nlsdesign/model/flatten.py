@@ -21,6 +21,7 @@ from ..components.sensing.sensors import Sensor
 from ..errors import ArrangementError, UnitError, nearest, unknown_name
 from ..quantity import typeset_unit
 from ..symbolic import Expression, depends
+from .declared_origin import DeclaredOrigin
 from .equation_builder import EquationBuilder, PartScope
 from .flat import FlatModel, Variable
 from .gear_train import balance_train, train_motions, trains
@@ -175,7 +176,7 @@ def _model(
         ca.SX.sym("w", 0),
     ]
     rows = [[solved.derivatives[n] for n in states], solved.outputs, solved.signals, solved.checks]
-    switches = switching(laws, columns, rows[0], states) if laws.switches else None
+    switches = switching(laws, columns, rows, states) if laws.switches else None
     rows = _natural(laws, rows)
     equations = ca.Function(
         "equations", [ca.SX(c) for c in columns], [ca.SX(ca.vertcat(*r)) for r in rows],
@@ -208,6 +209,7 @@ def _model(
         bodies=moving_bodies(assembly, owners),
         springs=springs_of(assembly, owners),
         readings=readings_of(assembly),
+        origin=DeclaredOrigin(assembly),
     )
 
 

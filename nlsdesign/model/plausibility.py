@@ -22,7 +22,13 @@ class Plausibility:
     resolution
         Change from sample to sample that is always possible, such as two counts, in the unit.
     stale_time
-        Time in s after which a reading that has not changed at all counts as stale.
+        Time in s after which a reading that has not changed at all counts as stale, if meanwhile what moves
+        the machine has changed.
+    moved_by
+        Name of the input or state that moves the machine, for instance the current of its motor; ``None``
+        where that is not known: then a reading is stale after the time in any case.
+    noticeable
+        Change of ``moved_by`` that a working sensor cannot fail to show.
 
     Raises
     ------
@@ -33,7 +39,11 @@ class Plausibility:
     largest_rate: float = math.inf
     resolution: float = 0.0
     stale_time: float = math.inf
+    moved_by: str | None = None
+    noticeable: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (self.largest_rate > 0.0 and self.stale_time > 0.0 and 0.0 <= self.resolution < math.inf):
-            raise ValueRangeError(f"{self}", "needs a positive rate and time, and a resolution of at least 0")
+        small = 0.0 <= self.resolution < math.inf and 0.0 <= self.noticeable < math.inf
+        if not (self.largest_rate > 0.0 and self.stale_time > 0.0 and small):
+            rule = "needs a positive rate and time; resolution and noticeable change must not be negative"
+            raise ValueRangeError(f"{self}", rule)

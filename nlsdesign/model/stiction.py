@@ -258,7 +258,7 @@ def natural_modes(laws: Laws) -> Expression:
 
 
 def switching(
-    laws: Laws, columns: Sequence[Expression], derivatives: Sequence[Expression], states: Sequence[str]
+    laws: Laws, columns: Sequence[Expression], rows: Sequence[Sequence[Expression]], states: Sequence[str]
 ) -> Switching:
     """Return the functions of the switches.
 
@@ -268,15 +268,15 @@ def switching(
         Cleaned.
     columns
         Symbols of time, states, inputs and parameters.
-    derivatives
-        Of the states, with the symbols of the modes.
+    rows
+        Derivatives of the states, outputs and signals, with the symbols of the modes.
     states
         Names.
     """
     modes, given = ca.vertcat(*laws.modes), [ca.SX(c) for c in columns[:4]]
     slope = ca.densify(ca.jacobian(ca.vertcat(*laws.rates), given[1]))
     reach = ca.vertcat(*[ca.horzcat(*laws.reach[n]) for n in states])
-    branch = [ca.SX(ca.densify(ca.vertcat(*row))) for row in (derivatives, laws.lasts, laws.rates)]
+    branch = [ca.SX(ca.densify(ca.vertcat(*row))) for row in (rows[0], laws.lasts, laws.rates)]
     landing = [*(ca.SX(ca.vertcat(*g)) for g in (laws.rates, laws.rebounds, laws.leads)), reach, slope]
     return Switching(
         laws.switches,
@@ -284,4 +284,5 @@ def switching(
         ca.Function("natural", given, [ca.densify(natural_modes(laws))]),
         ca.Function("landing", [*given, modes], ca.cse([ca.densify(e) for e in landing])),
         tuple(not rate.is_zero() for rate in laws.rates),
+        ca.Function("shown", [*given, modes], [ca.SX(ca.densify(ca.vertcat(*row))) for row in rows[1:3]]),
     )

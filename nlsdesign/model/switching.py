@@ -56,6 +56,8 @@ class Switching:
         derivatives per effort, shape (states, k), and ∂v/∂x, shape (k, states). Zero for the others.
     holds
         For each switch whether it holds a rate.
+    shown
+        (t, x, u, p, m) -> (y, s): outputs and signals with all modes held at m.
     """
 
     switches: tuple[Switch, ...]
@@ -63,6 +65,7 @@ class Switching:
     natural: ca.Function
     landing: ca.Function
     holds: tuple[bool, ...]
+    shown: ca.Function
 
     @property
     def jumps(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from ..errors import ArrangementError, unknown_name
 from ..symbolic import Expression, depends
 from .flat import FlatModel, Symbols, Variable
 from .structure import ModelParts
+from .switching import Switching
 
 
 def named(model: FlatModel, symbols: Symbols) -> dict[str, Expression]:
@@ -54,10 +55,13 @@ def with_outputs(model: FlatModel, names: Sequence[str]) -> FlatModel:
     UnknownNameError
         If a name does not exist, with the nearest that does.
     """
-    s = model.symbols()
-    known = named(model, s)
     outputs = tuple(model.variable(name) for name in names)
-    return _rebuilt(model, s._replace(output=_column([known[name] for name in names])), outputs=outputs)
+
+    def given_out(s: Symbols) -> Symbols:
+        known = named(model, s)
+        return s._replace(output=_column([known[name] for name in names]))
+
+    return _rebuilt(model, given_out(model.symbols()), outputs=outputs, again=given_out)
 
 
 def with_signal(
@@ -91,13 +95,15 @@ def with_signal(
     0.25
     """
     s = model.symbols()
-    known = named(model, s)
-    if variable.name in known:
+    if variable.name in named(model, s):
         raise ArrangementError(
             f"signal '{variable.name}'", "the name is taken", next_step="choose another name"
         )
-    changed = s._replace(signal=_column([s.signal, value(known)]))
-    return _rebuilt(model, changed, signals=(*model.signals, variable))
+
+    def shown(s: Symbols) -> Symbols:
+        return s._replace(signal=_column([s.signal, value(named(model, s))]))
+
+    return _rebuilt(model, shown(s), signals=(*model.signals, variable), again=shown)
 
 
 def replace_state(model: FlatModel, old: str, signal: str) -> FlatModel:
@@ -268,8 +274,12 @@ def _rebuilt(
     inputs: tuple[Variable, ...] | None = None,
     outputs: tuple[Variable, ...] | None = None,
     signals: tuple[Variable, ...] | None = None,
+    again: Callable[[Symbols], Symbols] | None = None,
 ) -> FlatModel:
-    """Return the model with these expressions and names; groups that are not given stay."""
+    """Return the model with these expressions and names; groups that are not given stay.
+
+    ``again`` makes the same change in the expressions with all modes held.
+    """
     moved = states is not None or inputs is not None
     if moved and model.switching is not None and model.switching.jumps:
         raise ArrangementError(
@@ -290,13 +300,27 @@ def _rebuilt(
         model,
         equations=equations,
         # Corners may be forgotten: the equations say them too.
-        switching=None if moved else model.switching,
+        switching=None if moved else _switching(model, again),
         states=model.states if states is None else states,
         inputs=model.inputs if inputs is None else inputs,
         outputs=model.outputs if outputs is None else outputs,
         signals=model.signals if signals is None else signals,
     )
     return with_parts(changed, parts_of(model))
+
+
+def _switching(model: FlatModel, again: Callable[[Symbols], Symbols] | None) -> Switching | None:
+    """Return the switches of a model whose outputs or signals have been changed."""
+    if model.switching is None or again is None:
+        return model.switching
+    s = model.symbols()
+    shown = model.switching.shown
+    if (shown.size1_in(1), shown.size1_in(2)) != (s.state.numel(), s.input.numel()):
+        return None  # states or inputs were exchanged before, and only a model with corners allows that
+    given = [s.time, s.state, s.input, s.parameter, ca.SX.sym("mode", len(model.switching.switches))]
+    output, signal = shown.call(given)
+    s = again(s._replace(output=output, signal=signal))
+    return replace(model.switching, shown=ca.Function("shown", given, [s.output, s.signal]))
 
 
 def _column(items: Iterable[Expression]) -> Expression:

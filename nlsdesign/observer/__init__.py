@@ -37,7 +37,8 @@ from .scheduling.gains import (
 )
 from .scheduling.run import observe
 from .scheduling.scheduled import ObserverDesign, design_observer_with_details
-from .scheduling.table import FixedGrid, Grid, GridByTolerance
+from .scheduling.table import FixedGrid, Grid, GridByTolerance, TableTorqueError
+from .scheduling.torque_grid import GridByTorqueError
 from .spread.choice import ObserverOfChoice, choose_observer, design_observer
 from .spread.least_error import least_torque_error
 from .spread.observer_bench import ObserverBench, observer_bench
@@ -61,6 +62,7 @@ __all__ = [
     "GainRule",
     "Grid",
     "GridByTolerance",
+    "GridByTorqueError",
     "HeldEstimateCertificate",
     "Minimal",
     "ObserverBench",
@@ -72,6 +74,7 @@ __all__ = [
     "SpreadErrors",
     "StateForm",
     "SteadyStateKalman",
+    "TableTorqueError",
     "TorqueErrorBound",
     "Trust",
     "UncertainDirections",

@@ -433,8 +433,9 @@ def _looked_up(table: Table, model: FlatModel, state: ca.MX, u: ca.MX) -> ca.MX:
         at = state[states.index(table.argument)]
     else:
         at = u[[v.name for v in model.inputs].index(table.argument)]
-    grid = table.lower + table.step * np.arange(table.values.shape[0])
-    look = ca.interpolant("look_up", "linear", [grid], table.values.ravel(), {"lookup_mode": ["exact"]})
+    grid = table.grid
+    mode = "exact" if table.breakpoints is None else "binary"
+    look = ca.interpolant("look_up", "linear", [grid], table.values.ravel(), {"lookup_mode": [mode]})
     return look(ca.fmin(ca.fmax(at, grid[0]), grid[-1]))
 
 

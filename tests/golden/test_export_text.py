@@ -11,10 +11,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from nlsdesign.deck import ParentDeck
 from nlsdesign.export.c.c_text import real_type
 from nlsdesign.export.c.controller_code import header_text, source_text
 from nlsdesign.export.fmi.fmu import fmu_texts
+from nlsdesign.model import Plausibility
 from nlsdesign.model.flat import FlatModel, Table, Variable
+from nlsdesign.model.origin import Origin
+from nlsdesign.quantity import quantity
 from tests.hand_built import plant
 
 STORED = Path(__file__).with_name("export")
@@ -23,18 +27,27 @@ UPDATE = os.environ.get("NLSDESIGN_UPDATE_GOLDEN") == "1"
 
 def damper() -> FlatModel:
     """One state, one table of three points, one choice: every part of the generated text once."""
-    t, x, u, p, w = (ca.SX.sym(name) for name in "txupw")
-    force = w * u + p * x
+    t, x, p, w, both = *(ca.SX.sym(name) for name in "txpw"), ca.SX.sym("u", 2)
+    u, valve = both[0], both[1]
+    force = valve * (w * u + p * x)
     return_stroke = ca.if_else(u < 0, ca.fmin(force, 2.0), ca.exp(-u) * force)
-    equations = ca.Function("e", [t, x, u, p, w], [0.5 * x + 0.25 * u, return_stroke, force**2, ca.SX(0, 1)])
+    results = [0.5 * x + 0.25 * u, return_stroke, force**2, ca.SX(0, 1)]
+    equations = ca.Function("e", [t, x, both, p, w], results)
+    begin = ca.Function("begin", [x, both, p, w], [u, ca.fmin(x, u)])
+    expected = ca.Function("expected", [x, both, p, w], [ca.vertcat(x, valve)])
+    can = Plausibility(5.0, 0.01, 0.25, "valve.opening", 0.1)
     table = Table(
         "piston.speed", -1.0, 1.0, (Variable("viscosity", "N*s/m", "Viscosity"),), np.array([[3.0], [2], [4]])
     )
+    gain = quantity(0.75, "N*s/m", source="bench 2024-05-01", spread=0.1)
     return FlatModel(
         "scheduled damper",
         "Force of a damper whose viscosity depends on speed",
         (Variable("piston.filtered", "m/s", "Filtered speed"),),
-        (Variable("piston.speed", "m/s", "Speed", 0.0, 1.0, -1.0, 1.0),),
+        (
+            Variable("piston.speed", "m/s", "Speed", 0.0, 1.0, -1.0, 1.0, plausibility=can),
+            Variable("valve.opening", "1", "Opening of the valve", 1.0, 1.0, 0.0, 1.0),
+        ),
         (
             Variable(
                 "memory.gain", "N*s/m", "Weight of the past", 0.75, 1.0, 0.0, 10.0, "bench 2024-05-01", 0.1
@@ -45,6 +58,11 @@ def damper() -> FlatModel:
         equations,
         0.01,
         (table,),
+        begin=begin,
+        expected=expected,
+        origin=Origin(
+            "damper", "1" * 64, ParentDeck("older_damper", "0" * 64, "diagnosed"), (), {"gain": gain}
+        ),
     )
 
 

@@ -215,8 +215,8 @@ def stepper(model: FlatModel, folder) -> ctypes.CDLL:
             double jacobian[ORDER][ORDER], slope[ORDER], next[ORDER];
             const double h = (end - t) / count;
             for (int k = 0; k < count; ++k, t += h) {
-                model_jacobian(t, x, none, none, jacobian, slope);
-                rodas4(t, h, x, none, none, jacobian, slope, next, error);
+                model_jacobian(t, x, none, none, none, jacobian, slope);
+                rodas4(t, h, x, none, none, none, jacobian, slope, next, error);
                 for (int i = 0; i < ORDER; ++i) {
                     x[i] = next[i];
                 }

@@ -12,8 +12,8 @@ import pytest
 from nlsdesign import quantity
 from nlsdesign.export import Late, SamplesOf, Wire, cosimulate, export_fmu
 from nlsdesign.simulation import Sine
+from tests.command_line import Run, run
 from tests.hand_built import controller, observer, plant
-from tests.unit.test_cli import Run, run
 
 __all__ = ["run"]
 WIRES = {

@@ -13,8 +13,8 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.errors import ArrangementError, ExportError
 from nlsdesign.export import natively
 from nlsdesign.export.compilation.cross_compiler import compiler
-from nlsdesign.model import FlatModel, flatten
-from nlsdesign.model.transform import replace_state, with_outputs
+from nlsdesign.model import FlatModel, Variable, flatten
+from nlsdesign.model.transform import replace_state, with_outputs, with_signal
 from nlsdesign.simulation import Event, Sine, simulate
 from nlsdesign.simulation.events import locate_event
 from nlsdesign.simulation.input_signals import drives_of
@@ -99,7 +99,19 @@ def test_a_sine_at_many_times_is_the_sine_at_each() -> None:
 def test_other_views_keep_switches_or_refuse() -> None:
     model = gear()
     seen = with_outputs(model, ["load.angle"])
-    assert seen.switching is model.switching
+    assert seen.switching is not None
+    assert model.switching is not None
+    assert seen.switching.branch is model.switching.branch
+    doubled = with_signal(seen, Variable("twice", "rad", "twice the angle"), lambda n: 2 * n["load.angle"])
+    point = (0.0, [0.4, -1.3, 0.1, 0.7], [0.2, 0.0], model.start(model.parameters))
+    for view in (model, seen, doubled):
+        assert view.switching is not None
+        # At the modes that belong to the state, what is shown is what the equations give.
+        found = view.switching.shown(*point, view.switching.natural(*point))
+        _, *expected, _ = view.equations(*point, [])
+        for one, other in zip(found, expected, strict=True):
+            assert np.array(one).ravel() == pytest.approx(np.array(other).ravel(), rel=1e-14)
+    assert float(found[1][-1]) == pytest.approx(0.2, rel=1e-14)
     spring = flatten(
         assembly(
             "a",

@@ -6,6 +6,7 @@ symbols in the wrong order is one of this file.
 
 from __future__ import annotations
 
+import math
 import pickle
 from dataclasses import dataclass
 
@@ -336,6 +337,29 @@ def test_table_is_held_at_its_ends(at: float, row: int) -> None:
 
 def test_table_at_no_number_gives_no_number() -> None:
     assert np.all(np.isnan(table().look_up(float("nan"))))
+
+
+UNEVEN = np.array([-1.0, -0.2, -0.19, 0.7, 0.75])
+
+
+@pytest.mark.parametrize("at", [-1.0, -0.5, -0.2, -0.195, -0.19, 0.0, 0.7, 0.72, 0.75, -1.5, 2.0, np.inf])
+def test_table_over_breakpoints_runs_in_lines(at: float) -> None:
+    """Reference: ``numpy.interp``, also beyond the ends."""
+    values = np.array([[0.0, 5.0], [1.0, 5.0], [-4.0, 5.0], [9.0, 6.0], [2.0, 1.0]])
+    columns = (Variable("a", "1", "a"), Variable("b", "1", "b"))
+    uneven = Table.over("x", UNEVEN, columns, values)
+    expected = [np.interp(at, UNEVEN, column) for column in values.T]
+    assert uneven.look_up(at) == pytest.approx(expected, rel=1e-13, abs=1e-13)
+    assert np.all(np.isnan(uneven.look_up(math.nan)))
+    assert uneven.grid.tolist() == UNEVEN.tolist()
+
+
+@pytest.mark.parametrize(
+    "points", [[0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 1.0, math.inf], [0.0, 1.0], []]
+)
+def test_breakpoints_ascend_and_are_one_for_each_row(points: list[float]) -> None:
+    with pytest.raises(ValueRangeError, match="over 'x': needs finite, ascending breakpoints"):
+        Table.over("x", np.array(points), (Variable("a", "1", "a"),), np.zeros((3, 1)))
 
 
 def test_table_of_one_row_is_a_constant() -> None:

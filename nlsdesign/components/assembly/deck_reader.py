@@ -7,11 +7,12 @@ import functools
 import importlib
 import inspect
 import pkgutil
+import re
 from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
-from ...deck import NUMBER_FIELDS, Deck
+from ...deck import NUMBER_FIELDS, Deck, ParentDeck
 from ...errors import DeckError, NlsError, nearest, unknown_name
 from ...quantity import Quantity
 from ..core.domain import Domain
@@ -24,6 +25,8 @@ from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
 from .renamed import NUMBERS, renamed
+
+_PARENT_FIELDS = ("name", "digest", "change", "parent")
 
 
 @functools.cache
@@ -79,7 +82,7 @@ class Builder:
         made = {key: child for key, child in children.items() if child is not None}
         fields = self.fields(path, table, kind, next(iter(made.values()), None))
         if inner and not issubclass(kind, Combination | Through | Free):
-            self._problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
+            self.problem(f"{path}.{next(iter(inner))}", f"{kind.__name__} holds no other part")
         if len(self.problems) > before or len(made) < len(children):
             return None
         try:
@@ -119,7 +122,7 @@ class Builder:
                 intended.add(near)
                 step = f"fields are: {', '.join(valid)}"
                 rule = f"{kind.__name__} has no field '{key}'"
-                self._problem(full, rule, did_you_mean=near, next_step=step)
+                self.problem(full, rule, did_you_mean=near, next_step=step)
         stated = self._stated_domain(path, table, kind)
         domain = stated or _domain_of(kind, given, inner)
         infos = kind.parameter_infos(domain)
@@ -156,7 +159,7 @@ class Builder:
         if not fitting:
             ways = "; or ".join(f"{' and '.join(templates(e))} ({e.__name__})" for e in kinds if templates(e))
             rule = f"{kind.__name__} has either {ways}, not {' and '.join(sorted(map(str, asked)))}"
-            self._problem(path, rule, next_step="keep those of one way")
+            self.problem(path, rule, next_step="keep those of one way")
             return None
         holder = next(f for f in dataclasses.fields(kind) if f.metadata.get("readings") == kinds)
         if not asked and holder.default is not dataclasses.MISSING:
@@ -177,7 +180,7 @@ class Builder:
         for name in templates(holder):
             if name in _needed(holder) and name not in there:
                 step = f'add {name} = {{value = ..., unit = "{infos[name].unit}", source = "..."}}'
-                self._problem(path, f"{kind.__name__} needs '{name}'", next_step=step)
+                self.problem(path, f"{kind.__name__} needs '{name}'", next_step=step)
 
     def _stated_domain(self, path: str, table: Mapping[str, Any], kind: type[Part]) -> Domain | None:
         if "domain" not in table or "domain" not in self._keys(path, kind):
@@ -185,7 +188,7 @@ class Builder:
         known = {domain.name: domain for domain in kind.domains()}
         if table["domain"] not in known:
             rule = f"is {table['domain']!r}, not a domain of {kind.__name__}"
-            self._problem(f"{path}.domain", rule, next_step=f"write one of: {', '.join(known)}")
+            self.problem(f"{path}.domain", rule, next_step=f"write one of: {', '.join(known)}")
             return None
         return known[table["domain"]]
 
@@ -205,7 +208,7 @@ class Builder:
         if not isinstance(ends, list) or not all(isinstance(end, str) for end in ends):
             wrong = "is missing" if ends is None else f"is {ends!r}, not a list of names"
             step = 'write between = ["motor", "load"], or one name for the resting frame'
-            self._problem(f"{name}.between", wrong, next_step=step)
+            self.problem(f"{name}.between", wrong, next_step=step)
             return None
         # A table of an unknown component may be a body.
         bodies = [n for n in self.deck.tables if issubclass(self.class_of(n) or Body, Body)]
@@ -230,20 +233,21 @@ class Builder:
         table = self.deck.tables[name]
         return self.classes.get(str(table.get("component"))) if isinstance(table, dict) else None
 
-    def head(self) -> None:
-        """Check the table ``[deck]``."""
+    def head(self) -> ParentDeck | None:
+        """Check the table ``[deck]``, and return the deck that this one was made from."""
         for key, raw in self.deck.head.items():
-            if key not in ("name", "description"):
-                valid = ("name", "description")
-                self._problem(f"deck.{key}", "is not a field of [deck]", did_you_mean=nearest(key, valid))
-            elif not isinstance(raw, str):
-                self._problem(f"deck.{key}", f"is {raw!r}, not a text")
+            if key not in ("name", "description", "parent"):
+                valid = ("name", "description", "parent")
+                self.problem(f"deck.{key}", "is not a field of [deck]", did_you_mean=nearest(key, valid))
+            elif key != "parent" and not isinstance(raw, str):
+                self.problem(f"deck.{key}", f"is {raw!r}, not a text")
+        return _parent(self, "deck.parent", self.deck.head.get("parent"))
 
     def _kind(self, path: str, table: Mapping[str, Any]) -> type[Part] | None:
         name = table.get("component")
         if name is None:
             misspelt = nearest("component", [key for key in table if key not in ("between", "of")])
-            self._problem(
+            self.problem(
                 f"{path}.{misspelt}" if misspelt else path,
                 "is not a field; the table has no component" if misspelt else "the table has no component",
                 did_you_mean="component" if misspelt else None,
@@ -255,7 +259,7 @@ class Builder:
             self.problems.append(old.at(self.deck.place(f"{path}.component")))
             return None
         if not isinstance(name, str) or name not in self.classes:
-            self._problem(
+            self.problem(
                 f"{path}.component",
                 f"'{name}' is not a component",
                 did_you_mean=nearest(str(name), self.classes),
@@ -264,9 +268,9 @@ class Builder:
             return None
         kind = self.classes[name]
         if issubclass(kind, Sensor) and not isinstance(table.get("of"), str):
-            self._problem(path, f"{name} needs 'of'", next_step='add of = "...", the signal that it reads')
+            self.problem(path, f"{name} needs 'of'", next_step='add of = "...", the signal that it reads')
         if issubclass(kind, Gear) and not _is_pair(table.get("between")):
-            self._problem(path, f"{name} needs 'between'", next_step='add between = ["motor", "wheel"]')
+            self.problem(path, f"{name} needs 'between'", next_step='add between = ["motor", "wheel"]')
         return kind
 
     def _keys(self, path: str, kind: type[Part]) -> list[str]:
@@ -274,11 +278,43 @@ class Builder:
         free = any("domains" in field.metadata for field in dataclasses.fields(kind))
         return ["component"] + ["between"] * tied + ["of"] * issubclass(kind, Sensor) + ["domain"] * free
 
-    def _problem(
+    def problem(
         self, full_name: str, rule: str, *, did_you_mean: str | None = None, next_step: str | None = None
     ) -> None:
+        """Add a problem, with its place in the deck.
+
+        Parameters
+        ----------
+        full_name
+            What it is about.
+        rule, did_you_mean, next_step
+            As for :class:`~nlsdesign.errors.NlsError`.
+        """
         place = self.deck.place(full_name)
         self.problems.append(DeckError(place, rule, did_you_mean=did_you_mean, next_step=next_step))
+
+
+def _parent(builder: Builder, path: str, raw: object) -> ParentDeck | None:
+    if raw is None:
+        return None
+    before = len(builder.problems)
+    if not isinstance(raw, dict):
+        builder.problem(path, f"is {raw!r}, not a deck", next_step='write {name = "...", digest = "..."}')
+        return None
+    for key in raw:
+        if key not in _PARENT_FIELDS:
+            rule = f"is not a field of {path}"
+            builder.problem(f"{path}.{key}", rule, did_you_mean=nearest(key, _PARENT_FIELDS))
+    texts = {key: raw.get(key, "") for key in ("name", "digest", "change")}
+    for key, text in texts.items():
+        if not isinstance(text, str) or not (text or key == "change"):
+            builder.problem(f"{path}.{key}", f"is {text!r}, not a text" if key in raw else "is missing")
+    digest = texts["digest"]
+    if isinstance(digest, str) and digest and not re.fullmatch("[0-9a-f]{64}", digest):
+        step = "copy it from `nlsdesign deck check`, or leave the parent out"
+        builder.problem(f"{path}.digest", f"'{digest}' is no SHA-256 of 64 digits", next_step=step)
+    earlier = _parent(builder, f"{path}.parent", raw.get("parent"))
+    return ParentDeck(**texts, parent=earlier) if len(builder.problems) == before else None
 
 
 def _is_part(raw: object) -> bool:

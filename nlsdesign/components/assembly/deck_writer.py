@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Mapping
 from decimal import Context
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, Written
+from ...deck import Deck, ParentDeck, Written
 from ...errors import DeckError, NlsError, nearest
 from ...quantity import Quantity, parse_unit
 from ...writing import write_text
@@ -55,7 +57,7 @@ def declare(deck: Deck) -> Assembly:
 
 def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
     builder = Builder(deck)
-    builder.head()
+    parent = builder.head()
     parts: dict[str, Part | None] = {}
     for name, table in deck.tables.items():
         if not isinstance(table, dict):
@@ -73,7 +75,7 @@ def _declared(deck: Deck) -> tuple[Assembly | None, list[NlsError]]:
     if builder.problems:
         return None, builder.problems
     try:
-        return Assembly(deck.name, complete, deck.description), []
+        return Assembly(deck.name, complete, deck.description, parent), []
     except NlsError as error:
         return None, [error.at(deck.place("deck"))]
 
@@ -87,14 +89,48 @@ def deck_text(assembly: Assembly) -> str:
         Parts, made in Python or read from another deck.
     """
     lines = ["[deck]", f"name = {_string(assembly.name)}", f"description = {_string(assembly.description)}"]
+    if assembly.parent:
+        lines.append(f"parent = {_parent(assembly.parent)}")
+    return "\n".join([*lines, *_parts_lines(assembly, {})]) + "\n"
+
+
+def deck_digest(assembly: Assembly, changed: Mapping[str, Quantity] | None = None) -> str:
+    """Return the SHA-256 of the parts of an assembly as a deck writes them, 64 hexadecimal digits.
+
+    Every number, unit, source, spread and the arrangement count; the table ``[deck]``, with name, description
+    and parent, does not: the same machine under another name has the same digest. Comments and the order of
+    the fields of a part do not count either. The order of parts does, for it is the order of the variables.
+
+    Parameters
+    ----------
+    assembly
+        Parts, made in Python or read from a deck.
+    changed
+        Numbers that stand in place of those of the parts, by full name.
+    """
+    lines = _parts_lines(assembly, changed or {})
+    return hashlib.sha256(("\n".join(lines) + "\n").encode()).hexdigest()
+
+
+def _parts_lines(assembly: Assembly, changed: Mapping[str, Quantity]) -> list[str]:
+    lines: list[str] = []
     for name, part in assembly.parts:
         if isinstance(part, Tie | Gear):
             ends = ", ".join(_string(end) for end in part.between)
             inner = part.element if isinstance(part, Tie) else part
-            lines += _table(name, inner, [f"between = [{ends}]"])
+            lines += _table(name, inner, [f"between = [{ends}]"], changed)
         else:
-            lines += _table(name, part, [f"of = {_string(part.of)}"] if isinstance(part, Sensor) else [])
-    return "\n".join(lines) + "\n"
+            of = [f"of = {_string(part.of)}"] if isinstance(part, Sensor) else []
+            lines += _table(name, part, of, changed)
+    return lines
+
+
+def _parent(parent: ParentDeck) -> str:
+    """Return the deck before this one, and those before it, as an inline table."""
+    fields = {"name": parent.name, "digest": parent.digest, "change": parent.change}
+    items = [f"{key} = {_string(text)}" for key, text in fields.items() if text]
+    items += [f"parent = {_parent(parent.parent)}"] if parent.parent else []
+    return "{" + ", ".join(items) + "}"
 
 
 def write_deck(assembly: Assembly, path: Path) -> None:
@@ -110,14 +146,15 @@ def write_deck(assembly: Assembly, path: Path) -> None:
     write_text(path, deck_text(assembly))
 
 
-def _table(path: str, part: Part, structure: list[str]) -> list[str]:
+def _table(path: str, part: Part, structure: list[str], changed: Mapping[str, Quantity]) -> list[str]:
     lines = ["", f"[{path}]", f"component = {_string(type(part).__name__)}", *structure]
     domain = part.stated_domain()
     if domain:
         lines.append(f"domain = {_string(domain.name)}")
-    lines += [f"{name} = {_number(q)}" for name, q in part.parameters().items()]
+    for name, declared in part.parameters().items():
+        lines.append(f"{name} = {_number(changed.get(f'{path}.{name}', declared))}")
     for name, child in part.children().items():
-        lines += _table(f"{path}.{name}", child, [])
+        lines += _table(f"{path}.{name}", child, [], changed)
     return lines
 
 

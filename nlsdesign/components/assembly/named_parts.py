@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ...deck import ParentDeck
 from ...errors import ArrangementError, NlsError, unknown_name
 from ...quantity import Quantity
 from ..core.element import Element, Parallel
@@ -31,6 +32,9 @@ class Assembly(NotebookCircuits):
         Pairs of name and body, gear, tie or sensor, in written order.
     description
         One sentence.
+    parent
+        The deck that these parts were made from by a design, a fit or a diagnosis; ``None`` where there is
+        none.
 
     Raises
     ------
@@ -41,6 +45,7 @@ class Assembly(NotebookCircuits):
     name: str
     parts: tuple[tuple[str, Part], ...]
     description: str = ""
+    parent: ParentDeck | None = None
 
     def __post_init__(self) -> None:
         # In a deck the table [deck] holds name and description.

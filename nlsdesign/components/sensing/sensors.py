@@ -23,6 +23,7 @@ from ...quantity import Quantity, same_dimension
 from ...symbolic import Expression
 from ..core.element import Scope
 from ..core.part import Part, parameter
+from ..core.part_numbers import NotDeclared, Reading, read_as
 
 Array = NDArray[np.float64]
 
@@ -143,13 +144,41 @@ class Sensor(Part):
         return reading
 
 
+@dataclass(frozen=True)
+class ReadingLimits(Reading):
+    """What a reading of the encoder can be on this machine; they enter no law.
+
+    Generated code does not use a reading beyond them, and its status word says so.
+
+    Examples
+    --------
+    >>> limits = ReadingLimits(lowest_reading=-1.5, highest_reading=1.5, largest_rate=90.0, stale_time=0.1)
+    >>> limits.stale_time
+    0.1
+    """
+
+    lowest_reading: Quantity = parameter("rad", "smallest possible reading", minimum=-1e5, maximum=1e5)
+    highest_reading: Quantity = parameter("rad", "largest possible reading", minimum=-1e5, maximum=1e5)
+    largest_rate: Quantity = parameter("rad/s", "fastest motion", minimum=1e-6, maximum=1e6)
+    stale_time: Quantity = parameter(
+        "s",
+        "time without change while the drive changes",
+        minimum=1e-6,
+        maximum=1e4,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Encoder(Sensor):
-    """Incremental encoder: reading = q·round(θ/q). The reading has no derivative; use the angle for that."""
+    """Incremental encoder: reading = q·round(θ/q). The reading has no derivative; use the angle for that.
+
+    :class:`ReadingLimits` may be declared, for the guards of generated code.
+    """
 
     units: ClassVar[tuple[str, ...]] = ("rad",)
 
     quantum: Quantity = parameter("rad", "angle of one count", minimum=1e-9, maximum=1.0)
+    limits: Reading = read_as(NotDeclared, ReadingLimits, default=NotDeclared())
 
     def read(self, scope: Scope, value: Expression, unit: str) -> Expression:
         """Return the angle rounded to whole counts."""

@@ -87,11 +87,11 @@ class SlopedTables(TableSlope):
 
     def of(self, table: Table, at: Array) -> Array:
         """Return the slope between the grid points around each argument; zero beyond the ends."""
-        last = table.values.shape[0] - 1
-        place = (at - table.lower) / table.step
-        left = np.clip(np.floor(place).astype(int), 0, last - 1)
-        slope: Array = (table.values[left + 1] - table.values[left]) / table.step
-        return np.where(((place >= 0.0) & (place <= last))[:, None], slope, 0.0)
+        grid = table.grid
+        left = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+        cell = (grid[left + 1] - grid[left])[:, None]
+        slope: Array = (table.values[left + 1] - table.values[left]) / cell
+        return np.where(((at >= grid[0]) & (at <= grid[-1]))[:, None], slope, 0.0)
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ class DisturbanceObserver:
         )
         disturbance = writer.low_pass(estimate, apart, corner)
         writer.follow("disturbance_observer.speed.previous", balance.raw_speed)
+        writer.begin("disturbance_observer.load.previous", balance.load)
         writer.follow("disturbance_observer.load.previous", balance.load)
         writer.follow("disturbance_observer.torque", disturbance)
         for i in range(2, self.delay + 3):

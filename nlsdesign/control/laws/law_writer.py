@@ -7,8 +7,11 @@ import math
 import casadi as ca
 
 from ...errors import ArrangementError
-from ...model import FlatModel, Table, Variable
+from ...model import FlatModel, Origin, Table, Variable
 from ...symbolic import Expression
+
+_DEPTH = 3
+"""How many states in a row may begin with one another's values."""
 
 GAIN = "controller"
 """What the names of settings begin with: they belong to no part of the plant."""
@@ -21,12 +24,16 @@ class LawWriter:
     ----------
     sample_time
         In s.
+    origin
+        The deck of the plant that the controller is for.
     """
 
-    def __init__(self, sample_time: float) -> None:
-        self.sample_time = sample_time
+    def __init__(self, sample_time: float, origin: Origin | None = None) -> None:
+        self.sample_time, self.origin = sample_time, origin
         self._states: dict[str, tuple[Variable, Expression]] = {}
         self._following: dict[str, Expression] = {}
+        self._beginning: dict[str, Expression] = {}
+        self._resuming: dict[str, Expression] = {}
         self._inputs: dict[str, tuple[Variable, Expression]] = {}
         self._parameters: dict[str, tuple[Variable, Expression]] = {}
         self._signals: dict[str, tuple[Variable, Expression]] = {}
@@ -95,6 +102,22 @@ class LawWriter:
             raise ArrangementError(f"state '{name}' of a controller", "is declared by two of its parts")
         self._states[name] = (Variable(name, unit, description), ca.SX.sym(name))
         return self._states[name][1]
+
+    def begin(self, name: str, value: Expression, *, resumes: bool = False) -> None:
+        """Say what a state is before the first sample, where that is not zero.
+
+        Parameters
+        ----------
+        name
+            Of the state.
+        value
+            In terms of inputs, parameters and what other states begin with.
+        resumes
+            Whether it is that after a gap in the readings too; other states go on as they were.
+        """
+        self._beginning[name] = value
+        if resumes:
+            self._resuming[name] = value
 
     def follow(self, name: str, value: Expression) -> None:
         """Say what a state is one sample later.
@@ -179,8 +202,20 @@ class LawWriter:
                 ["derivative", "output", "signal", "residual"],
             ),
             sample_time=self.sample_time,
+            origin=self.origin,
             tables=tuple(table for table, _ in self._tables),
+            begin=self._begun(x, u, p, ca.vertcat(*w) if w else ca.SX(0, 1)),
         )
+
+    def _begun(self, x: Expression, u: Expression, p: Expression, w: Expression) -> ca.Function:
+        """Return the states before the first sample, and those after a gap in the readings."""
+        first = ca.SX(ca.vertcat(*[self._beginning.get(name, ca.SX(0)) for name in self._states]))
+        own = [symbol for _, symbol in self._states.values()]
+        again = [self._resuming.get(name, symbol) for name, symbol in zip(self._states, own, strict=True)]
+        begun = ca.SX.zeros(len(own), 1)
+        for _ in range(_DEPTH):
+            begun = ca.substitute(first, ca.SX(x), begun)
+        return ca.Function("begin", [x, u, p, w], [ca.densify(begun), ca.densify(ca.vertcat(*again))])
 
 
 def limited(value: Expression, limit: Expression) -> Expression:

@@ -172,6 +172,7 @@ class PidTorque(TorqueLaw):
         speed = held_speed(writer, asked, self.speed_limit, self.acceleration_limit)
 
         def finish(held: HeldBack) -> None:
+            writer.begin("torque_loop.error.previous", error)
             writer.follow("torque_loop.error.previous", error)
             writer.follow("torque_loop.error.rate", rate)
             one = Integration(

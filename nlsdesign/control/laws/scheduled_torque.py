@@ -87,6 +87,7 @@ class FilteredDifference(DesiredRate):
         before = writer.state("torque_loop.desired.previous", "N*m", "desired torque one sample ago")
         old = writer.state("torque_loop.desired.rate", "N*m/s", "filtered rate of the desired torque")
         rate = writer.low_pass(old, (heard.desired - before) / writer.sample_time, corner)
+        writer.begin("torque_loop.desired.previous", heard.desired)
         writer.follow("torque_loop.desired.previous", heard.desired)
         writer.follow("torque_loop.desired.rate", rate)
         return rate
@@ -193,7 +194,7 @@ class ScheduledTorque(TorqueLaw):
         secant, smallest = _secant(table), int(np.argmin(table.values[:, 0]))
         value = FLOOR_SHARE * secant if self.stiffness_floor is None else self.stiffness_floor
         least = LEAST_FLOOR * secant if table.values[smallest, 0] <= LEAST_FLOOR * secant else 0.0
-        angle = round(table.lower + smallest * table.step, 9) + 0.0
+        angle = round(float(table.grid[smallest]), 9) + 0.0
         if value < least or secant <= 0.0:
             raise ValueRangeError(
                 f"stiffness_floor {value:g} N·m/rad",
@@ -223,6 +224,7 @@ class ScheduledTorque(TorqueLaw):
         before = writer.state("torque_loop.feedforward.previous", "rad/s", "feedforward one sample ago")
         old = writer.state("torque_loop.feedforward.rate", "rad/s^2", "filtered rate of the feedforward")
         rate = writer.low_pass(old, (ahead - before) / writer.sample_time, corner)
+        writer.begin("torque_loop.feedforward.previous", ahead)
         writer.follow("torque_loop.feedforward.previous", ahead)
         writer.follow("torque_loop.feedforward.rate", rate)
         return share * rate
@@ -281,7 +283,7 @@ def _secant(table: Table) -> float:
 
     A mean of the slopes, so that a corner of the law at one angle does not decide.
     """
-    grid = table.lower + table.step * np.arange(len(table.values))
+    grid = table.grid
     slope = table.values[:, 0]
     sides = [(grid >= 0.0), (grid <= 0.0)]
     return max(float(np.mean(slope[side])) for side in sides if np.any(side))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from ...errors import ArrangementError, ValueRangeError
 from ...model import FlatModel, Variable
+from ...model.declared_limits import with_declared_reading
 from .known_drive import KnownDrive
 from .law_writer import LawWriter
 from .outer_laws import Heard, PidTorque, TorqueLaw, check_settings
@@ -141,7 +142,7 @@ def torque_controller(
         raise ValueRangeError(f"sample_time {sample_time:g} s", "must be positive")
     outer, inner = _parts(law, velocity, gains or _gains_by_default(law, velocity, sample_time))
     _check_bandwidths(outer, inner, sample_time)
-    drive, writer = KnownDrive(plant), LawWriter(sample_time)
+    drive, writer = KnownDrive(plant), LawWriter(sample_time, plant.origin)
     names = drive.names
     heard = Heard(
         writer.input(names.desired, "N*m", "torque that the spring should have"),
@@ -161,7 +162,14 @@ def torque_controller(
     )  # fmt: skip
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{supply}"
-    return writer.model("torque_controller", description, (output, motor.current))
+    model = writer.model("torque_controller", description, (output, motor.current))
+    return _with_declared_angle(model, plant, names.angle)
+
+
+def _with_declared_angle(controller: FlatModel, plant: FlatModel, angle: str) -> FlatModel:
+    """Return the controller with what the deck declares of the readings of its angle."""
+    inputs = [with_declared_reading(v, plant, angle) if v.name == angle else v for v in controller.inputs]
+    return replace(controller, inputs=tuple(inputs))
 
 
 def _parts(

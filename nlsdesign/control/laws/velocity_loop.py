@@ -232,6 +232,7 @@ class VelocityLoop:
         )  # fmt: skip
         raw = (heard.angle - before) / writer.sample_time
         speed = writer.low_pass(old, raw, corner)
+        writer.begin(f"{names.angle}.previous", heard.angle, resumes=True)
         writer.follow(f"{names.angle}.previous", heard.angle)
         writer.follow(f"{names.speed}.filtered", speed)
         return raw, speed

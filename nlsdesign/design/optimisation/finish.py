@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...components.assembly.named_parts import Assembly
 from ...errors import NlsError
 from ...model import FlatModel, flatten
+from ...model.derived_deck import derived
 from ...quantity import Quantity, significant
 from ..statics.contour import Contour, contour_from_curvature
 from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
@@ -164,7 +165,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
     return CamDesign(
         target=design.target,
         changes=tuple(solved.changes.items()),
-        actuator=solved.changed,
+        actuator=derived(solved.changed, solved.actuator, "designed"),
         check=solved.check,
         predicted_rms=solved.predicted_rms,
         contour=contour,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from ...components.assembly.named_parts import Assembly
 from ...errors import ConvergenceError, InfeasibleError, NlsError
 from ...model import flatten
+from ...model.derived_deck import derived
 from ...model.roles import series_cam
 from ...processes import parallel_map
 from ..curves.target import Target
@@ -96,7 +97,9 @@ def design_cam(
     design = wanted.chosen(combinations(actuator, choices), settings)
     known, now = actuator.quantities(), design.actuator.quantities()
     stock = [(each.chosen, now[each.chosen]) for each in choices if each.chosen in known]
-    return replace(design, changes=(*stock, *design.changes))
+    # Not from the combination that was tried, but from what was given.
+    made = derived(design.actuator, actuator, "designed")
+    return replace(design, changes=(*stock, *design.changes), actuator=made)
 
 
 @dataclass(frozen=True, eq=False)

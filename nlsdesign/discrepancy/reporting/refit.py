@@ -19,6 +19,7 @@ from ...identification.estimation.least_squares import Fit
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...model import flatten
+from ...model.derived_deck import derived
 from ..blocks.tearing import blocks_of
 from ..screening.other_rig import out_of_reach
 from ..screening.scale_check import scale_findings, typical_sizes
@@ -186,7 +187,8 @@ def refit(
     numbers = fitted_numbers(fits)
     fitted = fitted.as_written()
     gaps = gaps_of(Hypothesis(actuator), fitted, comparison)
-    return Refit(sourced(fitted), fits, numbers, (*gaps, *window_errors), findings)
+    better = derived(sourced(fitted), actuator, "refitted")
+    return Refit(better, fits, numbers, (*gaps, *window_errors), findings)
 
 
 def sourced(hypothesis: Hypothesis) -> Assembly:

@@ -40,12 +40,15 @@ class Real:
         Largest finite number.
     epsilon
         Distance from 1 to the next number.
+    portable
+        Functions of ``math.h`` that are replaced by our own, see :mod:`.elementary`.
     """
 
     name: str
     suffix: str
     largest: float
     epsilon: float
+    portable: frozenset[str] = frozenset()
 
     def round(self, value: float) -> float:
         """Return the number of this type that is nearest to a value.
@@ -98,14 +101,14 @@ class Real:
         return self.literal(min(max(value, -self.largest), self.largest))
 
     def function(self, name: str) -> str:
-        """Return the name of a function of ``math.h`` for this type.
+        """Return the name of a function of ``math.h`` for this type, or of our own in its place.
 
         Parameters
         ----------
         name
             Name for ``double``.
         """
-        return name + self.suffix
+        return ("portable_" if name in self.portable else "") + name + self.suffix
 
 
 DOUBLE = Real("double", "", float(np.finfo(np.float64).max), float(np.finfo(np.float64).eps))

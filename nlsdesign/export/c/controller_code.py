@@ -1,8 +1,7 @@
 """C99 for the controller: a discrete model as ``init`` and ``step`` on a structure that the caller owns.
 
-No heap, no recursion, no mutable data outside the caller's structure, tables ``static const``, no loop: a
-step is straight-line code. For any input states and outputs stay finite, and the status word tells what was
-held or saturated. CasADi generates the arithmetic (see :mod:`.instructions`).
+No heap, recursion, loop, or mutable data outside the caller's structure: a step is straight-line code. States
+and outputs stay finite, the status word says what was held. The arithmetic is CasADi's, see ``instructions``.
 """
 
 from __future__ import annotations
@@ -17,10 +16,14 @@ from ...locations import version
 from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
-from .controller_step import step_body
-from .guarded_step import STATUS_BITS, first_outputs, index_bit
+from .controller_step import measured_inputs, reading_constants, settled_body, step_body, take_body
+from .elementary import elementary_functions, portable
+from .guarded_step import first_outputs
+from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
+from .reading_guard import AGREEING, GAP, MOST
 from .self_test import selftest_source
 from .smooth_only import refuse_jumps
+from .status_bits import STATUS_BITS, index_bit
 from .structures import initialiser, member_paths, structure
 from .table_lookup import indexed_tables, table_data
 
@@ -91,7 +94,7 @@ def export_c(
         source.source: source_text(model, prefix, number),
         source.selftest: selftest_source(model, prefix, number),
     }
-    write_all(texts)
+    write_all({path: stamped(text, model) for path, text in texts.items()})
     return source
 
 
@@ -150,13 +153,24 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
     bits = [f"#define {upper}_{flag} 0x{bit:x}u /* {text} */" for flag, (bit, text) in STATUS_BITS.items()]
     sample_time = real.literal(float(model.sample_time or 0.0))
     values = {"name": name, "NAME": upper, "title": _title(model), "bits": bits, "sample_time": sample_time}
-    return filled("controller.h", values | _heads(name) | structures)
+    count = len(measured_inputs(model))
+    readings = {
+        "reading": filled("controller_reading.h", {"name": name, "real": real.name}).splitlines()
+        if count
+        else [],
+        "readings": [f"{name}_reading readings[{count}]; /* in the order of the inputs */"] if count else [],
+    }
+    texts = values | _heads(name) | structures | readings
+    texts |= {"provenance": origin_macros(model, name), "numbers": number_lines(model)}
+    text = filled("controller.h", texts | {"interface": "0u"})
+    return filled("controller.h", texts | {"interface": interface_version(text, model)})
 
 
 def _title(model: FlatModel) -> list[str]:
     return [
         f"/* {comment(model.name)}: {comment(model.description)}",
         f"   Sample time {model.sample_time!r} s; all numbers in SI units, given in brackets.",
+        *origin_lines(model),
         f"   Written by nlsdesign {version()} with CasADi {ca.CasadiMeta.version()}; do not edit. */",
     ]
 
@@ -185,25 +199,90 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     real
         Number type.
     """
+    real = portable(real)
     body, used = step_body(model, name, real)
+    settled = _settled(model, name, real)
     tables = [table_data(each, real) for each in indexed_tables(model) if each.columns(used)]
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
     names = {"real": real.name, "zero": real.literal(0.0), "name": name, "NAME": name.upper()}
-    guards = [filled("controller_guard.c", names)] if model.inputs else []
-    guards += [filled("controller_parameter.c", names)] if model.parameters else []
     values = {
         "title": _title(model),
-        "tables": [line for table in tables for line in (*table, "")],
+        "tables": [
+            *elementary_functions(real, [*body, *settled]),
+            *(line for table in tables for line in (*table, "")),
+        ],
         "start_parameters": initialiser(model.parameters, real),
         "start_states": initialiser(model.states, real),
         "start_inputs": initialiser(inputs, real),
         "start_outputs": initialiser(outputs, real),
-        "guards": [line for guard in guards for line in (*guard.splitlines(), "")],
+        "guards": _guards(model, real, names),
         "assignments": _assignments(model, real),
+        "start_readings": _start_readings(model, name, real),
+        "settled": settled,
+        "take": [*take_body(model, name, real), *_beginning(model, name)],
         "body": body,
     }
     return filled("controller.c", {**names, **_heads(name), **values})
+
+
+def _guards(model: FlatModel, real: Real, names: dict[str, str]) -> list[str]:
+    """Return the functions that judge commands, readings and parameters, as far as there are any."""
+    largest = "FLT_MAX" if real.name == "float" else "DBL_MAX"
+    numbers: dict[str, str | list[str]] = {
+        **names, "LARGEST": largest, "fabs": real.function("fabs"), "AGREEING": str(AGREEING),
+        "GAP": str(GAP), "MOST": str(MOST), "readings": reading_constants(model, real),
+    }  # fmt: skip
+    count = len(measured_inputs(model))
+    wanted = {
+        "controller_guard.c": len(model.inputs) > count,
+        "controller_reading.c": count > 0,
+        "controller_parameter.c": bool(model.parameters),
+    }
+    texts = [filled(shell, numbers) for shell, is_wanted in wanted.items() if is_wanted]
+    return [line for text in texts for line in (*text.splitlines(), "")]
+
+
+def _start_readings(model: FlatModel, name: str, real: Real) -> list[str]:
+    paths, lines = member_paths(model.inputs), []
+    for reading, number in measured_inputs(model).items():
+        lines.append(f"state->readings[{number}] = ({name}_reading){{0}};")
+        lines.append(f"state->readings[{number}].last = start_inputs.{paths[reading]};")
+    return lines
+
+
+def _settled(model: FlatModel, name: str, real: Real) -> list[str]:
+    """Return the functions that begin and resume, where the states depend on the readings."""
+    if model.begin is None:
+        return []
+    lines: list[str] = []
+    # Without a measured input there are no gaps after which to resume.
+    for which, verb in enumerate(("begin", "resume") if measured_inputs(model) else ("begin",)):
+        words = "rests at its first readings" if which == 0 else "goes on after a gap in its readings"
+        lines += [f"/* Sets the states of a machine that {words}. */"]
+        lines += [f"static void {name}_{verb}({name}_state *state)", "{"]
+        lines += [f"    {line}" for line in settled_body(model, real, which) or ["(void)state;"]]
+        lines += ["}", ""]
+    return lines
+
+
+def _beginning(model: FlatModel, name: str) -> list[str]:
+    """Return the statements that begin with the first usable readings, and resume after a gap."""
+    readings = measured_inputs(model).values()
+    begin = [f"    {name}_begin(state);"] if model.begin is not None else []
+    seen = " && ".join(f"state->readings[{number}].seen != 0u" for number in readings)
+    condition = f"state->begun == 0u && {seen}" if seen else "state->begun == 0u"
+    lines = [f"if ({condition}) {{", *begin, "    state->begun = 1u;"]
+    if readings and model.begin is not None:
+        return [
+            *lines,
+            "} else if (state->begun != 0u && resuming != 0u) {",
+            f"    {name}_resume(state);",
+            "} else {",
+            "    /* goes on, or waits for the first readings */",
+            "}",
+        ]
+    return [*lines, "}"]
 
 
 def _at(variable: Variable, start: float) -> Variable:

@@ -23,7 +23,9 @@ hundred operations, accumulated by stable poles over some ten samples, and still
 
 
 def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
-    """Return an input sequence that sweeps each range, then holds NaN, infinities and excesses.
+    """Return an input sequence that sweeps each range, with NaN, infinities, excesses, a jump and a gap.
+
+    A measured input moves over its usual range, and no faster than is believed.
 
     Parameters
     ----------
@@ -37,23 +39,35 @@ def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
     numpy.ndarray
         Shape (samples, inputs).
     """
-    k = np.arange(SAMPLES)
     columns = np.zeros((SAMPLES, len(model.inputs)))
     for i, variable in enumerate(model.inputs):
         middle, half = _range(variable)
-        wave = 0.6 * np.sin(0.071 * (i + 1) * k + i) + 0.3 * np.sin(0.39 * k + 2 * i)
-        columns[:, i] = middle + half * wave
+        columns[:, i] = middle + half * _wave(variable, half, float(model.sample_time or 0.0), i)
         for at, bad in ((50, math.nan), (60, math.inf), (70, -math.inf)):
             columns[at + i % 8, i] = bad
         if variable.maximum < math.inf:
             columns[80 + i % 8, i] = variable.maximum + 0.1 * half
         if variable.minimum > -math.inf:
             columns[90 + i % 8, i] = variable.minimum - 10.0 * half
+        if variable.plausibility is not None:
+            columns[100 + i % 8, i] += 0.5 * half
+            columns[108 + i % 4 : 112 + i % 4, i] = math.nan
     return np.vectorize(real.round, otypes=[float])(columns) if columns.size else columns
 
 
+def _wave(variable: Variable, half: float, sample_time: float, number: int) -> NDArray[np.float64]:
+    """Return a motion within ±0.9; a measured one is slow enough to be believed."""
+    slow, fast = 0.071 * (number + 1), 0.39
+    k = np.arange(SAMPLES, dtype=float)
+    if variable.plausibility is not None:
+        k *= min(
+            1.0, 0.5 * variable.plausibility.largest_rate * sample_time / (half * (0.6 * slow + 0.3 * fast))
+        )
+    return np.asarray(0.6 * np.sin(slow * k + number) + 0.3 * np.sin(fast * k + 2 * number))
+
+
 def _range(variable: Variable) -> tuple[float, float]:
-    if math.isfinite(variable.minimum) and math.isfinite(variable.maximum):
+    if variable.plausibility is None and math.isfinite(variable.minimum) and math.isfinite(variable.maximum):
         return (variable.minimum + variable.maximum) / 2, (variable.maximum - variable.minimum) / 2
     return variable.start, variable.nominal
 
@@ -81,9 +95,9 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
     values = {
         "name": name,
         "samples": str(len(results)),
-        "given": _rows("given", inputs.tolist(), real),
-        "expected": _rows("expected", outputs.tolist(), real),
-        "tolerance": _rows("tolerance", [tolerance], real),
+        "given": number_rows("given", inputs.tolist(), real),
+        "expected": number_rows("expected", outputs.tolist(), real),
+        "tolerance": number_rows("tolerance", [tolerance], real),
         "status": ", ".join(f"0x{s:x}u" for _, s in results),
         "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
         "comparisons": [_comparison(real, path, i) for i, path in enumerate(y)],
@@ -96,7 +110,18 @@ def _comparison(real: Real, path: str, i: int) -> str:
     return f"differs |= !({difference} <= tolerance[0][{i}]);"
 
 
-def _rows(name: str, rows: Sequence[Sequence[float]], real: Real) -> list[str]:
+def number_rows(name: str, rows: Sequence[Sequence[float]], real: Real) -> list[str]:
+    """Return the definition of a table of constants.
+
+    Parameters
+    ----------
+    name
+        Name of the array.
+    rows
+        Numbers, NaN too.
+    real
+        Number type.
+    """
     width = len(rows[0]) if rows else 0
     if not width:
         return []

@@ -21,6 +21,10 @@ STRICT = (
 )  # fmt: skip
 """Flags that the generated code must pass."""
 
+BASELINE = ("-mcpu=baseline",)
+"""Only instructions that every processor of the platform has: what is built here runs elsewhere too, also in
+emulators and under valgrind. Without it the compiler may take those of the machine it runs on."""
+
 
 @dataclass(frozen=True)
 class Platform:
@@ -201,7 +205,7 @@ def compile_library(
         If the compiler is missing or finds a mistake.
     """
     where = platform or PLATFORMS[host_platform()]
-    arguments: list[str | Path] = ["-target", where.target, "-shared", "-O2", *flags]
+    arguments: list[str | Path] = ["-target", where.target, *BASELINE, "-shared", "-O2", *flags]
     # Same numbers on every machine: no fused multiply-add, IEEE comparisons.
     arguments += ["-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-s"]
     if where.extension == ".so":
@@ -248,6 +252,6 @@ def compile_program(sources: Sequence[Path], target: Path, *, flags: Sequence[st
         If the compiler is missing or finds a mistake.
     """
     where = PLATFORMS[host_platform()]
-    arguments: list[str | Path] = ["-target", where.target, "-O2", "-ffp-contract=off", *flags, *sources]
-    run_compiler([*arguments, "-lm", "-o", target], about=f"{sources[0].name} for {where.name}")
+    arguments: list[str | Path] = ["-target", where.target, *BASELINE, "-O2", "-ffp-contract=off", *flags]
+    run_compiler([*arguments, *sources, "-lm", "-o", target], about=f"{sources[0].name} for {where.name}")
     return target

@@ -13,7 +13,7 @@ from ..c.controller_code import check_discrete, header_text, source_text
 from ..c.controller_step import step_body
 from ..c.instructions import named_indices, print_statements
 from ..c.structures import member_paths
-from ..c.table_lookup import indexed_tables, look_up, table_data
+from ..c.table_lookup import indexed_tables, look_up, look_up_slopes, table_data
 from ..files import filled, shell
 from .fmu_variables import FmuLayout
 
@@ -37,14 +37,17 @@ def fmu_sources(layout: FmuLayout, version: str, token: str) -> dict[str, str]:
     """
     model = layout.model
     main = main_source(version)
-    texts = {main: shell(main), "instance.c": shell("instance.c")}
+    texts = {name: shell(name) for name in (main, "instance.c", "exchange.c", "saved_state.c")}
     if model.sample_time is None:
         if model.tables:
             raise ExportError(
                 f"model '{model.name}'", "is continuous and has tables", next_step="write them as laws"
             )
         body = _continuous(layout)
-        texts["integrator.c"] = shell("integrator.c")
+        texts |= {
+            name: shell(name)
+            for name in ("integrator.c", *(("events.c", "switched.c") if layout.modes else ()))
+        }
     else:
         check_discrete(model)
         name = identifier(model.name)
@@ -68,7 +71,9 @@ def main_source(version: str) -> str:
 
 def _head(layout: FmuLayout, token: str) -> str:
     model, end = layout.model, [layout.extra]
-    signals = layout.signals or end
+    modes = layout.modes or end
+    indicators = layout.indicators or modes
+    signals = layout.signals or indicators
     outputs = layout.outputs or signals
     parameters = layout.parameters or outputs
     inputs = layout.inputs or parameters
@@ -84,6 +89,9 @@ def _head(layout: FmuLayout, token: str) -> str:
         "P": parameters[0].reference,
         "Y": outputs[0].reference,
         "S": signals[0].reference,
+        "Z": indicators[0].reference,
+        "M": modes[0].reference,
+        "SWITCHES": len(layout.modes),
         "EXTRA": layout.extra.reference,
         "VALUES": len(layout.reals),
     }
@@ -107,7 +115,7 @@ def _row(v: Variable) -> str:
 
 def _continuous(layout: FmuLayout) -> str:
     model = layout.model
-    s = model.symbols()
+    s, mode, indicators = _held(layout)
     y, signals = _own(layout, s)
     everything = ca.vertcat(s.time, s.state, s.input, s.parameter)
     seed = ca.SX.sym("seed", everything.numel())
@@ -116,16 +124,57 @@ def _continuous(layout: FmuLayout) -> str:
     slope = ca.densify(ca.jacobian(s.derivative, s.time))
     results = [s.derivative, y, signals]
     targets = [_cells(name, e.numel()) for name, e in zip("fys", results, strict=True)]
-    tangents = [ca.jtimes(e, everything, seed) for e in results]
-    cells = [f"jacobian[{i}][{j}]" for j in range(n) for i in range(n)]
+    moved = [*results, indicators]
+    tangents = [ca.jtimes(e, everything, seed) for e in moved]
+    tangent_targets = [*targets, _cells("z", indicators.numel())]
     values = {
         "nominal": ", ".join(DOUBLE.literal(abs(v.nominal) or 1.0) for v in model.states) or "1.0",
-        "rates": _statements(s, [s.derivative], [_cells("f", n)]),
-        "equations": _statements(s, results, targets),
-        "jacobian": _statements(s, [jacobian, slope], [cells, _cells("slope", n)]),
-        "directional": _statements(s, tangents, targets, seed=seed),
+        "rates": _statements(s, mode, [s.derivative], [_cells("f", n)]),
+        "equations": _statements(s, mode, results, targets),
+        "jacobian": _statements(s, mode, [jacobian, slope], [_table("jacobian", n, n), _cells("slope", n)]),
+        "directional": _statements(s, mode, tangents, tangent_targets, seed=seed),
     }
-    return filled("fmu_continuous.c", values)
+    return filled("fmu_continuous.c", values) + (
+        _switched(layout, s, mode, indicators) if layout.modes else ""
+    )
+
+
+def _held(layout: FmuLayout) -> tuple[Symbols, ca.SX, ca.SX]:
+    """Return the expressions with all modes held, the symbols of the modes and the event indicators."""
+    s, switching = layout.model.symbols(), layout.model.switching
+    if switching is None or not layout.modes:
+        return s, ca.SX(0, 1), ca.SX(0, 1)
+    mode = ca.SX.sym("mode", len(layout.modes))
+    given = [s.time, s.state, s.input, s.parameter, mode]
+    derivative, indicators, _ = switching.branch.call(given)
+    output, signal = switching.shown.call(given)
+    # An output that is a state or a signal is that one; so outputs may have been added to the model.
+    named = {v.name: s.state[i] for i, v in enumerate(layout.model.states)}
+    named |= {v.name: signal[i] for i, v in enumerate(layout.model.signals)}
+    outputs = [named[v.name] if v.name in named else output[i] for i, v in enumerate(layout.model.outputs)]
+    held = s._replace(derivative=derivative, output=ca.SX(ca.vertcat(*outputs)), signal=signal)
+    return held, mode, ca.densify(indicators)
+
+
+def _switched(layout: FmuLayout, s: Symbols, mode: ca.SX, indicators: ca.SX) -> str:
+    """Return what the switches need: modes at a state, indicators with slopes, what follows a landing."""
+    switching = layout.model.switching
+    if switching is None:
+        return ""
+    n, k = len(layout.model.states), len(layout.modes)
+    given = [s.time, s.state, s.input, s.parameter]
+    natural = switching.natural.call(given)
+    slope = ca.jtimes(indicators, s.state, s.derivative) + ca.jacobian(indicators, s.time)
+    follows = switching.landing.call([*given, mode])
+    targets = [_cells("rate", k), _cells("target", k), _cells("leads", k)]
+    targets += [_table("reach", n, k), _table("slope", k, n)]
+    values = {
+        "holds": ", ".join(str(int(holds)) for holds in switching.holds),
+        "natural": _statements(s, mode, natural, [_cells("m", k)]),
+        "indicators": _statements(s, mode, [indicators, slope], [_cells("z", k), _cells("slope", k)]),
+        "landing": _statements(s, mode, follows, targets),
+    }
+    return filled("fmu_switched.c", values)
 
 
 def _own(layout: FmuLayout, s: Symbols) -> tuple[ca.SX, ca.SX]:
@@ -144,19 +193,24 @@ def _cells(name: str, count: int) -> list[str]:
     return [f"{name}[{i}]" for i in range(count)]
 
 
+def _table(name: str, rows: int, columns: int) -> list[str]:
+    return [f"{name}[{i}][{j}]" for j in range(columns) for i in range(rows)]
+
+
 def _statements(
     s: Symbols,
+    mode: ca.SX,
     results: Sequence[ca.SX],
     targets: Sequence[Sequence[str]],
     *,
     seed: ca.SX | None = None,
 ) -> list[str]:
-    """Return the body of a function of (t, x, u, p), and of a direction (dt, dx, du, dp) with a seed."""
-    groups, texts = [s.time, s.state, s.input, s.parameter], [["t"]]
-    texts += [_cells(name, e.numel()) for name, e in zip("xup", groups[1:], strict=True)]
+    """Return the body of a function of (t, x, u, p, m), and of a direction (dt, dx, du, dp) with a seed."""
+    groups, texts = [s.time, s.state, s.input, s.parameter, mode], [["t"]]
+    texts += [_cells(name, e.numel()) for name, e in zip("xupm", groups[1:], strict=True)]
     if seed is not None:
         groups.append(seed)
-        texts.append(["dt"] + [f"d{cell}" for group in texts[1:] for cell in group])
+        texts.append(["dt"] + [f"d{cell}" for group in texts[1:-1] for cell in group])
     function = ca.Function("f", groups, [ca.densify(e) for e in results], {"cse": True})
     return print_statements(function, texts, targets, real=DOUBLE)
 
@@ -171,9 +225,12 @@ def _discrete(layout: FmuLayout, name: str) -> str:
     given = [path for path, v in zip(y, model.outputs, strict=True) if v.name in own]
     lookups, signals, looked_up = _signals(layout)
     _, known = step_body(model, name, DOUBLE)
+    directional, sloped = _directional(layout)
+    looked_up |= sloped
     missing = [t for t in indexed_tables(model) if t.columns(looked_up) and not t.columns(known)]
     values = {
         "name": name,
+        "NAME": name.upper(),
         "tables": [line for each in missing for line in (*table_data(each, DOUBLE), "")],
         "parameters": [f"parameters.{path} = p[{i}];" for i, path in enumerate(p)],
         "start": [f"memory->states.{path} = x[{i}];" for i, path in enumerate(x)],
@@ -181,8 +238,47 @@ def _discrete(layout: FmuLayout, name: str) -> str:
         "states": [f"x[{i}] = before.{path};" for i, path in enumerate(x)],
         "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(given)],
         "signals": [*lookups, *signals],
+        "directional": directional,
     }
     return filled("fmu_discrete.c", values)
+
+
+def _directional(layout: FmuLayout) -> tuple[list[str], set[int]]:
+    """Return how what a sample shows changes in a direction, and the looked-up numbers used."""
+    model = layout.model
+    s = model.symbols()
+    groups = {
+        "x": (model.states, s.state),
+        "u": (model.inputs, s.input),
+        "p": (model.parameters, s.parameter),
+    }
+    places = {"u": "memory->inputs", "p": "memory->parameters"}
+    texts = {
+        letter: [f"{places[letter]}.{path}" for path in member_paths(group).values()]
+        if letter in places
+        else _cells(letter, len(group))
+        for letter, (group, _) in groups.items()
+    }
+    count = s.table.numel()
+    seeds = [ca.SX.sym(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
+    seeds.append(ca.SX.sym("dw", count))
+    of = [e for _, e in groups.values()] + [s.table]
+    results = [ca.jtimes(e, ca.vertcat(*of), ca.vertcat(*seeds)) for e in _own(layout, s)]
+    function = ca.Function("d", [*of, *seeds], [ca.densify(e) for e in results], {"cse": True})
+    given = [*texts.values(), [f"w{i}" for i in range(count)]]
+    given += [_cells(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
+    given.append([f"dw{i}" for i in range(count)])
+    targets = [_cells(name, e.numel()) for name, e in zip(("dy", "ds"), results, strict=True)]
+    statements = print_statements(function, given, targets, real=DOUBLE)
+    sloped = named_indices(statements, "dw")
+    used = named_indices(statements, "w") | sloped
+    names = {v.name: (texts[letter][i], f"d{letter}[{i}]")
+             for letter in "xu" for i, v in enumerate(groups[letter][0])}  # fmt: skip
+    arguments = {name: text for name, (text, _) in names.items()}
+    columns = [names[table.argument][1] for table in model.tables for _ in table.columns]
+    changes = [f"const double dw{i} = slope{i} * {columns[i]};" for i in sorted(sloped)]
+    slopes = look_up_slopes(model, DOUBLE, arguments, sloped)
+    return [*look_up(model, DOUBLE, arguments, used), *slopes, *changes, *statements], used
 
 
 def _signals(layout: FmuLayout) -> tuple[list[str], list[str], set[int]]:

@@ -1,22 +1,28 @@
 """The variables of an FMU: their order, causality and variability.
 
 A value reference is an index into one array; the groups are in the order time, states, derivatives,
-inputs, parameters, outputs, signals, one extra, and behind them the status word. An output that is a state is
-one variable, as is a signal that is an output.
+inputs, parameters, outputs, signals, event indicators, modes, one extra, and behind them the status word.
+An output that is a state is one variable, as is a signal that is an output.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
+from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
+from .event_variables import indicator_variables, mode_variables
+from .expression_walk import EVERYTHING, Interval, ranges
+from .terminals import with_flange_outputs
+from .typical_sizes import typical_sizes, with_sizes
 
 RELATIVE_TOLERANCE = 1e-8
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
@@ -64,7 +70,7 @@ class FmuLayout:
     ----------
     model
         The model.
-    time, states, derivatives, inputs, parameters, outputs, signals, extra, status
+    time, states, derivatives, inputs, parameters, outputs, signals, indicators, modes, extra, status
         The groups in the order of the value references. ``outputs`` and ``signals`` leave out states and
         variables named before; ``extra`` is the tolerance of the integrator, or the sample time.
     """
@@ -77,6 +83,8 @@ class FmuLayout:
     parameters: tuple[FmuVariable, ...]
     outputs: tuple[FmuVariable, ...]
     signals: tuple[FmuVariable, ...]
+    indicators: tuple[FmuVariable, ...]
+    modes: tuple[FmuVariable, ...]
     extra: FmuVariable
     status: tuple[FmuVariable, ...]
 
@@ -84,7 +92,8 @@ class FmuLayout:
     def reals(self) -> tuple[FmuVariable, ...]:
         """All but the status word; the position is the value reference."""
         groups = (self.states, self.derivatives, self.inputs, self.parameters, self.outputs, self.signals)
-        return (self.time, *[each for group in groups for each in group], self.extra)
+        inside = [each for group in (*groups, self.indicators, self.modes) for each in group]
+        return (self.time, *inside, self.extra)
 
     @property
     def everything(self) -> tuple[FmuVariable, ...]:
@@ -113,6 +122,9 @@ def layout(model: FlatModel) -> FmuLayout:
     continuous = model.sample_time is None
     changing = "continuous" if continuous else "discrete"
     _check_names(model)
+    model = with_flange_outputs(model)
+    sizes = typical_sizes(model)
+    model = _as_shown(model, sizes)
     outputs, signals = _named_once(model)
     given_out = {v.name for v in model.outputs}
     number = iter(range(10**9))
@@ -128,7 +140,7 @@ def layout(model: FlatModel) -> FmuLayout:
         for v in model.states
     )
     derivatives = tuple(
-        FmuVariable(next(number), _rate(s.variable), "local", changing, "calculated", s.reference)
+        FmuVariable(next(number), _rate(s.variable, sizes), "local", changing, "calculated", s.reference)
         for s in states
         if continuous
     )
@@ -142,15 +154,53 @@ def layout(model: FlatModel) -> FmuLayout:
         group(model.parameters, "parameter", "fixed" if continuous else "tunable", None),
         group(outputs, "output", changing, "calculated"),
         group(signals, "local", changing, "calculated"),
+        group(indicator_variables(model), "local", changing, "calculated"),
+        group(mode_variables(model), "local", "discrete", "calculated"),
         _extra(model, next(number)),
         () if continuous else (_status(next(number)),),
     )
 
 
-def _rate(state: Variable) -> Variable:
+def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
+    """Return the model with typical sizes, and with ranges that hold whatever the parameters are tuned to."""
+    s = model.symbols()
+    groups = [s.time, s.state, s.input, s.parameter, s.table]
+    # The guards of a sampled model keep its inputs in their range; those of a plant are only warned of.
+    bounds = [
+        [EVERYTHING],
+        [EVERYTHING] * len(model.states),
+        [(v.minimum, v.maximum) if model.sample_time else EVERYTHING for v in model.inputs],
+        [(v.minimum, v.maximum) for v in model.parameters],
+        [EVERYTHING] * s.table.numel(),
+    ]
+
+    def tuned(variables: Sequence[Variable], expressions: ca.SX) -> list[Variable]:
+        intervals = ranges(ca.Function("shown", groups, [ca.densify(expressions)]), bounds)
+        depends = ca.jacobian_sparsity(expressions, s.parameter).row()
+        return [
+            _widened(v, interval) if v.bounded and i in depends else v
+            for i, (v, interval) in enumerate(zip(variables, intervals, strict=True))
+        ]
+
+    signals = tuned(model.signals, s.signal) if model.sample_time else model.signals
+    return replace(
+        model,
+        states=with_sizes(model.states, sizes),
+        inputs=with_sizes(model.inputs, sizes),
+        outputs=with_sizes(tuned(model.outputs, s.output), sizes),
+        signals=with_sizes(signals, sizes),
+    )
+
+
+def _widened(v: Variable, interval: Interval) -> Variable:
+    return replace(v, minimum=min(v.minimum, interval[0]), maximum=max(v.maximum, interval[1]))
+
+
+def _rate(state: Variable, sizes: Mapping[str, float]) -> Variable:
     unit = state.unit + "^2" if state.unit.endswith("/s") else f"{state.unit}/s"
     text = f"Rate of change: {state.description}"
-    return Variable(f"der({state.name})", unit, text, nominal=state.nominal)
+    name = f"der({state.name})"
+    return Variable(name, unit, text, nominal=sizes[name])
 
 
 def _extra(model: FlatModel, reference: int) -> FmuVariable:
@@ -163,10 +213,10 @@ def _extra(model: FlatModel, reference: int) -> FmuVariable:
 
 
 def _status(reference: int) -> FmuVariable:
-    text = (
-        "Status word of the last sample: bit 0 input held, 1 input saturated, 2 state held, 3 output held; "
-        "bit 8 + i: input i"
+    bits = ", ".join(
+        f"{bit.bit_length() - 1} {flag.lower().replace('_', ' ')}" for flag, (bit, _) in STATUS_BITS.items()
     )
+    text = f"Status word of the last sample: bit {bits}; bit {FIRST_INDEX_BIT} + i: input i"
     status = Variable("sample.status", "1", text)
     return FmuVariable(reference, status, "local", "discrete", "calculated", integer=True)
 
@@ -178,6 +228,7 @@ def _check_names(model: FlatModel) -> None:
         else ("time", "sample.time", "sample.status")
     )
     taken = dict.fromkeys(own, "variable of every FMU")
+    known = {v.name for v in (*model.outputs, *model.signals)}
     for kind, group in (("state", model.states), ("input", model.inputs), ("parameter", model.parameters)):
         for variable in group:
             if not _NAME.fullmatch(variable.name):
@@ -191,6 +242,10 @@ def _check_names(model: FlatModel) -> None:
                     next_step="rename one of them",
                 )
             taken[variable.name] = kind
+    for variable in (*indicator_variables(model), *mode_variables(model)):
+        if not _NAME.fullmatch(variable.name) or variable.name in known | taken.keys():
+            raise ExportError(f"switch '{variable.name}'", "its name is taken", next_step="rename a part")
+        taken[variable.name] = "switch"
     for variable in model.outputs:
         if taken.get(variable.name, "state") != "state":
             raise ExportError(

@@ -1,4 +1,5 @@
 @title@
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 
@@ -45,13 +46,39 @@ void @name@_defaults(@name@_parameters *parameters)
     state->states = start_states;
     state->inputs = start_inputs;
     state->outputs = start_outputs;
+    @start_readings@
+    state->begun = 0u;
     return parameters == NULL ? 0u : @name@_set_parameters(state, parameters);
 }
 
-@step@
+@settled@
+/* Takes the inputs of a sample; begins with the first usable readings. */
+static uint32_t @name@_take(@name@_state *state, const @name@_inputs *inputs)
+{
+    uint32_t status = 0u;
+
+    @take@
+    return status;
+}
+
+/* Computes the outputs of this sample and the state of the next from the inputs that were taken. */
+static uint32_t @name@_advance(@name@_state *state, @name@_outputs *outputs)
 {
     uint32_t status = 0u;
 
     @body@
+    return status;
+}
+
+@step@
+{
+    uint32_t status = @name@_take(state, inputs);
+
+    if (state->begun == 0u) {
+        *outputs = state->outputs;
+        status |= @NAME@_WAITING;
+    } else {
+        status |= @name@_advance(state, outputs);
+    }
     return status;
 }

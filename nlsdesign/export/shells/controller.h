@@ -9,9 +9,11 @@ extern "C" {
 #endif
 
 #define @NAME@_SAMPLE_TIME @sample_time@ /* s */
+@provenance@
+#define @NAME@_INTERFACE_VERSION @interface@ /* another one where structures, functions or units differ */
 
-/* Bits of the status word. Bit 8 + i names input i (of step) or parameter i (of init and
-   set_parameters) as numbered below; bit 30 stands for all from 22 on. */
+/* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
+   set_parameters) as numbered below; bit 30 stands for all from 14 on. */
 @bits@
 
 @inputs@
@@ -22,18 +24,22 @@ extern "C" {
 
 @states@
 
+@reading@
 /* One running instance; the caller owns it, there may be many. */
 typedef struct {
     @name@_parameters parameters;
     @name@_states states;
-    @name@_inputs inputs; /* last good */
+    @name@_inputs inputs; /* as they were taken */
     @name@_outputs outputs; /* last good */
+    @readings@
+    uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
 } @name@_state;
 
 /* Gives the parameters of the design. */
 void @name@_defaults(@name@_parameters *parameters);
 
-/* Starts an instance; null stands for the parameters of the design. Returns a status word. */
+/* Starts an instance; null stands for the parameters of the design. The first step takes its states from the
+   first usable readings, of a machine at rest. Returns a status word. */
 @init@;
 
 /* Takes over parameters, each only if it is within its range. Returns a status word. */
@@ -45,5 +51,6 @@ void @name@_defaults(@name@_parameters *parameters);
 #ifdef __cplusplus
 }
 #endif
+@numbers@
 
 #endif

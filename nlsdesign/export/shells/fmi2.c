@@ -1,4 +1,4 @@
-/* FMI 2.0 for co-simulation. */
+/* FMI 2.0 for co-simulation and, of a continuous model, model exchange. */
 #include "fmi2Functions.h"
 
 #include "instance.c"
@@ -21,8 +21,8 @@ static void report2(const instance *me, int status, const char *category, const 
     if ((me) == NULL || !allowed((instance *)(me), phases, function)) \
     return fmi2Error
 
-#define ANY_TIME (INSTANTIATED | INITIALIZATION | STEPPING | TERMINATED | FAILED)
-#define RUNNING (INITIALIZATION | STEPPING)
+#define RUNNING (INITIALIZATION | STEPPING | EVENT | CONTINUOUS)
+#define ANY_TIME (INSTANTIATED | RUNNING | TERMINATED | FAILED)
 
 static fmi2Status unsupported(fmi2Component me, const char *function)
 {
@@ -57,15 +57,15 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     (void)resources, (void)visible;
-    if (name == NULL || guid == NULL || strcmp(guid, MODEL_TOKEN) != 0 || type != fmi2CoSimulation) {
+    if (name == NULL || guid == NULL || strcmp(guid, MODEL_TOKEN) != 0 || (type == fmi2ModelExchange && !MODEL_CONTINUOUS)) {
         if (callbacks != NULL && callbacks->logger != NULL) {
             callbacks->logger(callbacks->componentEnvironment, name, fmi2Error, "logStatusError",
-                              type != fmi2CoSimulation ? "this model offers co-simulation only"
-                                                       : "the GUID is that of another model");
+                              type == fmi2ModelExchange && !MODEL_CONTINUOUS ? "a sampled model offers co-simulation only"
+                                                                             : "the GUID is that of another model");
         }
         return NULL;
     }
-    instance2 *me = (instance2 *)(void *)establish(sizeof(instance2), name, report2);
+    instance2 *me = (instance2 *)(void *)establish(sizeof(instance2), name, type == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION, report2);
     if (me != NULL) {
         me->callbacks = callbacks;
         me->base.solver_logged = logging;
@@ -105,12 +105,12 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component me)
 fmi2Status fmi2ExitInitializationMode(fmi2Component me)
 {
     RETURN_UNLESS(me, INITIALIZATION, "fmi2ExitInitializationMode");
-    return (fmi2Status)enter_stepping(me);
+    return (fmi2Status)leave_initialization(me);
 }
 
 fmi2Status fmi2Terminate(fmi2Component me)
 {
-    RETURN_UNLESS(me, STEPPING | FAILED, "fmi2Terminate");
+    RETURN_UNLESS(me, STEPPING | EVENT | CONTINUOUS | FAILED, "fmi2Terminate");
     ((instance *)me)->now.phase = TERMINATED;
     return fmi2OK;
 }
@@ -118,7 +118,7 @@ fmi2Status fmi2Terminate(fmi2Component me)
 fmi2Status fmi2Reset(fmi2Component me)
 {
     RETURN_UNLESS(me, ANY_TIME, "fmi2Reset");
-    begin(me);
+    begin(me, ((instance *)me)->now.purpose);
     ((instance2 *)me)->set_up = 0;
     return fmi2OK;
 }
@@ -127,7 +127,8 @@ fmi2Status fmi2DoStep(fmi2Component me, fmi2Real from, fmi2Real length, fmi2Bool
 {
     (void)no_set_state_before;
     RETURN_UNLESS(me, STEPPING, "fmi2DoStep");
-    return (fmi2Status)do_step(me, from, length);
+    int event = 0;
+    return (fmi2Status)do_step(me, from, length, &event);
 }
 
 fmi2Status fmi2GetReal(fmi2Component me, const fmi2ValueReference references[], size_t count, fmi2Real values[])
@@ -173,8 +174,10 @@ fmi2Status fmi2GetFMUstate(fmi2Component me, fmi2FMUstate *state)
 fmi2Status fmi2SetFMUstate(fmi2Component me, fmi2FMUstate state)
 {
     RETURN_UNLESS(me, ANY_TIME, "fmi2SetFMUstate");
-    ((instance2 *)me)->set_up = 1; /* a copy holds the start and stop time too */
-    return (fmi2Status)restore_state(me, state);
+    const fmi2Status done = (fmi2Status)restore_state(me, state);
+    /* A copy holds the start and stop time too. */
+    ((instance2 *)me)->set_up = ((instance2 *)me)->set_up || done == fmi2OK;
+    return done;
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component me, fmi2FMUstate *state)
@@ -264,3 +267,76 @@ fmi2Status fmi2CancelStep(fmi2Component me)
 NO_STATUS(GetStatus, fmi2Status)
 NO_STATUS(GetIntegerStatus, fmi2Integer)
 NO_STATUS(GetStringStatus, fmi2String)
+
+/* Model exchange. */
+fmi2Status fmi2EnterEventMode(fmi2Component me)
+{
+    RETURN_UNLESS(me, EVENT | CONTINUOUS, "fmi2EnterEventMode");
+    enter_event_mode(me);
+    return fmi2OK;
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component me, fmi2EventInfo *info)
+{
+    RETURN_UNLESS(me, EVENT, "fmi2NewDiscreteStates");
+    int changed = 0;
+    const fmi2Status done = (fmi2Status)update_discrete(me, &changed);
+    info->newDiscreteStatesNeeded = info->terminateSimulation = info->nominalsOfContinuousStatesChanged = fmi2False;
+    info->valuesOfContinuousStatesChanged = changed;
+    info->nextEventTimeDefined = fmi2False;
+    info->nextEventTime = 0.0;
+    return done;
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component me)
+{
+    RETURN_UNLESS(me, EVENT, "fmi2EnterContinuousTimeMode");
+    ((instance *)me)->now.phase = CONTINUOUS;
+    return fmi2OK;
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component me, fmi2Boolean no_set_state_before, fmi2Boolean *event,
+                                       fmi2Boolean *terminate)
+{
+    (void)no_set_state_before;
+    RETURN_UNLESS(me, CONTINUOUS, "fmi2CompletedIntegratorStep");
+    *event = event_is_due(me);
+    *terminate = fmi2False;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetTime(fmi2Component me, fmi2Real time)
+{
+    RETURN_UNLESS(me, EVENT | CONTINUOUS, "fmi2SetTime");
+    return (fmi2Status)set_time(me, time);
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component me, const fmi2Real x[], size_t count)
+{
+    RETURN_UNLESS(me, EVENT | CONTINUOUS, "fmi2SetContinuousStates");
+    return (fmi2Status)set_states(me, x, count);
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component me, fmi2Real rates[], size_t count)
+{
+    RETURN_UNLESS(me, EVENT | CONTINUOUS | TERMINATED | FAILED, "fmi2GetDerivatives");
+    return (fmi2Status)get_rates(me, rates, count);
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component me, fmi2Real indicators[], size_t count)
+{
+    RETURN_UNLESS(me, RUNNING | TERMINATED | FAILED, "fmi2GetEventIndicators");
+    return (fmi2Status)get_indicators(me, indicators, count);
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component me, fmi2Real x[], size_t count)
+{
+    RETURN_UNLESS(me, RUNNING | TERMINATED | FAILED, "fmi2GetContinuousStates");
+    return (fmi2Status)get_states(me, x, count);
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component me, fmi2Real nominals[], size_t count)
+{
+    RETURN_UNLESS(me, ANY_TIME, "fmi2GetNominalsOfContinuousStates");
+    return (fmi2Status)get_nominals(me, nominals, count);
+}

@@ -1,4 +1,4 @@
-/* FMI 3.0 for co-simulation. */
+/* FMI 3.0 for co-simulation and, of a continuous model, model exchange. */
 #include "fmi3Functions.h"
 
 #include "instance.c"
@@ -21,8 +21,8 @@ static void report3(const instance *me, int status, const char *category, const 
     if ((me) == NULL || !allowed((instance *)(me), phases, function)) \
     return fmi3Error
 
-#define ANY_TIME (INSTANTIATED | INITIALIZATION | STEPPING | TERMINATED | FAILED)
-#define RUNNING (INITIALIZATION | STEPPING)
+#define RUNNING (INITIALIZATION | STEPPING | EVENT | CONTINUOUS)
+#define ANY_TIME (INSTANTIATED | RUNNING | TERMINATED | FAILED)
 
 static fmi3Status unsupported(fmi3Instance me, const char *function)
 {
@@ -48,21 +48,19 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance me, fmi3Boolean on, size_t count, co
     return fmi3OK;
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-                                         fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
-                                         const fmi3ValueReference intermediate[], size_t intermediate_count,
-                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
-                                         fmi3IntermediateUpdateCallback update)
+static fmi3Instance created(fmi3String name, fmi3String token, fmi3Boolean logging, int purpose,
+                            fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, const char *refusal)
 {
-    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)intermediate_count, (void)update;
-    if (name == NULL || token == NULL || strcmp(token, MODEL_TOKEN) != 0 || event_mode) {
+    if (refusal == NULL && (name == NULL || token == NULL || strcmp(token, MODEL_TOKEN) != 0)) {
+        refusal = "the instantiation token is that of another model";
+    }
+    if (refusal != NULL) {
         if (log != NULL) {
-            log(environment, fmi3Error, "logStatusError",
-                event_mode ? "there is no event mode" : "the instantiation token is that of another model");
+            log(environment, fmi3Error, "logStatusError", refusal);
         }
         return NULL;
     }
-    instance3 *me = (instance3 *)(void *)establish(sizeof(instance3), name, report3);
+    instance3 *me = (instance3 *)(void *)establish(sizeof(instance3), name, purpose, report3);
     if (me != NULL) {
         me->environment = environment;
         me->log = log;
@@ -71,15 +69,28 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     return me;
 }
 
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const fmi3ValueReference intermediate[], size_t intermediate_count,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                         fmi3IntermediateUpdateCallback update)
+{
+    (void)resources, (void)visible, (void)intermediate, (void)intermediate_count, (void)update;
+    instance3 *me = created(name, token, logging, event_mode ? CO_SIMULATION_WITH_EVENTS : CO_SIMULATION, environment,
+                            log, event_mode && MODEL_SWITCHES == 0 ? "this model has no events" : NULL);
+    if (me != NULL) {
+        me->base.may_return_early = event_mode && early_return;
+    }
+    return me;
+}
+
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
                                           fmi3Boolean logging, fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log)
 {
-    (void)name, (void)token, (void)resources, (void)visible, (void)logging;
-    if (log != NULL) {
-        log(environment, fmi3Error, "logStatusError", "this model offers co-simulation only");
-    }
-    return NULL;
+    (void)resources, (void)visible;
+    return created(name, token, logging, MODEL_EXCHANGE, environment, log,
+                   MODEL_CONTINUOUS ? NULL : "a sampled model offers co-simulation only");
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
@@ -88,8 +99,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
                                                fmi3ClockUpdateCallback update, fmi3LockPreemptionCallback lock,
                                                fmi3UnlockPreemptionCallback unlock)
 {
-    (void)update, (void)lock, (void)unlock;
-    return fmi3InstantiateModelExchange(name, token, resources, visible, logging, environment, log);
+    (void)resources, (void)visible, (void)update, (void)lock, (void)unlock;
+    return created(name, token, logging, CO_SIMULATION, environment, log, "this model offers no scheduled execution");
 }
 
 void fmi3FreeInstance(fmi3Instance me)
@@ -117,12 +128,12 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance me, fmi3Boolean has_toleranc
 fmi3Status fmi3ExitInitializationMode(fmi3Instance me)
 {
     RETURN_UNLESS(me, INITIALIZATION, "fmi3ExitInitializationMode");
-    return (fmi3Status)enter_stepping(me);
+    return (fmi3Status)leave_initialization(me);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance me)
 {
-    RETURN_UNLESS(me, STEPPING | FAILED, "fmi3Terminate");
+    RETURN_UNLESS(me, STEPPING | EVENT | CONTINUOUS | FAILED, "fmi3Terminate");
     ((instance *)me)->now.phase = TERMINATED;
     return fmi3OK;
 }
@@ -130,7 +141,7 @@ fmi3Status fmi3Terminate(fmi3Instance me)
 fmi3Status fmi3Reset(fmi3Instance me)
 {
     RETURN_UNLESS(me, ANY_TIME, "fmi3Reset");
-    begin(me);
+    begin(me, ((instance *)me)->now.purpose);
     return fmi3OK;
 }
 
@@ -139,8 +150,11 @@ fmi3Status fmi3DoStep(fmi3Instance me, fmi3Float64 from, fmi3Float64 length, fmi
 {
     (void)no_set_state_before;
     RETURN_UNLESS(me, STEPPING, "fmi3DoStep");
-    const int status = do_step(me, from, length);
-    *event = *terminate = *early = false;
+    int found = 0;
+    const int status = do_step(me, from, length, &found);
+    *event = found != 0;
+    *terminate = false;
+    *early = found && ((instance *)me)->now.time < from + length;
     *last_time = ((instance *)me)->now.time;
     return (fmi3Status)status;
 }
@@ -225,6 +239,108 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance me, const fmi3Byte bytes[], size
     return (fmi3Status)read_state(me, bytes, size, state);
 }
 
+/* Model exchange and event mode. */
+fmi3Status fmi3EnterEventMode(fmi3Instance me)
+{
+    const int steps = me != NULL && ((instance *)me)->now.purpose == CO_SIMULATION_WITH_EVENTS ? STEPPING : 0;
+    RETURN_UNLESS(me, EVENT | CONTINUOUS | steps, "fmi3EnterEventMode");
+    enter_event_mode(me);
+    return fmi3OK;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance me, fmi3Boolean *again, fmi3Boolean *terminate,
+                                    fmi3Boolean *nominals_changed, fmi3Boolean *states_changed,
+                                    fmi3Boolean *next_event_defined, fmi3Float64 *next_event)
+{
+    RETURN_UNLESS(me, EVENT, "fmi3UpdateDiscreteStates");
+    int changed = 0;
+    const fmi3Status done = (fmi3Status)update_discrete(me, &changed);
+    *again = *terminate = *nominals_changed = *next_event_defined = false;
+    *states_changed = changed != 0;
+    *next_event = 0.0;
+    return done;
+}
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance me)
+{
+    RETURN_UNLESS(me, EVENT, "fmi3EnterContinuousTimeMode");
+    if (((instance *)me)->now.purpose != MODEL_EXCHANGE) {
+        return unsupported(me, "fmi3EnterContinuousTimeMode");
+    }
+    ((instance *)me)->now.phase = CONTINUOUS;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance me)
+{
+    RETURN_UNLESS(me, EVENT, "fmi3EnterStepMode");
+    if (((instance *)me)->now.purpose != CO_SIMULATION_WITH_EVENTS) {
+        return unsupported(me, "fmi3EnterStepMode");
+    }
+    ((instance *)me)->now.phase = STEPPING;
+    return fmi3OK;
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance me, fmi3Boolean no_set_state_before, fmi3Boolean *event,
+                                       fmi3Boolean *terminate)
+{
+    (void)no_set_state_before;
+    RETURN_UNLESS(me, CONTINUOUS, "fmi3CompletedIntegratorStep");
+    *event = event_is_due(me) != 0;
+    *terminate = false;
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetTime(fmi3Instance me, fmi3Float64 time)
+{
+    RETURN_UNLESS(me, EVENT | CONTINUOUS, "fmi3SetTime");
+    return (fmi3Status)set_time(me, time);
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance me, const fmi3Float64 x[], size_t count)
+{
+    RETURN_UNLESS(me, EVENT | CONTINUOUS, "fmi3SetContinuousStates");
+    return (fmi3Status)set_states(me, x, count);
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance me, fmi3Float64 rates[], size_t count)
+{
+    RETURN_UNLESS(me, RUNNING | TERMINATED | FAILED, "fmi3GetContinuousStateDerivatives");
+    return (fmi3Status)get_rates(me, rates, count);
+}
+
+fmi3Status fmi3GetEventIndicators(fmi3Instance me, fmi3Float64 indicators[], size_t count)
+{
+    RETURN_UNLESS(me, RUNNING | TERMINATED | FAILED, "fmi3GetEventIndicators");
+    return (fmi3Status)get_indicators(me, indicators, count);
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance me, fmi3Float64 x[], size_t count)
+{
+    RETURN_UNLESS(me, RUNNING | TERMINATED | FAILED, "fmi3GetContinuousStates");
+    return (fmi3Status)get_states(me, x, count);
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance me, fmi3Float64 nominals[], size_t count)
+{
+    RETURN_UNLESS(me, ANY_TIME, "fmi3GetNominalsOfContinuousStates");
+    return (fmi3Status)get_nominals(me, nominals, count);
+}
+
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance me, size_t *count)
+{
+    RETURN_UNLESS(me, ANY_TIME, "fmi3GetNumberOfEventIndicators");
+    *count = MODEL_SWITCHES;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance me, size_t *count)
+{
+    RETURN_UNLESS(me, ANY_TIME, "fmi3GetNumberOfContinuousStates");
+    *count = MODEL_CONTINUOUS ? MODEL_STATES : 0;
+    return fmi3OK;
+}
+
 /* What the standard names and this model does not have. */
 #define REF const fmi3ValueReference references[]
 #define NO_TYPE(Type)                                                                                                \
@@ -259,12 +375,9 @@ NO_TYPE(String)
         return unsupported(me, "fmi3" #Name);         \
     }
 #define ME fmi3Instance me
-NO_FUNCTION(EnterEventMode, (ME), )
 NO_FUNCTION(EnterConfigurationMode, (ME), )
 NO_FUNCTION(ExitConfigurationMode, (ME), )
 NO_FUNCTION(EvaluateDiscreteStates, (ME), )
-NO_FUNCTION(EnterContinuousTimeMode, (ME), )
-NO_FUNCTION(EnterStepMode, (ME), )
 NO_FUNCTION(GetBinary, (ME, REF, size_t n, size_t sizes[], fmi3Binary values[], size_t m),
             ((void)references, (void)n, (void)sizes, (void)values, (void)m))
 NO_FUNCTION(SetBinary, (ME, REF, size_t n, const size_t sizes[], const fmi3Binary values[], size_t m),
@@ -296,18 +409,6 @@ NO_FUNCTION(SetShiftDecimal, (ME, REF, size_t n, const fmi3Float64 values[]),
             ((void)references, (void)n, (void)values))
 NO_FUNCTION(SetShiftFraction, (ME, REF, size_t n, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]),
             ((void)references, (void)n, (void)counters, (void)resolutions))
-NO_FUNCTION(UpdateDiscreteStates,
-            (ME, fmi3Boolean *a, fmi3Boolean *b, fmi3Boolean *c, fmi3Boolean *d, fmi3Boolean *e, fmi3Float64 *f),
-            ((void)a, (void)b, (void)c, (void)d, (void)e, (void)f))
-NO_FUNCTION(CompletedIntegratorStep, (ME, fmi3Boolean a, fmi3Boolean *b, fmi3Boolean *c), ((void)a, (void)b, (void)c))
-NO_FUNCTION(SetTime, (ME, fmi3Float64 time), ((void)time))
-NO_FUNCTION(SetContinuousStates, (ME, const fmi3Float64 x[], size_t n), ((void)x, (void)n))
-NO_FUNCTION(GetContinuousStateDerivatives, (ME, fmi3Float64 x[], size_t n), ((void)x, (void)n))
-NO_FUNCTION(GetEventIndicators, (ME, fmi3Float64 z[], size_t n), ((void)z, (void)n))
-NO_FUNCTION(GetContinuousStates, (ME, fmi3Float64 x[], size_t n), ((void)x, (void)n))
-NO_FUNCTION(GetNominalsOfContinuousStates, (ME, fmi3Float64 x[], size_t n), ((void)x, (void)n))
-NO_FUNCTION(GetNumberOfEventIndicators, (ME, size_t *n), ((void)n))
-NO_FUNCTION(GetNumberOfContinuousStates, (ME, size_t *n), ((void)n))
 NO_FUNCTION(GetOutputDerivatives, (ME, REF, size_t n, const fmi3Int32 orders[], fmi3Float64 values[], size_t m),
             ((void)references, (void)n, (void)orders, (void)values, (void)m))
 NO_FUNCTION(ActivateModelPartition, (ME, fmi3ValueReference clock, fmi3Float64 time), ((void)clock, (void)time))

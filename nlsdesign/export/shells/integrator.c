@@ -3,7 +3,9 @@
    The Jacobian is exact, so no Newton iteration can fail; what can fail is the step size, and then it says so. */
 #include <float.h>
 
-enum { ORDER = MODEL_STATES > 0 ? MODEL_STATES : 1, STAGES = 6, MOST_ATTEMPTS = 100000 };
+enum { ORDER = MODEL_STATES > 0 ? MODEL_STATES : 1, STAGES = 6 };
+enum { MOST_ATTEMPTS = 200000 };                 /* in one communication step */
+enum { INTEGRATED = 0, NO_STEP = 1, TOO_LONG = 2 };
 
 static const double RODAS_GAMMA = 0.25;
 static const double RODAS_TIME[STAGES] = {0.0, 0.386, 0.21, 0.63, 1.0, 1.0};
@@ -32,9 +34,10 @@ typedef struct {
 } integrator_memory;
 
 typedef struct {
-    double time; /* how far it came, s */
+    double time; /* how far it came from the beginning of the step, s */
     int accepted;
     int rejected;
+    int stopped; /* at an event */
 } integrator_report;
 
 /* Factorises a in place with row exchanges; returns 0 if it is singular or not finite. */
@@ -89,7 +92,7 @@ static void solve(double a[ORDER][ORDER], const int row[ORDER], double b[ORDER])
 /* One step of length h from x with the Jacobian df/dx and the slope df/dt at its beginning; gives the state at
    the end and the estimate of its error. Returns 0 if the matrix is singular. */
 static int rodas4(double t, double h, const double x[], const double u[], const double p[],
-                  double jacobian[ORDER][ORDER], const double slope[ORDER], double next[ORDER],
+                  const double m[], double jacobian[ORDER][ORDER], const double slope[ORDER], double next[ORDER],
                   double error[ORDER])
 {
     double matrix[ORDER][ORDER], k[STAGES][ORDER];
@@ -110,7 +113,7 @@ static int rodas4(double t, double h, const double x[], const double u[], const 
                 next[i] += RODAS_A[stage][j] * k[j][i];
             }
         }
-        model_rates(t + RODAS_TIME[stage] * h, next, u, p, k[stage]);
+        model_rates(t + RODAS_TIME[stage] * h, next, u, p, m, k[stage]);
         for (int i = 0; i < ORDER; ++i) {
             k[stage][i] += h * RODAS_SLOPE[stage] * slope[i];
             for (int j = 0; j < stage; ++j) {
@@ -139,33 +142,37 @@ static double measured_error(const double x[], const double next[], const double
     return sqrt(sum / (double)ORDER);
 }
 
-/* Integrates from one time to another with constant inputs. Returns 0, with x as it was, if no step size gives
-   the tolerance. */
-static int integrate(double from, double to, double x[], const double u[], const double p[], double tolerance,
-                     integrator_memory *memory, integrator_report *report)
+#if MODEL_SWITCHES == 0
+/* Integrates over a length of time with constant inputs. Time is counted from the beginning of the step, so that
+   a large clock does not bound the step size. Where the result is not INTEGRATED, x is as it was. */
+static int integrate(double from, double length, double x[], const double u[], const double p[], const double m[],
+                     double tolerance, integrator_memory *memory, integrator_report *report)
 {
     double now[ORDER], next[ORDER], error[ORDER], slope[ORDER], jacobian[ORDER][ORDER];
-    double t = from, step = memory->step > 0.0 ? memory->step : to - from;
+    double t = 0.0, step = memory->step > 0.0 ? memory->step : length;
     int fresh = 0, growing = 1;
 
-    report->accepted = report->rejected = 0;
+    report->time = 0.0;
+    report->accepted = report->rejected = report->stopped = 0;
     for (int i = 0; i < MODEL_STATES; ++i) {
         now[i] = x[i];
         memory->largest[i] = fmax(memory->largest[i], fmax(fabs(x[i]), 1e-6 * model_nominal[i]));
     }
-    while (MODEL_STATES > 0 && t < to) {
-        const int last = t + 1.001 * step >= to;
-        const double h = last ? to - t : step;
+    while (MODEL_STATES > 0 && t < length) {
+        const int last = t + 1.001 * step >= length;
+        const double h = last ? length - t : step;
         report->time = t;
-        if (report->accepted + report->rejected >= MOST_ATTEMPTS ||
-            (!last && !(h > 16.0 * DBL_EPSILON * fmax(fabs(t), fabs(to))))) {
-            return 0;
+        if (report->accepted + report->rejected >= MOST_ATTEMPTS) {
+            return TOO_LONG;
+        }
+        if (!last && !(h > 16.0 * DBL_EPSILON * t)) {
+            return NO_STEP;
         }
         if (!fresh) {
-            model_jacobian(t, now, u, p, jacobian, slope);
+            model_jacobian(from + t, now, u, p, m, jacobian, slope);
             fresh = 1;
         }
-        const int solved = rodas4(t, h, now, u, p, jacobian, slope, next, error);
+        const int solved = rodas4(from + t, h, now, u, p, m, jacobian, slope, next, error);
         const double size = solved ? measured_error(now, next, error, memory->largest, tolerance) : 1e9;
         const double factor = 0.9 * pow(fmax(size, 1e-10), -0.25);
         if (!(size <= 1.0)) { /* also NaN */
@@ -174,7 +181,7 @@ static int integrate(double from, double to, double x[], const double u[], const
             ++report->rejected;
             continue;
         }
-        t = last ? to : t + h;
+        t = last ? length : t + h;
         for (int i = 0; i < ORDER; ++i) {
             now[i] = next[i];
             memory->largest[i] = fmax(memory->largest[i], fabs(now[i]));
@@ -189,6 +196,7 @@ static int integrate(double from, double to, double x[], const double u[], const
         x[i] = now[i];
     }
     memory->step = step;
-    report->time = to;
-    return 1;
+    report->time = length;
+    return INTEGRATED;
 }
+#endif

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +33,17 @@ from ...quantity import typeset_unit
 from ...simulation.prior import Prior, declared_prior
 from ..scheduling.forms import finished, minimal_form
 from ..scheduling.gains import CascadeGain
+from ..scheduling.measured_angle import with_plausible_inputs
 from ..scheduling.scheduled import MEMORY, check_sampling, whole_contour
 from ..scheduling.step import ObserverStep
-from ..scheduling.table import Compact, Grid
+from ..scheduling.table import Compact, Draft, Grid
 from .adaptive_settings import AdaptiveSettings, Trust
 from .adaptive_step import AdaptiveStep, adaptive_step
 from .adaptive_variables import FOLLOWED, filter_model
 from .directions import UncertainDirections, uncertain_directions
 from .duty import Duty, operating_points
 from .filter_equations import FilterEquations, FilterNoise
+from .held_observer import held_observer
 
 Array = NDArray[np.float64]
 
@@ -92,7 +95,7 @@ class AdaptiveDesign:
         lines = [
             f"Adaptive observer of {estimate.name} every {self.step.nominal.sample_time:g} s",
             f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
-            f"{len(self.compact.columns)} columns",
+            f"{len(self.compact.columns)} columns{self.compact.cost(estimate.unit)}",
             "  slow states, with the torque that one deviation moves:",
         ]
         for d, effect in enumerate(self.directions.effect):
@@ -163,12 +166,15 @@ def design_adaptive_observer(
     step = adaptive_step(
         form, ObserverStep(plant, CascadeGain(), sample_time, reference), directions, form.model.values
     )
-    compact = over.compact(step.entries)
     missed = math.hypot(resolution, directions.left_out)
     noises = FilterNoise(noise, missed / points.inertia, missed, safe_inputs(model, prior))
-    flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = AdaptiveDesign(replace(flat, bodies=observed), step, compact, directions, settings.duty, trust)
+    compact = over.compact(step.entries, Draft(plant, partial(held_observer, step)))
+    flat = filter_model(FilterEquations(step, compact, trust, noises), directions)
+    flat = with_plausible_inputs(
+        replace(flat, bodies=observed, origin=model.origin), model, plant, compact.angles
+    )
+    design = AdaptiveDesign(flat, step, compact, directions, settings.duty, trust)
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import FlatModel, Table, Variable
+from ..scheduling.measured_angle import measured_angle
 from ..scheduling.scheduled import ESTIMATE, INNOVATION, MEMORY
 from .directions import UncertainDirections
 from .filter_equations import FilterEquations, pairs
+from .filter_start import expected_inputs, first_states
 
 Array = NDArray[np.float64]
 
@@ -41,6 +43,8 @@ def filter_model(filter_: FilterEquations, directions: UncertainDirections) -> F
         equations=filter_.sample(),
         sample_time=filter_.step.nominal.sample_time,
         tables=writer.tables(),
+        begin=first_states(filter_),
+        expected=expected_inputs(filter_),
     )
 
 
@@ -102,13 +106,7 @@ class _Variables:
 
     def inputs(self) -> tuple[Variable, ...]:
         """Return the measured angle and the known inputs."""
-        grid, v = self.compact.angles, self.plant.states[self.angle]
-        text = (
-            f"measured {v.name}; the table reaches from {grid[0]:.4g} to {grid[-1]:.4g} rad and holds its "
-            "ends beyond"
-        )
-        size = float(self.plant.sizes[self.angle])
-        return (Variable(v.name, v.unit, text, nominal=size), *self.plant.inputs)
+        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
 
     def outputs(self) -> tuple[Variable, ...]:
         """Return the estimate, its expected deviation, states, innovation and slow states."""
@@ -132,12 +130,5 @@ class _Variables:
 
     def tables(self) -> tuple[Table, ...]:
         """Return the table over the angle."""
-        if not self.compact.columns:
-            return ()
-        grid = self.compact.angles
-        columns = tuple(
-            Variable(c.name, c.unit, f"entry {c.key} of the step, in the sum of {c.row}")
-            for c in self.compact.columns
-        )
-        step = float(grid[1] - grid[0])
-        return (Table(self.plant.angle, float(grid[0]), step, columns, self.compact.values),)
+        table = self.compact.table(self.plant.angle)
+        return () if table is None else (table,)

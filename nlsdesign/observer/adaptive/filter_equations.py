@@ -84,8 +84,18 @@ class FilterEquations:
         place = self.compact.places[f"{kind}[{i}][{j}]"]
         return ca.SX(place.factor) if place.column is None else place.factor * self.w[place.column]
 
-    def _matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
-        """Return a matrix of the step at the slow states."""
+    def matrix(self, kind: str, rows: int, columns: int, slow: Expression) -> Expression:
+        """Return a matrix of the step at the slow states.
+
+        Parameters
+        ----------
+        kind
+            Of :meth:`AdaptiveStep.matrices`.
+        rows, columns
+            Its shape.
+        slow
+            Slow states.
+        """
         total = ca.SX(rows, columns)
         for i in range(rows):
             for j in range(columns):
@@ -110,12 +120,20 @@ class FilterEquations:
 
     # --- the two halves of a sample ---------------------------------------------------------------------
 
-    def _begin(self, memory: Expression, slow: Expression) -> Expression:
-        """Return the states expected at a sample: what the angle adds at its end, then friction."""
-        state = memory + self._matrix("prior", self.n, 1, slow)
+    def expected_states(self, memory: Expression, slow: Expression) -> Expression:
+        """Return the states expected at a sample: what the angle adds at its end, then friction.
+
+        Parameters
+        ----------
+        memory
+            What the estimates carry on.
+        slow
+            Slow states.
+        """
+        state = memory + self.matrix("prior", self.n, 1, slow)
         inner = self.step.inner
         if inner:
-            state += ca.mtimes(self._matrix("coupling", self.n, inner, slow), state[:inner])
+            state += ca.mtimes(self.matrix("coupling", self.n, inner, slow), state[:inner])
         friction_of = self.step.friction
         speed = ca.SX.sym("speed")
         length = ca.sqrt(speed**2 + self.blur**2)
@@ -144,7 +162,7 @@ class FilterEquations:
     def _end(self, state: Expression, slow: Expression, u: Expression) -> Expression:
         """Return what goes on to the next sample."""
         count = self.n + 1 + len(self.plant.rows)
-        matrix = self._matrix("next", self.n, count, slow)
+        matrix = self.matrix("next", self.n, count, slow)
         own, slopes = self.step.driven(u)
         pushed = self._lightness(slow) * (
             own + sum((slow[d] * slope for d, slope in enumerate(slopes)), start=ca.SX(0))
@@ -185,9 +203,9 @@ class FilterEquations:
         memory, slow = ca.SX.sym("memory", n), ca.SX.sym("slow", slow_count)
         packed, unrest = ca.SX.sym("covariance", size * (size + 1) // 2), ca.SX.sym("unrest")
         angle, u = ca.SX.sym(plant.angle), ca.SX.sym("u", len(plant.inputs))
-        slopes = self._carried(self._begin(memory, slow), memory, slow)
+        slopes = self._carried(self.expected_states(memory, slow), memory, slow)
         before = ca.mtimes([slopes, _unpacked(packed, size), slopes.T])
-        expected = self._begin(memory, slow)
+        expected = self.expected_states(memory, slow)
         innovation = angle - expected[self.angle]
         off, variance_of_angle = innovation / self.noise.angle, before[self.angle, self.angle]
         followed = ca.SX.sym("followed")
@@ -222,13 +240,13 @@ class FilterEquations:
         fading = ca.vertcat(ca.SX.ones(n, 1), ca.sqrt(1.0 - forget) * ca.SX.ones(slow_count, 1))
         onward = ca.mtimes(ca.diag(fading), onward)
         next_covariance = ca.mtimes([onward, after, onward.T]) + self._process_noise(forget, unrest, u)
-        row = self._matrix("estimate", 1, n + 1, free)
+        row = self.matrix("estimate", 1, n + 1, free)
         wanted = ca.mtimes(row, ca.vertcat(s, 1))
         slopes_of_estimate = self._slopes(wanted, s, free)
         both = (ca.vertcat(s, free), ca.vertcat(state, slow_after))
         estimate, row_at = ca.substitute(wanted, *both), ca.substitute(slopes_of_estimate, *both)
         variance = ca.mtimes([row_at, after, row_at.T]) + self.noise.estimate**2
-        shown = state + self._matrix("shift", n, 1, slow_after)
+        shown = state + self.matrix("shift", n, 1, slow_after)
         outputs = [estimate, ca.sqrt(variance), shown, innovation, slow_after]
         excess = ca.fmin(squared, self.trust.surprise**2) - 1.0
         restless = unrest * (1.0 + self.step.nominal.sample_time / UNREST_TIME * excess)

@@ -409,9 +409,9 @@ def _read(design: ObserverDesign, key: str, at: Array) -> tuple[Array, Array]:
     place, grid = compact.places[key], compact.angles
     if place.column is None:
         return np.full(len(at), place.factor), np.zeros(len(at))
-    column, step = place.factor * compact.values[:, place.column], grid[1] - grid[0]
-    left = np.clip(((at - grid[0]) / step).astype(int), 0, len(grid) - 2)
-    slope = (column[left + 1] - column[left]) / step
+    column = place.factor * compact.values[:, place.column]
+    left = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+    slope = (column[left + 1] - column[left]) / (grid[left + 1] - grid[left])
     return column[left] + slope * (at - grid[left]), slope
 
 

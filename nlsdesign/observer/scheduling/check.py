@@ -133,9 +133,9 @@ def check_stability(
         raise ValueRangeError(
             f"model '{observer.name}'", "is not an observer with one table over the angle of a body"
         )
-    table = tables[0]
-    points = (table.values.shape[0] - 1) * finer + 1
-    angles = table.lower + table.step / finer * np.arange(points)
+    grid = tables[0].grid
+    shares = np.arange(finer) / finer
+    angles = np.append((grid[:-1, None] + shares * np.diff(grid)[:, None]).ravel(), grid[-1])
     matrices = np.array([error_matrices(observer, angles, speed) for speed in speeds])
     radius = np.max(np.abs(np.linalg.eigvals(matrices)), axis=(0, 2))
     every = matrices.reshape(-1, *matrices.shape[2:])

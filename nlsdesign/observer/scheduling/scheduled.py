@@ -16,10 +16,15 @@ from ...model.roles import measured_motion, spring_torque
 from ...quantity import typeset_unit
 from ...symbolic import Expression
 from .braking import braked_speed
+from .breakpoints import FineEntries
+from .first_reading import FirstReading
 from .forms import Minimal, StateForm
 from .gains import CascadeGain, FittedGain, GainRule
+from .measured_angle import measured_angle, with_plausible_inputs
 from .step import ObserverStep
-from .table import Compact, Grid, GridByTolerance
+from .table import Compact, Draft, Grid, TableTorqueError
+from .table_trial import TableTrial
+from .torque_grid import RESOLUTION, GridByTorqueError
 
 Array = NDArray[np.float64]
 
@@ -53,6 +58,15 @@ class ObserverDesign:
         """
         return dict(self.compact.error)
 
+    @property
+    def table_torque_error(self) -> TableTorqueError:
+        """What the table does to the estimated torque, measured on motions over its range."""
+        if self.compact.torque_error is not None:
+            return self.compact.torque_error
+        grid = self.compact.angles
+        fine = FineEntries.of(self.step.entries, float(grid[0]), float(grid[-1]), RESOLUTION)
+        return TableTrial(Draft(self.step.plant, lambda c: _written(self, c)), fine).error(self.compact)
+
     def start(self, angle: float) -> dict[str, float]:
         """Return the start values of an observer that begins while the actuator rests at an angle.
 
@@ -74,13 +88,19 @@ class ObserverDesign:
         lines = [
             f"Observer of {self.step.plant.estimate.name} every {self.step.sample_time:g} s",
             f"  table: {len(grid)} angles from {grid[0]:.4g} to {grid[-1]:.4g} rad, "
-            f"{len(self.compact.columns)} columns",
+            f"{len(self.compact.columns)} columns{self.compact.cost(self.step.plant.estimate.unit)}",
             f"  estimate is linear in the inner states to {self.step.plant.affine_error:.2g} of its size",
         ]
         lines += [
             f"  table error of {row}: {error:.2g}" for row, error in self.compact.error.items() if error
         ]
         return "\n".join(lines)
+
+
+def _written(design: ObserverDesign, compact: Compact) -> ObserverDesign:
+    """Return the observer with another table."""
+    model = replace(_Writer(design.step, compact).model(), bodies=design.model.bodies)
+    return ObserverDesign(model, design.step, compact)
 
 
 def design_observer_with_details(
@@ -131,9 +151,13 @@ def design_observer_with_details(
     plant = (form or Minimal()).plant(model, estimate=estimate, angle=measured, angles=reference)
     fitted = rule.fitted(plant, sample_time, reference) if isinstance(rule, FittedGain) else rule
     step = ObserverStep(plant, fitted, sample_time, reference)
-    compact = over.compact(step.entries)
     observed = tuple(body for body in model.bodies if body.motion == measured)
-    design = ObserverDesign(replace(_Writer(step, compact).model(), bodies=observed), step, compact)
+
+    def written(compact: Compact) -> ObserverDesign:
+        flat = replace(_Writer(step, compact).model(), bodies=observed, origin=model.origin)
+        return ObserverDesign(with_plausible_inputs(flat, model, plant, compact.angles), step, compact)
+
+    design = written(over.compact(step.entries, Draft(plant, written)))
     return replace(design, model=design.model.with_values(design.start(0.0)))
 
 
@@ -158,7 +182,7 @@ def check_sampling(model: FlatModel, sample_time: float) -> None:
         raise ValueRangeError(f"model '{model.name}'", "an observer is designed on a continuous model")
 
 
-def whole_contour(model: FlatModel) -> GridByTolerance:
+def whole_contour(model: FlatModel) -> GridByTorqueError:
     """Return a grid that reaches to the ends of the cam's contour, or ±90° where there is none.
 
     Parameters
@@ -168,7 +192,7 @@ def whole_contour(model: FlatModel) -> GridByTolerance:
     """
     cams = [cam for spring in model.springs for cam in spring.cams]
     end = min((model.values[cam.last_angle] for cam in cams if cam.last_angle), default=math.pi / 2.0)
-    return GridByTolerance(-end, end)
+    return GridByTorqueError(-end, end)
 
 
 class _Writer:
@@ -198,7 +222,8 @@ class _Writer:
         filtered = [ca.SX.sym(f"{name}.rate") for name in plant.measured] if self._filters else []
         angle, u = ca.SX.sym(self.angle.name), [ca.SX.sym(v.name) for v in plant.inputs]
         measured = [angle, *(self.read("measured", i) for i in range(len(plant.measured)))]
-        prior = self._braked([memory[i] + self.read("prior", i) for i in range(n)])
+        prior = self.prior(memory)
+        first = FirstReading(self, memory, [*previous, *filtered], angle)
         seen = [int(np.argmax(row)) for row in plant.output_matrix]
         innovation = [y - prior[i] for y, i in zip(measured, seen, strict=True)]
         state = [prior[i] + self.row("correction", i, innovation) for i in range(n)]
@@ -231,6 +256,8 @@ class _Writer:
             equations=equations,
             sample_time=self.step.sample_time,
             tables=self._tables(),
+            begin=first.begin(),
+            expected=first.expected(),
         )
 
     @property
@@ -249,13 +276,13 @@ class _Writer:
             else raw
         )
 
-    def _braked(self, state: list[Expression]) -> list[Expression]:
-        """Return the state after friction has acted for one sample; the angle moves by half of that."""
+    def prior(self, memory: Sequence[Expression]) -> list[Expression]:
+        """Return the states expected at a sample, after friction, half of which moves the angle too."""
+        after = [memory[i] + self.read("prior", i) for i in range(self.n)]
         if self.plant.friction is None:
-            return state
-        time, before = self.step.sample_time, state[self.speed_place]
+            return after
+        time, before = self.step.sample_time, after[self.speed_place]
         change = ca.SX(braked_speed(self.plant.friction, time)(before)) - before
-        after = list(state)
         after[self.angle_place] += time / 2.0 * change
         after[self.speed_place] += change
         return after
@@ -284,12 +311,7 @@ class _Writer:
         return tuple(states)
 
     def _inputs(self) -> tuple[Variable, ...]:
-        grid, size = self.compact.angles, float(self.plant.sizes[self.angle_place])
-        angle = Variable(
-            self.angle.name, self.angle.unit, f"measured {self.angle.name}; the table reaches from "
-            f"{grid[0]:.4g} to {grid[-1]:.4g} rad and holds its ends beyond", nominal=size,
-        )  # fmt: skip
-        return (angle, *self.plant.inputs)
+        return (measured_angle(self.plant, self.compact.angles), *self.plant.inputs)
 
     def _outputs(self) -> tuple[Variable, ...]:
         plant = self.plant
@@ -308,16 +330,8 @@ class _Writer:
         return tuple(outputs)
 
     def _tables(self) -> tuple[Table, ...]:
-        if not self.compact.columns:
-            return ()
-        grid = self.compact.angles
-        columns = tuple(
-            Variable(c.name, c.unit, f"entry {c.key} of the step, in the sum of {c.row}")
-            for c in self.compact.columns
-        )
-        return (
-            Table(self.angle.name, float(grid[0]), float(grid[1] - grid[0]), columns, self.compact.values),
-        )
+        table = self.compact.table(self.angle.name)
+        return () if table is None else (table,)
 
 
 def _column(items: Sequence[Expression]) -> Expression:

@@ -10,11 +10,15 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, ValueRangeError
+from ...model import FlatModel, Table, Variable
+from ...quantity import typeset_unit
+from .plant import AngleScheduledPlant
 
 Array = NDArray[np.float64]
 
@@ -63,6 +67,30 @@ class ColumnPlace:
     column: int | None = None
 
 
+@dataclass(frozen=True)
+class TableTorqueError:
+    """What reading a table costs: torque with the table minus torque with exact functions of the angle.
+
+    Parameters
+    ----------
+    largest
+        Over all motions, in the unit of the estimate.
+    rms
+        Root mean square over all motions.
+    full_scale
+        Largest exact torque over all motions.
+    """
+
+    largest: float
+    rms: float
+    full_scale: float
+
+    @property
+    def share(self) -> float:
+        """Largest error over the full scale."""
+        return self.largest / self.full_scale if self.full_scale > 0.0 else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Compact:
     """A table and how to read each entry from it.
@@ -81,6 +109,10 @@ class Compact:
         By row: largest error at the checked points, share of the typical size of the sum.
     angle_error
         Angle in rad within which the exact function may be read to judge the error.
+    uniform
+        Whether the grid points lie equally far apart.
+    torque_error
+        What the table costs; ``None`` where it was not measured.
     """
 
     angles: Array
@@ -89,6 +121,86 @@ class Compact:
     places: Mapping[str, ColumnPlace]
     error: Mapping[str, float]
     angle_error: float
+    uniform: bool = True
+    torque_error: TableTorqueError | None = None
+
+    def size(self, bytes_per_number: int) -> int:
+        """Return the flash that values and breakpoints take, in bytes.
+
+        Parameters
+        ----------
+        bytes_per_number
+            4 for ``float``, 8 for ``double``.
+        """
+        if not self.columns:
+            return 0
+        return bytes_per_number * (self.values.size + (0 if self.uniform else len(self.angles)))
+
+    def cost(self, unit: str) -> str:
+        """Return what the table costs in torque, as the end of a sentence; empty where it was not measured.
+
+        Parameters
+        ----------
+        unit
+            Of the estimate.
+        """
+        if self.torque_error is None:
+            return ""
+        return f", which move the torque by at most {self.torque_error.largest:.2g} {typeset_unit(unit)}"
+
+    def table(self, argument: str) -> Table | None:
+        """Return the table of a flat model; ``None`` where every entry is a literal.
+
+        Parameters
+        ----------
+        argument
+            Name of the angle.
+        """
+        if not self.columns:
+            return None
+        columns = tuple(
+            Variable(c.name, c.unit, f"entry {c.key} of the step, in the sum of {c.row}")
+            for c in self.columns
+        )
+        if not self.uniform:
+            return Table.over(argument, self.angles, columns, self.values)
+        step = float(self.angles[1] - self.angles[0])
+        return Table(argument, float(self.angles[0]), step, columns, self.values)
+
+
+class ObserverWithTable(Protocol):
+    """An observer that was written for a table."""
+
+    @property
+    def model(self) -> FlatModel:
+        """Discrete."""
+        ...
+
+    def start(self, angle: float) -> dict[str, float]:
+        """Return the start values at rest at an angle.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """An observer that still lacks its table.
+
+    Parameters
+    ----------
+    plant
+        On which it is designed.
+    write
+        Writes it for a table.
+    """
+
+    plant: AngleScheduledPlant
+    write: Callable[[Compact], ObserverWithTable]
 
 
 class Grid(ABC):
@@ -98,17 +210,31 @@ class Grid(ABC):
     upper: float
 
     @abstractmethod
-    def compact(self, entries: Entries) -> Compact:
+    def compact(self, entries: Entries, draft: Draft | None = None) -> Compact:
         """Return the table of some entries.
 
         Parameters
         ----------
         entries
             Takes angles of shape (N,) and returns the entries there.
+        draft
+            The observer, for grids that measure what a table does to its torque.
         """
 
 
-def _check_range(lower: float, upper: float) -> None:
+def check_range(lower: float, upper: float) -> None:
+    """Refuse a range that is not finite or not ascending.
+
+    Parameters
+    ----------
+    lower, upper
+        In rad.
+
+    Raises
+    ------
+    ValueRangeError
+        If it is neither.
+    """
     if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
         raise ValueRangeError(f"range {lower:g} to {upper:g} rad", "must be finite and ascending")
 
@@ -147,11 +273,11 @@ class GridByTolerance(Grid):
     most_points: int = 4097
 
     def __post_init__(self) -> None:
-        _check_range(self.lower, self.upper)
+        check_range(self.lower, self.upper)
         if not self.tolerance > 0.0:
             raise ValueRangeError(f"tolerance {self.tolerance:g}", "must be positive")
 
-    def compact(self, entries: Entries) -> Compact:
+    def compact(self, entries: Entries, draft: Draft | None = None) -> Compact:
         """Return the table; see :class:`Grid`.
 
         Raises
@@ -200,11 +326,11 @@ class FixedGrid(Grid):
     points: int = 221
 
     def __post_init__(self) -> None:
-        _check_range(self.lower, self.upper)
+        check_range(self.lower, self.upper)
         if self.points < 2:
             raise ValueRangeError(f"{self.points} points", "a grid has at least two")
 
-    def compact(self, entries: Entries) -> Compact:
+    def compact(self, entries: Entries, draft: Draft | None = None) -> Compact:
         """Return the table; see :class:`Grid`."""
         angles = np.linspace(self.lower, self.upper, (self.points - 1) * CHECKS + 1)
         return compacted(angles, entries(angles), every=CHECKS, tolerance=0.0, angle_error=0.0)
@@ -240,7 +366,11 @@ def compacted(
     for entry in fine:
         if not (np.all(np.isfinite(entry.values)) and math.isfinite(entry.weight)):
             raise ConvergenceError(f"table of the observer, '{entry.name}'", "is not finite at some angle")
-        place = _place(entry, columns, spare)
+        largest = float(np.max(np.abs(entry.values)))
+        if largest * entry.weight <= NOTHING:
+            place = ColumnPlace(0.0)
+        else:
+            place = place_of(entry, columns, spare / entry.weight)
         places[entry.key] = place
         kept = np.ones(len(grid)) if place.column is None else columns[place.column].values[::every]
         read = np.interp(angles, grid, place.factor * kept)
@@ -250,12 +380,19 @@ def compacted(
     return Compact(grid, tuple(columns), np.ascontiguousarray(values), places, error, angle_error)
 
 
-def _place(entry: Entry, columns: list[Entry], spare: float) -> ColumnPlace:
-    """Return where an entry goes; a new column is added to ``columns`` where it needs one."""
+def place_of(entry: Entry, columns: list[Entry], allowed: float) -> ColumnPlace:
+    """Return where an entry goes; it is added to the columns where it needs one of its own.
+
+    Parameters
+    ----------
+    entry
+        On the same angles as the columns.
+    columns
+        So far; may grow.
+    allowed
+        What a literal or a shared column may be off, in the unit of the entry.
+    """
     low, high = float(np.min(entry.values)), float(np.max(entry.values))
-    if max(abs(low), abs(high)) * entry.weight <= NOTHING:
-        return ColumnPlace(0.0)
-    allowed = spare / entry.weight
     if (high - low) / 2.0 <= allowed:
         return ColumnPlace((high + low) / 2.0)
     for i, column in enumerate(columns):

@@ -16,6 +16,9 @@
 #define MODEL_P 8
 #define MODEL_Y 18
 #define MODEL_S 19
+#define MODEL_Z 20
+#define MODEL_M 20
+#define MODEL_SWITCHES 0
 #define MODEL_EXTRA 20
 #define MODEL_VALUES 21
 
@@ -49,15 +52,11 @@ static const variable model_variable[MODEL_VALUES] = {
     {"solver.relative_tolerance", 1e-08, 1e-13, 0.01},
 };
 
-static const double model_nominal[MODEL_STATES > 0 ? MODEL_STATES : 1] = {0.001, 1.0, 10.0};
+static const double model_nominal[MODEL_STATES > 0 ? MODEL_STATES : 1] = {0.001, 2.0, 10.0};
 
-static void model_rates(double t, const double x[], const double u[], const double p[], double f[])
+static void model_rates(double t, const double x[], const double u[], const double p[], const double m[], double f[])
 {
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)p;
-    (void)f;
+    (void)t, (void)x, (void)u, (void)p, (void)m, (void)f;
     const double a5 = x[1] / p[5];
     const double a6 = fabs(a5);
     const double a14 = p[4] * p[5] * (a6 + log1p(exp(-2.0 * a6)) - 0.6931471805599453);
@@ -68,15 +67,9 @@ static void model_rates(double t, const double x[], const double u[], const doub
     f[2] = (p[1] * u[0] - (p[2] * tanh(x[2] / 0.1) + p[3] * x[2]) - a44) / p[0];
 }
 
-static void model_equations(double t, const double x[], const double u[], const double p[], double f[], double y[], double s[])
+static void model_equations(double t, const double x[], const double u[], const double p[], const double m[], double f[], double y[], double s[])
 {
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)p;
-    (void)f;
-    (void)y;
-    (void)s;
+    (void)t, (void)x, (void)u, (void)p, (void)m, (void)f, (void)y, (void)s;
     const double a5 = x[1] / p[5];
     const double a6 = fabs(a5);
     const double a14 = p[4] * p[5] * (a6 + log1p(exp(-2.0 * a6)) - 0.6931471805599453);
@@ -90,14 +83,9 @@ static void model_equations(double t, const double x[], const double u[], const 
     s[0] = a43;
 }
 
-static void model_jacobian(double t, const double x[], const double u[], const double p[], double jacobian[][MODEL_STATES > 0 ? MODEL_STATES : 1], double slope[])
+static void model_jacobian(double t, const double x[], const double u[], const double p[], const double m[], double jacobian[][MODEL_STATES > 0 ? MODEL_STATES : 1], double slope[])
 {
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)p;
-    (void)jacobian;
-    (void)slope;
+    (void)t, (void)x, (void)u, (void)p, (void)m, (void)jacobian, (void)slope;
     const double a8 = x[1] / p[5];
     const double a9 = tanh(a8);
     const double a11 = 2.0 * (p[4] * a9);
@@ -127,19 +115,10 @@ static void model_jacobian(double t, const double x[], const double u[], const d
     slope[2] = 0.0;
 }
 
-static void model_directional(double t, const double x[], const double u[], const double p[], double dt, const double dx[], const double du[], const double dp[], double f[], double y[], double s[])
+static void model_directional(double t, const double x[], const double u[], const double p[], const double m[], double dt, const double dx[], const double du[], const double dp[], double f[], double y[], double s[], double z[])
 {
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)p;
-    (void)dt;
-    (void)dx;
-    (void)du;
-    (void)dp;
-    (void)f;
-    (void)y;
-    (void)s;
+    (void)t, (void)x, (void)u, (void)p, (void)m;
+    (void)dt, (void)dx, (void)du, (void)dp, (void)f, (void)y, (void)s, (void)z;
     const double a2 = p[4] * p[5];
     const double a4 = x[1] / p[5];
     const double a5 = fabs(a4);
@@ -169,4 +148,3 @@ static void model_directional(double t, const double x[], const double u[], cons
     y[0] = a112;
     s[0] = a110;
 }
-

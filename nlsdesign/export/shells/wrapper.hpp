@@ -1,0 +1,48 @@
+// C++ class around @name@.h: one object is one running instance.
+#ifndef @NAME@_HPP
+#define @NAME@_HPP
+
+#include <cstdint>
+
+#include "@name@.h"
+
+class @name@ {
+public:
+    using inputs_type = @name@_inputs;
+    using outputs_type = @name@_outputs;
+    using parameters_type = @name@_parameters;
+
+    static constexpr @real@ sample_time = @NAME@_SAMPLE_TIME;
+
+    @name@() noexcept { status_ = @name@_init(&state_, nullptr); }
+    explicit @name@(const parameters_type &parameters) noexcept { status_ = @name@_init(&state_, &parameters); }
+
+    // Begins anew with the next usable readings.
+    void restart() noexcept
+    {
+        const parameters_type kept = state_.parameters;
+        status_ = @name@_init(&state_, &kept);
+    }
+
+    // One sample; the outputs are finite whatever comes in.
+    const outputs_type &step(const inputs_type &inputs) noexcept
+    {
+        status_ = @name@_step(&state_, &inputs, &outputs_);
+        return outputs_;
+    }
+
+    std::uint32_t set_parameters(const parameters_type &parameters) noexcept
+    {
+        return @name@_set_parameters(&state_, &parameters);
+    }
+
+    std::uint32_t status() const noexcept { return status_; }
+    const outputs_type &outputs() const noexcept { return outputs_; }
+
+private:
+    @name@_state state_{};
+    outputs_type outputs_{};
+    std::uint32_t status_ = 0;
+};
+
+#endif

@@ -1,0 +1,171 @@
+"""What a controller does and costs on its processor: outputs, instructions, flash, memory, stack."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import ExportError
+from ..c.c_text import real_type
+from ..c.controller_code import CSource
+from ..c.self_test import number_rows, sample_inputs
+from ..c.structures import member_paths
+from ..compilation.running_c import CompiledStep
+from .cross_build import controller_object, controller_sizes, image, sized_object
+from .elf_file import SectionSizes, section_sizes
+from .emulator import emulated, missing_emulator
+from .processors import CORTEX_M4F, Processor
+
+_NS_PER_TICK = 40  # the clock of the boards runs at 25 MHz, an instruction takes 1 ns
+_KNOWN, _NOTHING = 2003, 2  # instructions of the two functions of the shell
+
+
+@dataclass(frozen=True, eq=False)
+class TargetRun:
+    """One run of the vectors of the self-test on the processor.
+
+    Parameters
+    ----------
+    instructions
+        Of the step at each sample, the return included, to one part in 4000, shape (samples,).
+    stack
+        Deepest use at each sample in bytes, without interrupts, shape (samples,).
+    outputs
+        Shape (samples, outputs).
+    status
+        Status words, shape (samples,).
+    same
+        Whether all outputs and status words are those of the same code on this machine, bit by bit.
+    """
+
+    instructions: NDArray[np.int64]
+    stack: NDArray[np.int64]
+    outputs: NDArray[np.float64]
+    status: NDArray[np.int64]
+    same: bool
+
+
+@dataclass(frozen=True, eq=False)
+class TargetMeasurement:
+    """What a controller costs on a processor.
+
+    Parameters
+    ----------
+    source
+        The controller.
+    processor
+        Where.
+    alone
+        Its own code, tables and variables.
+    added
+        What it adds to a program, with all that it calls, for instance arithmetic in software.
+    state
+        Size of the structure that the caller owns, in bytes.
+    run
+        What was seen in the emulator; ``None`` where there is none.
+    reason
+        Why it was not run; empty otherwise.
+    """
+
+    source: CSource
+    processor: Processor
+    alone: SectionSizes
+    added: SectionSizes
+    state: int
+    run: TargetRun | None
+    reason: str = ""
+
+    @property
+    def flash(self) -> int:
+        """Bytes of flash: code, tables and start values, and what they call."""
+        return self.added.flash
+
+    @property
+    def memory(self) -> int:
+        """Bytes of working memory without the stack: one instance, and variables outside it."""
+        return self.state + self.alone.memory
+
+
+def measure_on_target(
+    source: CSource, processor: Processor = CORTEX_M4F, *, inputs: NDArray[np.float64] | None = None
+) -> TargetMeasurement:
+    """Measure what a controller costs on a processor, and whether it computes there what it computes here.
+
+    The code is compiled with the bundled compiler. Where the emulator ``qemu-system-arm`` is installed, the
+    vectors of the self-test run there, and the count of instructions is verified on a loop of known length.
+
+    Parameters
+    ----------
+    source
+        Generated C files.
+    processor
+        Where.
+    inputs
+        Samples to run, shape (samples, inputs); those of the self-test by default.
+
+    Raises
+    ------
+    ExportError
+        If the compiler is missing or finds a mistake, or the emulator fails or miscounts.
+
+    Examples
+    --------
+    >>> cost = measure_on_target(export_c(observer, "out/c", real="float"), CORTEX_M4F)  # doctest: +SKIP
+    >>> cost.flash, cost.memory, cost.run.instructions.max()  # doctest: +SKIP
+    """
+    reason = missing_emulator()
+    with tempfile.TemporaryDirectory(prefix="nlsdesign-target-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        alone, added = controller_sizes(source, processor, folder)
+        state = _state_size(source, processor, folder)
+        given = sample_inputs(source.model, real_type(source.real)) if inputs is None else inputs
+        run = None if reason else _run(source, processor, folder, np.asarray(given, dtype=float))
+    return TargetMeasurement(source, processor, alone, added, state, run, reason)
+
+
+def _state_size(source: CSource, processor: Processor, folder: Path) -> int:
+    return section_sizes(sized_object(source, processor, folder)).cleared
+
+
+def _run(source: CSource, processor: Processor, folder: Path, given: NDArray[np.float64]) -> TargetRun:
+    real = real_type(source.real)
+    u, y = member_paths(source.model.inputs).values(), member_paths(source.model.outputs).values()
+    controller_object(source, processor, folder)
+    values: dict[str, str | list[str]] = {
+        "real": real.name,
+        "samples": str(len(given)),
+        "given": number_rows("given", given.tolist(), real),
+        "assignments": [f"inputs.{path} = given[k][{i}];" for i, path in enumerate(u)],
+        "outputs": [f"say_real(outputs.{path});" for path in y],
+    }
+    first, *rows = emulated(image(source, processor, folder, main="target_run.c", values=values), processor)
+    counted = _instructions(*first[1:4])
+    if abs(counted - _KNOWN) > 0.5:
+        raise ExportError(
+            f"the emulator's count on {processor.name}",
+            f"is wrong: {counted:.1f} instructions for a loop of {_KNOWN}",
+            next_step="measure with another version of qemu-system-arm",
+        )
+    table = np.array(rows, dtype=np.uint32)
+    words = np.ascontiguousarray(table[:, 5:])
+    outputs = words.view(np.float32 if real.name == "float" else np.float64)
+    step = CompiledStep(source)
+    expected = [step(row) for row in given.tolist()]
+    here = np.array([each for each, _ in expected]).reshape(outputs.shape).astype(outputs.dtype)
+    status = table[:, 4].astype(np.int64)
+    same = here.tobytes() == outputs.tobytes() and status.tolist() == [flags for _, flags in expected]
+    return TargetRun(
+        np.rint([_instructions(*row[:3]) for row in rows]).astype(np.int64),
+        table[:, 3].astype(np.int64),
+        outputs.astype(np.float64),
+        status,
+        same,
+    )
+
+
+def _instructions(calls: int, ticks: int, empty: int) -> float:
+    return (ticks - empty) * _NS_PER_TICK / calls + _NOTHING

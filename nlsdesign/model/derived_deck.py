@@ -1,0 +1,57 @@
+"""A deck that was made from another one: its name says from which and how, and changes with its content."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from ..components.assembly.deck_writer import deck_digest
+from ..components.assembly.named_parts import Assembly
+from ..deck import ParentDeck
+
+DIGITS = 8
+"""Digits of the digest in a name."""
+
+_ENDING = re.compile(rf"_[a-z]+_([0-9a-f]{{{DIGITS}}})\Z")
+
+
+def derived(made: Assembly, declared: Assembly, change: str) -> Assembly:
+    """Return an assembly under the name of the deck that it was made from, how, and the digits of its digest.
+
+    Parameters
+    ----------
+    made
+        Result of a design, a fit or a diagnosis; itself if nothing was changed.
+    declared
+        What it was made from. It becomes the parent.
+    change
+        What was done, in one word of small letters, such as ``"diagnosed"``.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import ROTATION, Inertia, Spring, assembly, tie
+    >>> spring = tie(Spring(stiffness=2.0, domain=ROTATION), "wheel")
+    >>> swing = assembly("swing", wheel=Inertia(inertia=1e-3), spring=spring)
+    >>> fitted = derived(swing.with_values({"spring.stiffness": 2.1}), swing, "refitted")
+    >>> fitted.name, fitted.parent.name
+    ('swing_refitted_1eb4b24f', 'swing')
+    """
+    digest, before = deck_digest(made), deck_digest(declared)
+    if digest == before:
+        return made
+    # The name of a deck that was derived itself does not grow: its line of parents says where it came from.
+    root = _ENDING.sub("", declared.name) if declared.parent else declared.name
+    parent = ParentDeck(declared.name, before, change, declared.parent)
+    return replace(made, name=f"{root}_{change}_{digest[:DIGITS]}", parent=parent)
+
+
+def digits_in_name(assembly: Assembly) -> str:
+    """Return the digits of a digest with which the name of a derived deck ends, empty where it has none.
+
+    Parameters
+    ----------
+    assembly
+        As read.
+    """
+    match = _ENDING.search(assembly.name) if assembly.parent else None
+    return match[1] if match else ""
