@@ -216,10 +216,7 @@ def run_batch(
 def _begun(
     system: SampledSystem, courses: Sequence[Array], state: Array, values: Array, given: set[str]
 ) -> Array:
-    """Return the states with those of blocks as they begin from their first readings, shape (states, runs).
-
-    A block of which a state was given begins from that.
-    """
+    """Return the states, those of blocks from their first readings where none was given, (states, runs)."""
     begins = tuple(
         name
         for name, block in system.blocks.items()
