@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 import nlsdesign as nls
 from nlsdesign.components import CurrentSensor, ForceSensor, InextensibleCable, Through
+from nlsdesign.components.assembly.deck_writer import deck_digest
+from nlsdesign.deck import ParentDeck
 
 Array = NDArray[np.float64]
 
@@ -49,7 +51,8 @@ def with_bench_sensors(actuator: nls.Assembly) -> nls.Assembly:
         .with_part("load_cell", ForceSensor(of="spring.cable.force", noise=cell))
         .with_part("ammeter", CurrentSensor(of="motor.current", noise=ammeter))
     )
-    numbers = bench.quantities()
+    numbers, before = bench.quantities(), ParentDeck(actuator.name, deck_digest(actuator), "bench sensors")
+    bench = replace(bench, parent=before)
     return bench.with_values({n: replace(q, spread=0.0) for n, q in numbers.items() if _is_dimension(n)})
 
 

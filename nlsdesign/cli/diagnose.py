@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..quantity import typeset_unit
+from .exported_machine import export_machine, export_option
 from .output import (
     deck_option,
     json_option,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from ..discrepancy import Verdict
     from ..identification import RecordSet
     from ..model import FlatModel
+    from ..regeneration import Regeneration
     from ..report.sections import Section
     from ..simulation import Trace
 
@@ -50,6 +52,7 @@ _OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
     is_flag=True,
     help="Design the torque observer again from the better model, write it as C and FMU, and compare it.",
 )
+@export_option
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True, help="Of the observer.")
 @spring_option
 @measured_option
@@ -89,12 +92,19 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     title = f"{actuator.name}: what is missing"
     write_report(out / "report.html", *sections, title=title, facts=facts)
+    observer = None
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
         with steps.step("observer"):
-            data, words, chapter = _regenerated(flatten(actuator), verdict, measured, out, options)
+            result = _regenerated(flatten(actuator), verdict, measured, options)
+            data, words, chapter = _written(result, out)
+        observer = result.observer
         content, text = {**content, "regeneration": data}, f"{text}\n{words}"
         write_report(out / "report.html", *sections, *chapter, title=title, facts=facts)
+    if options["exports"]:
+        with steps.step("export"):
+            machine = export_machine(flatten(verdict.actuator), out, observer=observer, **_chosen(options))
+        content, text = content | machine.content(), "\n".join([text, *machine.words()])
     if as_json:
         show_json(content)
         return
@@ -104,17 +114,27 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     click.echo(f"report: {out / 'report.html'}")
 
 
+def _chosen(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: options[name] for name in ("sample_time", "spring", "measured")}
+
+
 def _regenerated(
-    declared: FlatModel, verdict: Verdict, records: RecordSet, out: Path, options: Mapping[str, Any]
-) -> tuple[dict[str, Any], str, list[Section]]:
-    """Design and write the observer of the better model; return data, text and sections on it."""
+    declared: FlatModel, verdict: Verdict, records: RecordSet, options: Mapping[str, Any]
+) -> Regeneration:
+    """Design the observer of the better model, and compare it."""
     from ..model import flatten
-    from ..regeneration import ObserverChoice, regenerate, write_regeneration
+    from ..regeneration import ObserverChoice, regenerate
+
+    choice = ObserverChoice(**_chosen(options))
+    return regenerate(declared, flatten(verdict.actuator), records, fits=verdict.fits, choice=choice)
+
+
+def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list[Section]]:
+    """Write the observer of the better model; return data, text and sections on it."""
+    from ..regeneration import write_regeneration
     from ..report import regeneration_sections
     from ..writing import write_text
 
-    choice = ObserverChoice(options["sample_time"], options["spring"], options["measured"])
-    result = regenerate(declared, flatten(verdict.actuator), records, fits=verdict.fits, choice=choice)
     files, lacking = write_regeneration(result, out)
     result = replace(result, reasons=(*result.reasons, *lacking))
     content = {**result.to_dict(), "files": [str(path) for path in files]}

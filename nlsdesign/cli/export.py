@@ -10,9 +10,10 @@ import click
 
 from .controller import controller_of, export_controller, law_options
 from .export_check import check_exports
+from .export_fmu import export_fmus
 from .flash import flash_options, sized_observer
 from .observer import real_option, sample_time_option
-from .observer_kinds import kind_option, observer_of
+from .observer_kinds import kind_option
 from .output import deck_option, measured_option, out_option, spring_option
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def export() -> None:
 
 
 export.add_command(export_controller)
+export.add_command(export_fmus)
 export.add_command(check_exports)
 
 
@@ -99,49 +101,3 @@ def sampled_part(
     controller = controller_of(plant, sample_time, **law)
     sized = sized_observer(plant, sample_time, part_of=lambda each: joined(each, controller), **others)
     return "torque_loop", joined(sized.designed.model, controller), sized.sentences
-
-
-@export.command("fmu")
-@deck_option
-@kind_option
-@sample_time_option
-@spring_option
-@measured_option
-@out_option("out/fmu")
-@click.option(
-    "--version", type=click.Choice(["2.0", "3.0"]), default="3.0", show_default=True, help="FMI version."
-)
-@click.option(
-    "--platform",
-    "platforms",
-    multiple=True,
-    help="For instance x86_64-windows; this machine by default; repeatable.",
-)
-@click.option("--plant-only", is_flag=True, help="Write the plant alone; for a system without an observer.")
-def export_fmus(
-    deck_name: str,
-    sample_time: float,
-    out: Path,
-    version: str,
-    platforms: tuple[str, ...],
-    plant_only: bool,
-    **chosen: str | None,
-) -> None:
-    """Write plant and, for an actuator, its observer as co-simulation FMUs."""
-    from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..export import export_fmu
-    from ..model import flatten
-    from ..model.roles import is_actuator
-
-    plant = flatten(declare(load_deck(deck_name)))
-    models = {"plant": plant}
-    if is_actuator(plant) and not plant_only:
-        # Before anything is written: not every system has an observer.
-        models["observer"] = observer_of(plant, sample_time, **chosen)
-    systems = list(platforms) or None
-    written = [
-        export_fmu(model, out / f"{name}.fmu", version=version, platforms=systems)
-        for name, model in models.items()
-    ]
-    click.echo(f"written: {', '.join(str(path) for path in written)}")

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ..quantity import typeset_unit
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .exported_machine import ExportedMachine, export_machine, export_option
+from .observer import sample_time_option
+from .output import (
+    deck_option,
+    json_option,
+    measured_option,
+    out_option,
+    show_json,
+    show_table,
+    spring_option,
+)
 from .units import Number
 
 _file = click.Path(path_type=Path, dir_okay=False)
@@ -20,17 +31,13 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
 @click.option("--window", type=Number("s"), default=None,
               help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
+@export_option
+@sample_time_option
+@spring_option
+@measured_option
 @out_option("out/fit")
 @json_option
-def fit(
-    deck_name: str,
-    records: Path,
-    hold_out: tuple[str, ...],
-    mapping: Path | None,
-    window: float | None,
-    out: Path,
-    as_json: bool,
-) -> None:
+def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
@@ -40,13 +47,19 @@ def fit(
     from ..progress import Steps
 
     actuator = declare(load_deck(deck_name))
+    mapping, hold_out = options["mapping"], options["hold_out"]
     measured = load_records(records, flatten(actuator), mapping=mapping, hold_out=hold_out)
     steps = Steps()
     with steps.step("fit"):
-        result = refit(actuator, measured, window=window, progress=steps.note)
+        result = refit(actuator, measured, window=options["window"], progress=steps.note)
     file, deck = write_refit(result, out)
+    machine = ExportedMachine({}, ())
+    if options["exports"]:
+        with steps.step("export"):
+            chosen = {name: options[name] for name in ("sample_time", "spring", "measured")}
+            machine = export_machine(flatten(result.actuator), out, **chosen)
     if as_json:
-        show_json(result.to_dict(str(deck)))
+        show_json({**result.to_dict(str(deck)), **(machine.content() if options["exports"] else {})})
         return
     numbers = [
         (
@@ -65,5 +78,7 @@ def fit(
     ]
     show_table("Errors, rms", ("block", "records", "declared", "fitted", "noise floor", "unit"), errors)
     for sentence in result.words():
+        click.echo(sentence)
+    for sentence in machine.words():
         click.echo(sentence)
     click.echo(f"written: {file} and {deck}; next: nlsdesign diagnose --deck {deck} --records {records}")

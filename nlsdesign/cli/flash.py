@@ -35,7 +35,7 @@ def flash_options(command: F) -> F:
     command = click.option(
         "--flash", type=Bytes(), metavar="SIZE",
         help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser "
-        "for it, and what that costs is said. Without the mathematical functions of the C library.",
+        "for it, and what that costs is said.",
     )(command)  # fmt: skip
     return click.option(
         "--table-error", type=Number("N*m"), metavar="TORQUE",
@@ -65,7 +65,7 @@ class SizedObserver:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What the table costs, and how large everything is."""
-        compact, unit = self.designed.design.compact, typeset_unit(self._plant.estimate.unit)
+        compact, unit = self.designed.design.compact, typeset_unit(self.designed.design.model.outputs[0].unit)
         kind = "uniform" if compact.uniform else "by breakpoints"
         error = compact.torque_error
         words = f"table: {len(compact.angles)} angles {kind}, {len(compact.columns)} columns"
@@ -77,13 +77,7 @@ class SizedObserver:
         if self.code is None:
             return words, f"flash of the tables: {self.tables} B; the code was not measured: no compiler"
         total = f"flash on a Cortex-M4F: {self.code + self.tables} B"
-        return words, f"{total} ({self.code} B code, {self.tables} B tables), without the C library"
-
-    @property
-    def _plant(self) -> Any:
-        step = self.designed.design.step
-        nominal: Any = getattr(step, "nominal", step)
-        return nominal.plant
+        return words, f"{total} ({self.code} B code with what it calls, {self.tables} B tables)"
 
 
 def sized_observer(
@@ -130,13 +124,13 @@ def sized_observer(
     first = _sized(designed, part_of(designed.model), real, needed=flash is not None)
     if flash is None or first.code is None or first.code + first.tables <= flash:
         return first
-    found, chosen = first, {**chosen, "kind": designed.kind}
+    current, chosen = first, {**chosen, "kind": designed.kind}
     for _ in range(ATTEMPTS):
-        most = flash - (found.code or 0)
-        if most < each:
+        most = max(flash - (current.code or 0), 1)
+        if not current.tables:
             raise ValueRangeError(
-                f"flash of {flash} B", f"the code alone takes {found.code} B on a Cortex-M4F",
-                next_step=f"allow {first.code + first.tables} B, or take another --kind or --real float",
+                f"flash of {flash} B", f"the code alone takes {current.code} B on a Cortex-M4F",
+                next_step=f"allow {current.code} B, or take another --kind or --real float",
             )  # fmt: skip
         grid = _grid(plant, table_error, each, most)
         try:
@@ -144,18 +138,19 @@ def sized_observer(
         except TableTooLargeError as error:
             raise ValueRangeError(
                 f"flash of {flash} B",
-                f"cannot be met beside {found.code} B of code: {error.words}; the smallest that keeps this "
-                f"has {(found.code or 0) + error.least} B",
-                next_step=f"allow {(found.code or 0) + error.least} B, or a larger --table-error",
+                f"cannot be met beside {current.code} B of code: {error.words}; the smallest that keeps this "
+                f"has {(current.code or 0) + error.least} B",
+                next_step=f"allow {(current.code or 0) + error.least} B, a larger --table-error, or take "
+                "another --kind or --real float",
             ) from None
         # The kind is decided: a coarser table does not change which one errs least over the spread.
         again = replace(again, reason=designed.reason, expected=designed.expected)
-        found = _sized(again, part_of(again.model), real, needed=True)
-        if (found.code or 0) + found.tables <= flash:
-            return found
+        current = _sized(again, part_of(again.model), real, needed=True)
+        if (current.code or 0) + current.tables <= flash:
+            return current
     raise ValueRangeError(
         f"flash of {flash} B", f"was not met within {ATTEMPTS} attempts",
-        next_step=f"allow {(found.code or 0) + found.tables} B",
+        next_step=f"allow {(current.code or 0) + current.tables} B",
     )  # fmt: skip
 
 
@@ -167,13 +162,15 @@ def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) ->
 
 def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed: bool) -> SizedObserver:
     from ..export import export_c
-    from ..export.compilation.code_size import flash_bytes
+    from ..export.target.cross_build import controller_sizes
+    from ..export.target.processors import CORTEX_M4F
 
     tables = designed.design.compact.size(4 if real == "float" else 8)
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")
         try:
-            return SizedObserver(designed, flash_bytes(source) - tables, tables)
+            _, added = controller_sizes(source, CORTEX_M4F, Path(folder))
+            return SizedObserver(designed, added.flash - tables, tables)
         except ExportError:
             # Without the wheel of the compiler C is still written; only a budget cannot be judged.
             if needed:

@@ -99,7 +99,7 @@ def designed_observer(
     try:
         torque, measured = series_spring(plant, spring).effort, measured_motion(plant, measured)
     except ArrangementError as error:
-        alone = "nlsdesign export fmu --plant-only writes the plant alone, with its C sources inside"
+        alone = "nlsdesign export fmu --what plant writes the plant alone, with its C sources inside"
         raise ArrangementError(error.thing, error.rule, next_step=f"{error.next_step}; {alone}") from None
     named: dict[str, Any] = {
         "estimate": torque,

@@ -76,11 +76,11 @@ def split_number(text: str) -> tuple[float, str]:
     UnitError
         If it does not begin with a number.
     """
-    found = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
-    if found is None:
+    match = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
+    if match is None:
         raise UnitError(f"'{text}'", "does not start with a number")
-    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", found.group(2).strip())
-    return float(found.group(1)), unit
+    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
+    return float(match.group(1)), unit
 
 
 def parse_number(text: str, unit: str) -> Quantity:

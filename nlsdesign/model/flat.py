@@ -137,8 +137,7 @@ class Table:
         """All grid points, shape (grid points,)."""
         if self.breakpoints is not None:
             return self.breakpoints
-        uniform: NDArray[np.float64] = self.lower + self.step * np.arange(float(self.values.shape[0]))
-        return uniform
+        return np.asarray(self.lower + self.step * np.arange(self.values.shape[0]), dtype=np.float64)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -311,10 +310,8 @@ class FlatModel:
         def changed(group: tuple[Variable, ...]) -> tuple[Variable, ...]:
             return tuple(_with_start(v, values[v.name]) if v.name in values else v for v in group)
 
-        numbers = {v.name: values[v.name] for v in self.parameters if v.name in values}
         return replace(
             self,
-            origin=self.origin and self.origin.with_values(numbers),
             parameters=changed(self.parameters),
             states=changed(self.states),
             inputs=changed(self.inputs),

@@ -49,3 +49,27 @@ class Origin:
         text = "\n".join([self.digest, *(f"{name} = {value!r}" for name, value in sorted(values.items()))])
         changed = tuple(dict.fromkeys([*self.changed, *values]))
         return replace(self, digest=hashlib.sha256(text.encode()).hexdigest(), changed=changed)
+
+
+def common_origin(*origins: Origin | None) -> Origin | None:
+    """Return the origin of a model that was made from several.
+
+    Parameters
+    ----------
+    *origins
+        Of each.
+
+    Returns
+    -------
+    Origin
+        The one that all have; where they differ, one that names every deck and has the digest of none.
+        ``None`` if none has one.
+    """
+    known = [each for each in origins if each is not None]
+    if not known:
+        return None
+    if len(known) == len(origins) and len({each.digest for each in known}) == 1:
+        return known[0]
+    names = [each.deck if each is not None else "no deck" for each in origins]
+    digests = "\n".join(each.digest if each is not None else "" for each in origins)
+    return Origin(" and ".join(names), hashlib.sha256(digests.encode()).hexdigest())

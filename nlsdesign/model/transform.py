@@ -314,8 +314,11 @@ def _switching(model: FlatModel, again: Callable[[Symbols], Symbols] | None) -> 
     if model.switching is None or again is None:
         return model.switching
     s = model.symbols()
+    shown = model.switching.shown
+    if (shown.size1_in(1), shown.size1_in(2)) != (s.state.numel(), s.input.numel()):
+        return None  # states or inputs were exchanged before, and only a model with corners allows that
     given = [s.time, s.state, s.input, s.parameter, ca.SX.sym("mode", len(model.switching.switches))]
-    output, signal = model.switching.shown.call(given)
+    output, signal = shown.call(given)
     s = again(s._replace(output=output, signal=signal))
     return replace(model.switching, shown=ca.Function("shown", given, [s.output, s.signal]))
 

@@ -16,6 +16,7 @@ from .design import design_spring
 from .diagnosis import diagnose_bench
 from .evaluation import evaluate_loop
 from .figures import compare_with_figures
+from .generated import Code, code_of_three_decks
 from .observer import compare_observers, sweep_angle
 from .report import write_page
 from .results import ActuatorResults, Results
@@ -44,9 +45,16 @@ def main(out: Path, fast: bool = False) -> Results:
         figures = compare_with_figures(actuator)
     published = work_up(actuator, out / "actuator.toml", out / "published", steps=steps, fast=fast)
     designed = work_up(cam.design.actuator, out / "designed.toml", out / "designed", steps=steps, fast=fast)
+    both = {"published": published, "designed": designed}
     with steps.step("diagnosis of the bench records"):
         verdict = diagnose_bench(actuator, out, steps)
-    results = Results(published, designed, cam, figures, verdict)
+    with steps.step("the diagnosed actuator under code from three decks"):
+        codes = {
+            name: Code(each.model, each.observers.minimal.model, each.spread.chosen.model)
+            for name, each in both.items()
+        }
+        generated = code_of_three_decks(verdict.actuator, codes, out / "diagnosed", 1.0 if fast else 3.0)
+    results = Results(published, designed, cam, figures, verdict, generated)
     with steps.step("report"):
         write_page(results, out)
     return results

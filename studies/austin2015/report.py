@@ -26,6 +26,7 @@ from nlsdesign.report import (
 
 from .._designed import design_sections, drawing_section, tolerance_sections
 from .evaluation_report import evaluation_sections
+from .generated_report import generated_sections
 from .loop_report import loop_sections
 from .observer_report import observer_sections
 from .results import Results
@@ -57,6 +58,7 @@ def write_page(results: Results, out: Path) -> None:
         *evaluation_sections(results),
         *verdict_sections(results.verdict),
         TextSection("Where the records come from", RECORDS),
+        *generated_sections(results.generated),
         *file_sections(results, out),
         title="A cam-rubber actuator, from deck to report",
         abstract=ABSTRACT,
@@ -198,13 +200,17 @@ def file_sections(results: Results, out: Path) -> list[Section]:
         out / "designed.toml": "deck of the designed actuator",
         out / "diagnosis" / "model.toml": "deck of the refitted actuator with the missing effect",
     }
+    loops = {name: each.loop for name, each in results.both.items()} | {"diagnosed": results.generated.loop}
+    for name, loop in loops.items():
+        for what, source in (("observer", loop.source), ("controller", loop.controller)):
+            files |= {
+                source.header: f"{what} in C99, interface, {name}",
+                source.source: f"{what} in C99, {name}",
+                source.selftest: f"its self-test with vectors, {name}",
+            }
+        files |= dict.fromkeys(loop.fmus, f"co-simulation FMU, {name}")
     for name, each in results.both.items():
-        source = each.loop.source
         files |= {
-            source.header: f"observer in C99, interface, {name}",
-            source.source: f"observer in C99, {name}",
-            source.selftest: f"self-test with vectors, {name}",
-            **dict.fromkeys(each.loop.fmus, f"co-simulation FMU, {name}"),
             each.spread.code.source: f"certified observer in C99, {name}",
             each.spread.file: f"its certificate, {name}",
         }

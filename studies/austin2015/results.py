@@ -13,6 +13,7 @@ from nlsdesign.discrepancy import Verdict
 from .._designed import MadeCam
 from .evaluation import LoopEvaluation
 from .figures import FigureComparison
+from .generated import GeneratedCode
 from .observer import ObserverComparison
 from .spread import ObserverOverSpread
 from .torque_loop import TorqueLoop
@@ -74,6 +75,8 @@ class Results:
         Published actuator against the figures of the paper.
     verdict
         Of the diagnosis of the bench records of the published actuator.
+    generated
+        The diagnosed actuator: its code, and how it runs under code from the other decks.
     """
 
     published: ActuatorResults
@@ -81,6 +84,7 @@ class Results:
     cam: MadeCam
     figures: FigureComparison
     verdict: Verdict
+    generated: GeneratedCode
 
     @property
     def both(self) -> dict[str, ActuatorResults]:
@@ -116,4 +120,5 @@ class Results:
                 f"{name}_onset_of_limit_cycling_Kp": each.evaluation.onset.value,
                 f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
             }
+        numbers |= self.generated.numbers
         return numbers | tracking_numbers({name: each.following for name, each in self.both.items()})

@@ -28,8 +28,8 @@ class TorqueLoop:
 
     Parameters
     ----------
-    source
-        C files of the observer.
+    source, controller
+        C files of observer and controller.
     fmus
         Of plant, observer and controller, and of the plant in FMI 2.
     cosimulated
@@ -39,6 +39,7 @@ class TorqueLoop:
     """
 
     source: CSource
+    controller: CSource
     fmus: tuple[Path, ...]
     cosimulated: nls.Trace
     whole: nls.Trace
@@ -57,10 +58,11 @@ def export_and_cosimulate(
     controller = nls.torque_controller(model)
     parts = {"plant": model, "observer": observer, "controller": controller}
     source = nls.export_c(observer, out / "c", name="observer")
+    law = nls.export_c(controller, out / "c", name="controller")
     fmus = {name: nls.export_fmu(each, out / "fmu" / f"{name}.fmu") for name, each in parts.items()}
     second = nls.export_fmu(model, out / "fmu" / "plant_fmi2.fmu", version="2.0")
     desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
     order = ("observer", "controller", "plant")
     run = nls.cosimulate(fmus=fmus, wires=WIRES, order=order, stop=stop, inputs=desired)
     loop = nls.ClosedLoop(plant=model, observer=observer, controller=controller, wires=FROM_ENCODER)
-    return TorqueLoop(source, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))
+    return TorqueLoop(source, law, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))

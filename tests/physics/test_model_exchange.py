@@ -15,6 +15,7 @@ from models import cam_rubber_actuator
 from nlsdesign.components import (
     ROTATION,
     CoulombFriction,
+    Driven,
     Element,
     Inertia,
     RigidStop,
@@ -27,6 +28,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.export import export_fmu
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation import Trace, simulate
+from tests.fmu_unit import Unit, opened
 from tests.hand_built import plant
 
 VERSIONS = ("2.0", "3.0")
@@ -117,13 +119,14 @@ J, K, T, PULL = 1e-3, 2.0, 0.05, 0.021
 
 
 class Case(NamedTuple):
-    """A sharp model with what it starts from, and what is held all the time."""
+    """A sharp model with what it starts from, what drives it, and the efforts that hold at the end."""
 
     model: FlatModel
     start: dict[str, float]
-    held: dict[str, float]
+    driven: dict[str, float]
     rate: str
     rests: bool
+    holding: tuple[str, ...]
 
 
 def rubbing(friction: Element) -> FlatModel:
@@ -141,14 +144,42 @@ def clutch() -> FlatModel:
     return flatten(assembly("clutch", driver=Inertia(inertia=2 * J), driven=Inertia(inertia=5 * J), rub=rub))
 
 
+def struck() -> FlatModel:
+    """Two bodies that stick to each other; where one strikes a stop, the other one slips."""
+    spring, rub = Spring(stiffness=K, domain=ROTATION), CoulombFriction(sliding_effort=T)
+    return flatten(
+        assembly(
+            "struck",
+            motor=Inertia(inertia=J),
+            load=Inertia(inertia=2 * J),
+            rub=tie(rub, "motor", "load"),
+            spring=tie(spring, "motor"),
+            stop=tie(RigidStop(lower=-0.1, upper=0.1, restitution=0.5), "load"),
+        )
+    )
+
+
+def belt() -> FlatModel:
+    """Stick–slip on a belt that moves: the rate that is held is that to the belt, an input."""
+    spring, rub = tie(Spring(stiffness=K, domain=ROTATION), "wheel"), tie(STRIBECK, "wheel", "belt")
+    return flatten(assembly("belt", belt=Driven(), wheel=Inertia(inertia=J), spring=spring, rub=rub))
+
+
 STRIBECK = StribeckFriction(sliding_effort=0.03, breakaway=0.04, stribeck_speed=0.5)
+DROPPED, SPEED = {"wheel.angle": 0.33}, "wheel.speed"
 SHARP = {
     "coulomb": lambda: Case(
-        rubbing(CoulombFriction(sliding_effort=T)), {"wheel.angle": 0.33}, {}, "wheel.speed", True
+        rubbing(CoulombFriction(sliding_effort=T)), DROPPED, {}, SPEED, True, ("rub.torque",)
     ),
-    "stribeck": lambda: Case(rubbing(STRIBECK), {"wheel.angle": 0.33}, {}, "wheel.speed", True),
-    "bouncing": lambda: Case(bouncing(), {"wheel.angle": 0.5}, {"wheel.torque": -0.02}, "wheel.speed", True),
-    "clutch": lambda: Case(clutch(), {"driver.speed": 2.0}, {"driver.torque": PULL}, "driver.speed", False),
+    "stribeck": lambda: Case(rubbing(STRIBECK), DROPPED, {}, SPEED, True, ("rub.torque", "spring.torque")),
+    "bouncing": lambda: Case(
+        bouncing(), {"wheel.angle": 0.5}, {"wheel.torque": -0.02}, SPEED, True, ("stop.torque",)
+    ),
+    "clutch": lambda: Case(
+        clutch(), {"driver.speed": 2.0}, {"driver.torque": PULL}, "driver.speed", False, ("rub.torque",)
+    ),
+    "struck": lambda: Case(struck(), {"motor.speed": 2.0, "load.speed": 2.0}, {}, "load.speed", False, ()),
+    "belt": lambda: Case(belt(), {SPEED: 0.4}, {"belt.speed": 0.4}, SPEED, False, ()),
 }
 TIMES = np.linspace(0.0, 1.0, 101)
 each_sharp = pytest.mark.parametrize("name", SHARP)
@@ -174,21 +205,23 @@ def after_last_event(run: Trace) -> np.ndarray:
 def test_a_foreign_integrator_finds_the_events_of_a_sharp_model(name, version, sharp):
     """States as for smooth models; events one after another, so each passes on the errors of those before."""
     case = SHARP[name]()
-    own = simulate(case.model, TIMES, start=case.start, inputs=case.held, tolerance=1e-11)
+    own = simulate(case.model, TIMES, start=case.start, inputs=case.driven, tolerance=1e-11)
     assert len(own.events) >= 1
-    shown = [v.name for v in (*case.model.states, *case.model.outputs)]
+    shown = [*(v.name for v in case.model.states), *case.holding]
     worst = []
     for tolerance in (1e-7, 1e-9):
-        run = exchanged(sharp[name, version], TIMES, shown, tolerance, start_values=case.start | case.held)
+        run = exchanged(sharp[name, version], TIMES, shown, tolerance, start_values=case.start | case.driven)
         states = [v.name for v in case.model.states]
         worst.append(max(np.abs(run[n] - own[n]).max() / np.abs(own[n]).max() for n in states))
         assert worst[-1] < 1e3 * tolerance
         rest = after_last_event(own)
         if case.rests:
             assert np.all(run[case.rate][rest] == 0.0)
-        for n in (v.name for v in case.model.outputs):
-            # What holds is seen where it sticks, also when the rate that is held is one between two bodies.
-            assert run[n][rest] == pytest.approx(own[n][rest], rel=1e4 * tolerance, abs=1e-12)
+        for n in case.holding:
+            # What holds is seen where it sticks, also when what is held is the rate between two bodies. It
+            # carries the error of the efforts that it balances.
+            size = max(np.abs(own[v.name]).max() for v in case.model.outputs)
+            assert run[n][rest] == pytest.approx(own[n][rest], rel=0.0, abs=1e3 * tolerance * size)
             assert np.all(np.abs(run[n][rest]) > 1e-3)
     assert worst[1] < worst[0]
 
@@ -198,14 +231,14 @@ def test_a_foreign_integrator_finds_the_events_of_a_sharp_model(name, version, s
 def test_co_simulation_of_a_sharp_model_locates_its_own_events(name, version, sharp):
     """An L-stable method of order four with its tolerance per step, over some hundred steps."""
     case = SHARP[name]()
-    own = simulate(case.model, TIMES, start=case.start, inputs=case.held, tolerance=1e-11)
-    shown = [v.name for v in case.model.states] + [v.name for v in case.model.outputs]
+    own = simulate(case.model, TIMES, start=case.start, inputs=case.driven, tolerance=1e-11)
+    shown = [*(v.name for v in case.model.states), *case.holding]
     for interval in (0.01, 0.25):
         times = np.arange(round(1.0 / interval) + 1) * interval
         places = np.searchsorted(TIMES, times - 1e-9)
         run = fmpy.simulate_fmu(
             str(sharp[name, version]), fmi_type="CoSimulation", stop_time=1.0, output_interval=interval,
-            start_values=case.start | case.held, relative_tolerance=1e-9, output=shown,
+            start_values=case.start | case.driven, relative_tolerance=1e-9, output=shown,
         )  # fmt: skip
         for n in shown:
             assert np.abs(run[n] - own[n][places]).max() < 1e-6 * np.abs(own[n]).max(), n
@@ -216,14 +249,14 @@ def test_co_simulation_of_a_sharp_model_locates_its_own_events(name, version, sh
 @each_sharp
 def test_event_mode_and_early_return_stop_at_the_events(name, sharp):
     case = SHARP[name]()
-    own = simulate(case.model, TIMES, start=case.start, inputs=case.held, tolerance=1e-11)
+    own = simulate(case.model, TIMES, start=case.start, inputs=case.driven, tolerance=1e-11)
     run = fmpy.simulate_fmu(
         str(sharp[name, "3.0"]), fmi_type="CoSimulation", stop_time=1.0, output_interval=0.01,
-        start_values=case.start | case.held, relative_tolerance=1e-10, output=[case.rate],
+        start_values=case.start | case.driven, relative_tolerance=1e-10, output=[case.rate],
         use_event_mode=True, early_return_allowed=True,
     )  # fmt: skip
     off_grid = [t for t in run["time"].tolist() if abs(100 * t - round(100 * t)) > 1e-6]
-    events = [e.time for e in own.events if abs(100 * e.time - round(100 * e.time)) > 1e-6]
+    events = sorted({e.time for e in own.events if abs(100 * e.time - round(100 * e.time)) > 1e-6})
     # Before and after each event.
     assert off_grid == pytest.approx([t for t in events for _ in range(2)], abs=1e-8)
     assert len(events) >= 1
@@ -244,3 +277,67 @@ def test_two_bodies_that_stick_keep_their_momentum(sharp):
         (2 * J * 2.0 + PULL * TIMES[stuck]) / (7 * J), rel=1e-7
     )
     assert run["rub.torque"][stuck] == pytest.approx(np.full(stuck.sum(), PULL * 5 / 7), rel=1e-12)
+
+
+@both
+def test_a_short_touch_within_one_long_step_is_not_missed(version, sharp):
+    """Thrown at the upper stop and free again at the end of the only step: 0.9 + 2.2·t − 10·t²."""
+    start, length = {"wheel.angle": 0.9, "wheel.speed": 2.2}, 0.2
+    with opened(sharp["bouncing", version]) as unit:
+        unit.put(start)
+        unit.begin().run()
+        unit.set(wheel__torque=-0.02)
+        unit.step(length)
+        found = unit.get("wheel.angle", "wheel.speed")
+    # Meets 1 at the smaller root of 10·t² − 2.2·t + 0.1 = 0 with 2.2 − 20·t, and leaves with 0.6 of that.
+    meets = (2.2 - math.sqrt(2.2**2 - 4.0)) / 20.0
+    speed, rest = -0.6 * (2.2 - 20.0 * meets), length - meets
+    assert 0.9 + 2.2 * length - 10.0 * length**2 < 1.0
+    assert found == pytest.approx([1.0 + speed * rest - 10.0 * rest**2, speed - 20.0 * rest], rel=1e-9)
+
+
+@both
+def test_events_are_located_at_a_large_time_as_from_zero(version, sharp):
+    rows = []
+    with opened(sharp["coulomb", version]) as unit:
+        for start in (0.0, 1.7e9):
+            unit.raw.reset()
+            unit.put(DROPPED)
+            unit.begin(start=start).run()
+            for _ in range(600):
+                unit.step(STEP)
+            rows.append(unit.get("wheel.angle", "wheel.speed", "rub.mode"))
+    assert rows[0][1:] == [0.0, 0.0]
+    assert rows[1] == pytest.approx(rows[0], rel=1e-12)
+
+
+@both
+@each_sharp
+def test_a_restored_copy_of_a_sharp_model_goes_on_bit_by_bit(name, version, sharp):
+    case = SHARP[name]()
+    shown = [v.name for v in (*case.model.states, *case.model.outputs)]
+
+    def stepped(unit: Unit) -> list[list[float]]:
+        rows = []
+        for k in range(150):
+            unit.step(STEP * (1 + k % 4))
+            rows.append(unit.get(*shown))
+        return rows
+
+    with opened(sharp[name, version]) as unit:
+        unit.put(case.start | case.driven)
+        unit.begin().run()
+        stepped(unit)
+        copy, time = unit.raw.getFMUState(), unit.time
+        written = unit.raw.serializeFMUState(copy)
+        first = stepped(unit)
+        unit.raw.setFMUState(copy)
+        unit.raw.freeFMUState(copy)
+        unit.time = time
+        assert stepped(unit) == first
+        with opened(sharp[name, version]) as other:
+            read = other.raw.deserializeFMUState(written)
+            other.raw.setFMUState(read)
+            other.raw.freeFMUState(read)
+            other.time = time
+            assert stepped(other) == first

@@ -26,6 +26,7 @@ NAMED = {
 }
 
 
+# The measurements are no part of the project: they may not travel with it.
 @pytest.mark.skipif(
     "NLSDESIGN_SHARED" not in os.environ, reason="NLSDESIGN_SHARED does not name the folder of measurements"
 )

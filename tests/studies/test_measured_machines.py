@@ -29,6 +29,7 @@ from nlsdesign.quantity import Quantity
 
 SHARED = os.environ.get("NLSDESIGN_SHARED", "")
 STUDIES = Path(__file__).parents[2] / "studies"
+# The measurements are no part of the project: they may not travel with it.
 measured = pytest.mark.skipif(not SHARED, reason="NLSDESIGN_SHARED does not name the folder of measurements")
 
 

@@ -22,10 +22,10 @@ from nlsdesign.observer import CascadeGain, FixedGrid, check_stability, design_o
 from nlsdesign.report import verdict_sections, write_report
 from nlsdesign.simulation import Sine, simulate
 from tests.cam_cases import KEEP, TARGET
+from tests.command_line import Run, run
 from tests.diagnosed import declared_rig
 from tests.renamed import SCHEMES, Renamed, Scheme, exchanged, in_words, nested, renamed
 from tests.rig import ACTUATORS, make_records, write_declaration, write_records
-from tests.unit.test_cli import Run, run
 
 __all__ = ["run"]
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from nlsdesign.cli import studies as runner
 
 
+# A minute; that the robust design is a third better is held by tests/physics/test_tolerance_goal.py too.
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
     results = runner.run_study("robust_cam", tmp_path, fast=True)
     assert runner.not_as_claimed(results, runner.claims("robust_cam")) == {}

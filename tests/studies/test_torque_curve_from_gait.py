@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from nlsdesign.cli.studies import claims, load_study, not_as_claimed, run_study
 
 
+# Half a minute; the fast way below runs the same steps for fewer ratios.
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
     results = run_study("torque_curve_from_gait", tmp_path)
     expected = claims("torque_curve_from_gait")

@@ -18,7 +18,7 @@ from nlsdesign.errors import ArrangementError, MeasurementError
 from nlsdesign.observer import read_certificate, verify
 from nlsdesign.observer.certificates.exact import exact, exponential_below, is_positive_definite
 from nlsdesign.observer.certificates.intervals import enclose
-from tests.unit.test_cli import Run, run
+from tests.command_line import Run, run
 
 __all__ = ["run"]  # the fixture
 

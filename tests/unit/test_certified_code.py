@@ -27,8 +27,8 @@ from nlsdesign.observer import (
     read_certificate,
     write_certificate,
 )
+from tests.command_line import Run, run
 from tests.unguarded import unguarded
-from tests.unit.test_cli import Run, run
 
 __all__ = ["run"]  # the fixture
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.test_cli import Run, run
+from tests.command_line import Run, run
 
 __all__ = ["run"]
 DECK = "austin2015_figure_consistent"

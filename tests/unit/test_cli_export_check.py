@@ -20,8 +20,8 @@ from nlsdesign.deck import load_deck
 from nlsdesign.export import export_c, export_fmu
 from nlsdesign.export.fmi.fmu_origin import ORIGIN_FILE
 from nlsdesign.model import flatten
+from tests.command_line import Run, run
 from tests.hand_built import observer as hand_built_observer
-from tests.unit.test_cli import Run, run
 
 __all__ = ["run"]
 SPRING = "austin2015_soft_spring"

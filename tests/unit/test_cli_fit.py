@@ -10,20 +10,21 @@ import numpy as np
 import pytest
 
 from nlsdesign.components import Assembly, Dashpot, Mass, Spring, tie
-from nlsdesign.components.assembly.deck_writer import declare, write_deck
+from nlsdesign.components.assembly.deck_writer import deck_digest, declare, write_deck
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import refit
 from nlsdesign.errors import MeasurementError
 from nlsdesign.identification import Column, RecordSet, load_records
 from nlsdesign.model import flatten
+from tests.command_line import Run, run
 from tests.diagnosed import declared_rig
 from tests.rig import ACTUATORS, make_records, truth, write_declaration, write_records
-from tests.unit.test_cli import Run, run
 from tests.unit.test_identification_shooting import NOISE, TRUE
 from tests.unit.test_identification_shooting import truth as slide_record
 
 __all__ = ["run"]
+PARTS = ("observer", "controller", "torque_loop")
 SEED, ONLY = 5, ("sine_25deg_2.0Hz", "sine_15deg_5.0Hz", "multisine")
 
 
@@ -155,3 +156,32 @@ def test_a_drive_that_moves_freely_is_fitted_by_simulation_over_windows() -> Non
     assert held.noise_floor == pytest.approx(NOISE, rel=0.15)
     assert held.fitted < 0.5 * held.declared
     assert found.actuator.quantities()["body.mass"].number == pytest.approx(2.0, rel=0.03)
+
+
+def test_the_fitted_machine_is_exported_and_belongs_to_its_deck(
+    run: Run, bench: Path, tmp_path: Path
+) -> None:
+    called = ("fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "records"))
+    status, out, _ = run(
+        *called, "--out", str(tmp_path / "out"), "--export", "--sample-time", "2 ms", "--json"
+    )
+    assert status == 0
+    content = json.loads(out[out.index("{") :])
+    assert content["not_exported"] == []
+    names = {str(Path(path).relative_to(tmp_path / "out")) for path in content["exported"]}
+    code = {f"c/{part}{end}" for part in PARTS for end in (".c", ".h", "_selftest.c")}
+    assert names == code | {"plant.fmu", *(f"{part}.fmu" for part in PARTS)}
+    declared, fitted = assembly_of(bench / "deck.toml"), assembly_of(tmp_path / "out" / "model.toml")
+    assert fitted.name == f"{declared.name}_refitted_{deck_digest(fitted)[:8]}"
+    for part in PARTS:
+        header = (tmp_path / "out" / "c" / f"{part}.h").read_text("utf-8")
+        assert f'_DECK_DIGEST "{deck_digest(fitted)}"' in header
+        assert f'_PARENT_DIGEST "{deck_digest(declared)}"' in header
+        assert "SAMPLE_TIME 0.002 " in header
+    status, out, _ = run(
+        "export", "check", str(tmp_path / "out"), "--deck", str(tmp_path / "out" / "model.toml")
+    )
+    assert status == 0, out
+    assert "All 14 files belong" in out
+    status, out, _ = run("export", "check", str(tmp_path / "out"), "--deck", str(bench / "deck.toml"))
+    assert status == 1

@@ -5,39 +5,19 @@ from __future__ import annotations
 import csv
 import json
 import re
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from nlsdesign.cli import main
 from nlsdesign.cli.observer_kinds import KINDS, designed_observer
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.observer import choose_observer
+from tests.command_line import Run, run
 
-Run = Callable[..., tuple[int, str, str]]
+__all__ = ["run"]
 DECK = "austin2015_soft_spring"
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run the command line in an empty folder; returns exit status, output and errors."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["nlsdesign", *words])
-        try:
-            main()
-            status = 0
-        except SystemExit as leaving:
-            status = int(leaving.code or 0)
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return call
 
 
 def without_spread(path: Path) -> Path:

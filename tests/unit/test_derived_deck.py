@@ -10,7 +10,7 @@ from nlsdesign.components.assembly.deck_writer import deck_digest, deck_text, de
 from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.model import flatten
 from nlsdesign.model.derived_deck import derived, digits_in_name
-from tests.unit.test_cli import Run, run
+from tests.command_line import Run, run
 
 __all__ = ["run"]
 LINEAR = "austin2015_soft_spring"

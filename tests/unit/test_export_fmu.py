@@ -83,7 +83,7 @@ def test_the_archive_holds_what_the_standard_names(name, version, units):
         )
     (offers,) = etree.fromstring(text).iter("CoSimulation")
     word = "providesDirectionalDerivative" + ("" if version == "2.0" else "s")
-    assert offers.get(word) == ("true" if name == "plant" else "false")
+    assert offers.get(word) == "true"
     assert icon.startswith(b"\x89PNG\r\n\x1a\n")
     assert "MIT License" in licence
     for variable in (*MODELS[name].inputs, *MODELS[name].parameters, *MODELS[name].outputs):
@@ -110,7 +110,8 @@ def test_the_sources_in_the_archive_compile_without_a_warning(name, version, uni
 
 
 @both
-def test_the_same_model_gives_the_same_bytes_and_another_one_another_token(version, tmp_path):
+def test_the_same_model_gives_the_same_bytes_and_another_one_another_token(version, tmp_path, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     one, again = (export_fmu(plant(), tmp_path / f"{k}.fmu", version=version) for k in ("a", "b"))
     assert one.read_bytes() == again.read_bytes()
     token = fmpy.read_model_description(str(one)).guid
@@ -478,10 +479,6 @@ def test_directional_derivatives_are_those_of_the_equations(version, units):
             )
         with pytest.raises(Refused):
             unit.derivative(["spring.torque"], ["der(motor.speed)"], [1.0])
-    with opened(units["observer", version]) as unit:
-        unit.begin().run()
-        with pytest.raises(Refused):
-            unit.derivative(["spring.torque"], ["motor.angle"], [1.0])
 
 
 @both

@@ -23,6 +23,7 @@ STEP, COUNT = 1e-3, 300
     ("model", "read"), [(plant(), "spring.torque"), (observer(), "spring.torque")], ids=["plant", "observer"]
 )
 def test_the_windows_library_gives_the_same_as_the_one_for_this_machine(model, read, tmp_path):
+    # The loader, windows_loader.c, puts x86-64 code into a Linux process and calls it there.
     if host_platform() != "x86_64-linux":
         pytest.skip("the loader maps x86-64 code on Linux")
     unit = export_fmu(model, tmp_path / "one.fmu", platforms=["x86_64-linux", "x86_64-windows"])

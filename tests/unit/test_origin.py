@@ -6,6 +6,7 @@ import hashlib
 import re
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import deck_digest, deck_problems, deck_text, declare
 from nlsdesign.components.assembly.moved_load import with_moved_load
-from nlsdesign.control import torque_controller
+from nlsdesign.control import joined, torque_controller
 from nlsdesign.deck import deck_names, load_deck, read_deck
 from nlsdesign.model import FlatModel, Origin, flatten
 from nlsdesign.model.paper_form import paper_form
@@ -174,6 +175,21 @@ def test_numbers_that_no_deck_declares_leave_the_digest() -> None:
 
 def test_a_moved_load_is_another_arrangement() -> None:
     assert origin(flatten(with_moved_load(bundled()))).digest != deck_digest(bundled())
+
+
+def test_observer_and_controller_of_two_decks_are_of_neither() -> None:
+    plant, grid = flatten(bundled()), FixedGrid(-1.5, 1.5, 33)
+    other = plant.with_values({"motor.inertia": 7e-4})
+    observer = design_observer(plant, grid=grid)
+    one = joined(observer, torque_controller(plant))
+    assert origin(one).digest == deck_digest(bundled())
+    mixed = origin(joined(observer, torque_controller(other)))
+    assert mixed.digest not in (origin(plant).digest, origin(other).digest)
+    assert mixed.deck == f"{DECK} and {DECK}"
+    assert mixed.numbers == {}
+    without = joined(replace(observer, origin=None), torque_controller(plant))
+    assert origin(without).deck == f"no deck and {DECK}"
+    assert origin(without).digest != origin(plant).digest
 
 
 def test_an_origin_that_was_given_by_hand_is_not_kept_with_other_numbers() -> None:

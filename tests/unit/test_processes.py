@@ -42,6 +42,7 @@ def test_what_a_piece_raises_is_raised_here() -> None:
         list(parallel_map(work, 3))
 
 
+# Process lists are those of /proc, which other systems do not have.
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes as Linux lists them")
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
 def test_helpers_end_with_the_process_that_waits(ending: signal.Signals) -> None:
@@ -100,6 +101,7 @@ except KeyboardInterrupt:
 """
 
 
+# Elsewhere workers are spawned, and no handler is inherited that could end them.
 @pytest.mark.skipif(sys.platform != "linux", reason="counts on fork")
 @pytest.mark.parametrize(
     ("program", "expected"),

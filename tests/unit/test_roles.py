@@ -48,7 +48,7 @@ from nlsdesign.observer import design_observer
 from nlsdesign.simulation import measure, simulate
 from tests import observed as ob
 from tests.cam_cases import KEEP, TARGET
-from tests.unit.test_cli import Run, run
+from tests.command_line import Run, run
 
 __all__ = ["run"]
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.rig import ACTUATORS, make_records, write_set
 
 # Kernels of OpenBLAS that any x86-64 processor with AVX2 can run; other BLAS libraries ignore the name.
@@ -35,6 +37,8 @@ def test_the_deck_of_a_rig_is_the_same_to_the_byte(tmp_path: Path) -> None:
     assert decks[0] == decks[1] == decks[2]
 
 
+# Half a minute; the deck of a rig is compared in every run, below.
+@pytest.mark.slow
 def test_a_designed_deck_and_its_drawings_are_the_same_to_the_byte(tmp_path: Path) -> None:
     target = ("--maximum", "5 N*m", "--angle", "53 deg")
     names = ("cam.contour", "pretension", "rubber.area", "rubber.rest_length")

@@ -9,6 +9,7 @@ import casadi as ca
 
 from ...errors import ArrangementError, ValueRangeError, nearest
 from ...model import FlatModel, Variable
+from ...model.origin import common_origin
 from ...symbolic import Expression
 
 ACTING = "acting"
@@ -79,7 +80,7 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
         bodies=observer.bodies,
         begin=_Joint(wiring, inputs, delay).begin(),
         expected=_Joint(wiring, inputs, delay).expected(),
-        origin=observer.origin or controller.origin,
+        origin=common_origin(observer.origin, controller.origin),
     )
 
 

@@ -41,8 +41,7 @@ def export_date() -> datetime:
 
     Notes
     -----
-    With the variable an export is the same bytes every time. Source: reproducible-builds.org,
-    SOURCE_DATE_EPOCH specification 1.1.
+    With the variable an export is the same bytes every time, as https://reproducible-builds.org proposes.
     """
     given = os.environ.get(_DATE_VARIABLE, "")
     if not given:

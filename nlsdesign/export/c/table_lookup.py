@@ -140,6 +140,52 @@ def look_up(model: FlatModel, real: Real, arguments: Mapping[str, str], used: se
     return lines
 
 
+def look_up_slopes(model: FlatModel, real: Real, arguments: Mapping[str, str], used: set[int]) -> list[str]:
+    """Return the statements that define ``slope<i>``, the slope of ``w<i>`` over the argument of its table.
+
+    They stand behind those of :func:`look_up`. Beyond the ends of a table, where it is held, slopes are 0.
+
+    Parameters
+    ----------
+    model
+        The model.
+    real
+        Number type.
+    arguments
+        C text of each state and input by name.
+    used
+        Indices into w.
+    """
+    lines: list[str] = []
+    widths: dict[tuple[str, float, float, int, int | None], int] = {}
+    zero = real.literal(0.0)
+    for each in indexed_tables(model):
+        columns = each.columns(used)
+        if not columns:
+            continue
+        k, b, last = each.number, f"breakpoints_{each.number}", each.table.values.shape[0] - 1
+        if each.grid not in widths:
+            widths[each.grid] = k
+            at = arguments[each.table.argument]
+            placed = each.table.step != 0.0
+            inside = (
+                f"raw_{k} > {zero} && raw_{k} < {real.literal(float(last))}"
+                if placed
+                else f"{at} > {b}[0] && {at} < {b}[{last}]"
+            )
+            per = (
+                real.literal(1.0 / each.table.step)
+                if placed
+                else f"{real.literal(1.0)} / ({b}[left_{k} + 1] - {b}[left_{k}])"
+            )
+            lines.append(f"const {real.name} per_{k} = {inside} ? {per} : {zero};")
+        n, per = f"row_{k}", f"per_{widths[each.grid]}"
+        lines += [
+            f"const {real.name} slope{each.first + c} = ({n}_next[{c}] - {n}[{c}]) * {per};" for c in columns
+        ]
+    return lines
+
+
 def table_bytes(model: FlatModel, real: Real) -> int:
     """Return the flash that the tables of a model take in C, in bytes: numbers and breakpoints.
 

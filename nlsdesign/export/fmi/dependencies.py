@@ -1,4 +1,4 @@
-"""Dependencies of outputs and derivatives, from the sparsity of the symbolic Jacobian."""
+"""Dependencies of outputs and derivatives, from the operations of their expressions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ...model.flat import Symbols
+from .expression_walk import Dependence, dependences
 from .fmu_variables import FmuLayout, FmuVariable
 
 
@@ -61,7 +62,7 @@ def model_structure(layout: FmuLayout) -> ModelStructure:
     own = {v.name: i for i, v in enumerate(model.outputs)}
     given += [(v, ca.densify(s.output)[own[v.variable.name]]) for v in layout.outputs]
     rates = [(v, ca.densify(s.derivative)[i]) for i, v in enumerate(layout.derivatives)]
-    dependencies = {v.reference: slopes for v, slopes in _slopes(layout, s, [*given, *rates])}
+    dependencies = {v.reference: kinds for v, kinds in _kinds(layout, s, [*given, *rates])}
 
     running = {0, *[v.reference for v in layout.inputs]}
     if model.sample_time is None:
@@ -84,26 +85,30 @@ def model_structure(layout: FmuLayout) -> ModelStructure:
     )
 
 
-def _slopes(
+def _kinds(
     layout: FmuLayout, s: Symbols, unknowns: Sequence[tuple[FmuVariable, ca.SX]]
 ) -> list[tuple[FmuVariable, dict[int, str]]]:
-    """Return for each unknown the value references it depends on, each with the kind of its slope."""
+    """Return for each unknown the value references it depends on, each with its kind.
+
+    They are read off the operations, not off the slopes: a rounded or compared value depends on what is
+    rounded, though its slope is zero.
+    """
+    model = layout.model
     knowns = [layout.time, *layout.states, *layout.inputs, *layout.parameters]
+    place = {each.variable.name: number for number, each in enumerate(knowns)}
+    symbols = [[place[v.variable.name] for v in group] for group in (layout.states, layout.inputs)]
+    symbols = [[0], *symbols, [place[v.variable.name] for v in layout.parameters]]
+    symbols.append([place[table.argument] for table in model.tables for _ in table.columns])
+    changing = sum(1 << number for number in range(1 + len(layout.states) + len(layout.inputs)))
     expressions = ca.SX(ca.vertcat(*[e for _, e in unknowns]))
-    slopes = ca.jacobian(expressions, ca.vertcat(s.time, s.state, s.input, s.parameter))
-    cells = [ca.SX(slopes.nz[k]) for k in range(slopes.nnz())]
-    changing = ca.vertcat(s.time, s.state, s.input, s.table)
-    varied = set(ca.jacobian_sparsity(ca.SX(ca.vertcat(*cells)), changing).row()) if cells else set()
-    tuned = "fixed" if layout.model.sample_time is None else "tunable"
-    kinds_of: list[dict[int, str]] = [{} for _ in unknowns]
-    rows, columns = slopes.sparsity().get_triplet()
-    for number, (row, column) in enumerate(zip(rows, columns, strict=True)):
-        kind = "dependent" if number in varied else "constant" if cells[number].is_constant() else tuned
-        kinds_of[row][knowns[column].reference] = kind
-    # Looked-up numbers change with the argument of their table.
-    reference = {v.variable.name: v.reference for v in (*layout.states, *layout.inputs)}
-    arguments = [reference[table.argument] for table in layout.model.tables for _ in table.columns]
-    rows, columns = ca.jacobian_sparsity(expressions, s.table).get_triplet()
-    for row, column in zip(rows, columns, strict=True):
-        kinds_of[row][arguments[column]] = "dependent"
-    return [(variable, kinds) for (variable, _), kinds in zip(unknowns, kinds_of, strict=True)]
+    groups = [s.time, s.state, s.input, s.parameter, s.table]
+    of_each = dependences(ca.Function("unknowns", groups, [ca.densify(expressions)]), symbols, changing)
+    tuned = "fixed" if model.sample_time is None else "tunable"
+
+    def kind(of: Dependence, bit: int) -> str:
+        return "dependent" if of.nonlinear & bit else tuned if of.scaled & bit else "constant"
+
+    return [
+        (variable, {each.reference: kind(of, 1 << i) for i, each in enumerate(knowns) if of.on & (1 << i)})
+        for (variable, _), of in zip(unknowns, of_each, strict=True)
+    ]

@@ -1,14 +1,15 @@
 """Functional mock-up units for co-simulation, FMI 3.0 and 2.0, of any flat model.
 
 A continuous model contains its own integrator, a discrete one the same C code as the controller.
-Archives are deterministic: the same model gives the same bytes, and the instantiation token is a hash of the
-content.
+Archives are deterministic: the same model and date give the same bytes. The instantiation token is a hash of
+the content without the date.
 """
 
 from __future__ import annotations
 
 import hashlib
 import math
+import os
 import struct
 import tempfile
 import zipfile
@@ -19,13 +20,17 @@ from ...errors import ExportError, ValueRangeError, nearest
 from ...model.flat import FlatModel
 from ...writing import draft
 from ..c.c_text import identifier
-from ..compilation.cross_compiler import Platform, chosen_platforms, compile_library
+from ..compilation.cross_compiler import ALL_PLATFORMS, Platform, chosen_platforms
 from ..files import shell
+from .authorship import Authorship
+from .compiled_binaries import compiled_binaries
+from .compiled_binaries import fmi_headers as fmi_headers
 from .fmu_documentation import icon, page
 from .fmu_origin import with_origin
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout
 from .model_description import build_description, model_description, terminals_and_icons
+from .terminals import terminals
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _TOKEN = "{token-of-this-content}"
@@ -38,6 +43,7 @@ def export_fmu(
     version: str = "3.0",
     platforms: Sequence[str] | None = None,
     step: float | None = None,
+    authorship: Authorship | None = None,
 ) -> Path:
     """Write a co-simulation FMU with sources, documentation and compiled binaries.
 
@@ -50,10 +56,14 @@ def export_fmu(
     version
         ``"3.0"`` or ``"2.0"``.
     platforms
-        Names from :data:`~nlsdesign.export.compilation.cross_compiler.PLATFORMS`; by default only that of
-        the machine this runs on.
+        Names from :data:`~nlsdesign.export.compilation.cross_compiler.PLATFORMS`. By default those that the
+        environment variable ``NLSDESIGN_PLATFORMS`` names, separated by commas or as ``all``; without it that
+        of the machine this runs on.
     step
         Communication step of the default experiment in s; 1 ms or the sample time by default.
+    authorship
+        Author, licence and date of the export; the date is the present time by default, or that of
+        ``SOURCE_DATE_EPOCH``.
 
     Returns
     -------
@@ -85,8 +95,8 @@ def export_fmu(
     length = step if step is not None else (model.sample_time or 1e-3)
     if not (math.isfinite(length) and length > 0.0):
         raise ValueRangeError(f"step={length}", "must be a positive number of seconds")
-    chosen = chosen_platforms(platforms)
-    contents = fmu_texts(model, version=version, step=length)
+    chosen = chosen_platforms(platforms if platforms is not None else _platforms_of_environment())
+    contents = fmu_texts(model, version=version, step=length, authorship=(authorship or Authorship()).dated())
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
@@ -95,7 +105,14 @@ def export_fmu(
     return target
 
 
-def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes]:
+def _platforms_of_environment() -> Sequence[str] | None:
+    named = [name.strip() for name in os.environ.get("NLSDESIGN_PLATFORMS", "").split(",") if name.strip()]
+    return (ALL_PLATFORMS if "all" in named else named) or None
+
+
+def fmu_texts(
+    model: FlatModel, *, version: str, step: float, authorship: Authorship | None = None
+) -> dict[str, bytes]:
     """Return everything in an FMU but the binaries.
 
     Parameters
@@ -106,25 +123,37 @@ def fmu_texts(model: FlatModel, *, version: str, step: float) -> dict[str, bytes
         ``"3.0"`` or ``"2.0"``.
     step
         Communication step of the default experiment in s.
+    authorship
+        Author, licence and date. The date has no part in the token.
 
     Returns
     -------
     dict
         Content by path within the FMU.
     """
-    variables = layout(model)
-    texts = {"modelDescription.xml": model_description(variables, version=version, token=_TOKEN, step=step)}
-    for name, text in fmu_sources(variables, version, _TOKEN).items():
-        texts[f"sources/{name}"] = text
-    token = _token(texts)
-    texts = {path: text.replace(_TOKEN, token) for path, text in texts.items()}
-    texts["documentation/index.html"] = page(variables)
+    variables, about = layout(model), authorship or Authorship()
+
+    def description(token: str, shown: Authorship) -> str:
+        return model_description(variables, version=version, token=token, step=step, authorship=shown)
+
+    sources = {f"sources/{name}": text for name, text in fmu_sources(variables, version, _TOKEN).items()}
+    token = _token(sources | {"modelDescription.xml": description(_TOKEN, about.undated())})
+    texts = {path: text.replace(_TOKEN, token) for path, text in sources.items()}
+    texts["modelDescription.xml"] = description(token, about)
+    texts["documentation/index.html"] = page(variables, about)
     texts["documentation/licenses/license.txt"] = shell("license.txt")
     if version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(variables)
-        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons()
-    picture = "model.png" if version == "2.0" else "terminalsAndIcons/icon.png"
-    return {path: text.encode() for path, text in texts.items()} | {picture: icon()}
+        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(variables)
+    return {path: text.encode() for path, text in texts.items()} | _pictures(variables.model, version)
+
+
+def _pictures(model: FlatModel, version: str) -> dict[str, bytes]:
+    """Return the pictures of the model, and in FMI 3.0 of its terminals."""
+    if version == "2.0":
+        return {"model.png": icon()}
+    attached = {each.picture for each in terminals(model)}
+    return {f"terminalsAndIcons/{name}.png": icon(name) for name in ("icon", *sorted(attached))}
 
 
 def _token(texts: Mapping[str, str]) -> str:
@@ -139,31 +168,20 @@ def _token(texts: Mapping[str, str]) -> str:
 def _binaries(
     contents: Mapping[str, bytes], folder: Path, name: str, version: str, platforms: Sequence[Platform]
 ) -> dict[str, bytes]:
-    for path, content in contents.items():
-        if path.startswith("sources/"):
-            (folder / path).parent.mkdir(exist_ok=True)
-            (folder / path).write_bytes(content)
-    source = folder / "sources" / main_source(version)
+    prefix = "sources/"
+    sources = {
+        path.removeprefix(prefix): content for path, content in contents.items() if path.startswith(prefix)
+    }
+    sources.pop("buildDescription.xml", None)
+    libraries = compiled_binaries(sources, main_source(version), folder, name=name, platforms=platforms)
     built: dict[str, dict[str, bytes]] = {}
     for each in platforms:
-        place = folder / each.name
-        place.mkdir()
-        library = compile_library(
-            [source], place / f"{name}{each.extension}", platform=each, include=[fmi_headers()]
-        )
         where = each.name if version == "3.0" else each.fmi2
-        built.setdefault(f"binaries/{where}/{library.name}", {})[each.name] = library.read_bytes()
+        built.setdefault(f"binaries/{where}/{name}{each.extension}", {})[each.name] = libraries[each.name]
     return {
         path: next(iter(parts.values())) if len(parts) == 1 else universal_binary(parts)
         for path, parts in built.items()
     }
-
-
-def fmi_headers() -> Path:
-    """Return the folder of the headers of the FMI standard, which come with fmpy."""
-    import fmpy
-
-    return Path(fmpy.__file__).parent / "c-code"
 
 
 def universal_binary(parts: Mapping[str, bytes]) -> bytes:

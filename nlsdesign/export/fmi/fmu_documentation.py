@@ -9,18 +9,23 @@ from collections.abc import Sequence
 from html import escape
 
 from ...locations import version as own_version
+from ...model.origin import Origin
 from ...quantity import typeset_unit
 from ..files import filled
+from .authorship import Authorship
 from .fmu_variables import FmuLayout, FmuVariable
+from .terminals import FLANGE, LOOP, Terminal, terminals
 
 
-def page(layout: FmuLayout) -> str:
+def page(layout: FmuLayout, authorship: Authorship | None = None) -> str:
     """Return ``documentation/index.html``: a table of all variables, readable without a network.
 
     Parameters
     ----------
     layout
         Variables of the FMU.
+    authorship
+        Author, licence and date.
     """
     model = layout.model
     kind = (
@@ -39,8 +44,28 @@ def page(layout: FmuLayout) -> str:
         ("Derivatives and signals", (*layout.derivatives, *layout.signals)),
     )
     tables = "\n".join(_table(title, group) for title, group in groups if group)
+    attached = terminals(model)
+    tables += "".join(_terminal_table(each) for each in attached)
+    rows = _about(model.origin, authorship or Authorship())
     texts = {"title": model.name, "description": model.description, "kind": kind, "version": own_version()}
-    return filled("index.html", {key: escape(text) for key, text in texts.items()} | {"tables": tables})
+    return filled(
+        "index.html", {key: escape(text) for key, text in texts.items()} | {"about": rows, "tables": tables}
+    )
+
+
+def _about(origin: Origin | None, authorship: Authorship) -> list[str]:
+    """Return rows of a list that says where the FMU comes from."""
+    known = authorship.attributes(origin)
+    texts = {
+        "Deck": origin.deck if origin else "",
+        "SHA-256 of the deck": origin.digest if origin else "",
+        "Version": known.get("version", ""),
+        "Author": authorship.author,
+        "Copyright": authorship.copyright,
+        "Licence": known["license"],
+        "Date of export": authorship.stamp,
+    }
+    return [f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in texts.items() if text]
 
 
 def _table(title: str, group: Sequence[FmuVariable]) -> str:
@@ -49,6 +74,16 @@ def _table(title: str, group: Sequence[FmuVariable]) -> str:
         "<tr><th>name</th><th>value</th><th>unit</th><th>range</th><th>description</th><th>source</th></tr>"
     )
     return f"<h2>{title}</h2>\n<table>\n{head}\n{rows}\n</table>"
+
+
+def _terminal_table(each: Terminal) -> str:
+    rows = "\n".join(
+        f"<tr><td>{escape(m.name)}</td><td>{escape(m.variable)}</td><td>{m.kind}</td></tr>"
+        for m in each.members
+    )
+    head = "<tr><th>member</th><th>variable</th><th>kind</th></tr>"
+    title = f"Terminal {escape(each.name)} ({each.rule}, FMI 3.0 only)"
+    return f"\n<h2>{title}</h2>\n<p>{escape(each.description)}</p>\n<table>\n{head}\n{rows}\n</table>"
 
 
 def _table_row(each: FmuVariable) -> str:
@@ -66,15 +101,19 @@ def _table_row(each: FmuVariable) -> str:
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
 
 
-def icon(size: int = 96) -> bytes:
-    """Return a PNG: a spiral cam with its centre and the cable that leaves it.
+def icon(name: str = "icon", size: int = 96) -> bytes:
+    """Return a PNG: the model as a spiral cam with its cable, or one of its terminals.
 
     Parameters
     ----------
+    name
+        ``"icon"`` for the model, or the picture of a terminal.
     size
         Width and height in pixels.
     """
-    rows = b"".join(b"\0" + bytes(v for i in range(size) for v in _pixel(i, j, size)) for j in range(size))
+    pixel = {LOOP: _of_loop, FLANGE: _of_flange}.get(name, _of_model)
+    axis = [(i + 0.5) / size * 2 - 1 for i in range(size)]
+    rows = b"".join(b"\0" + bytes(v for x in axis for v in pixel(x, -y)) for y in axis)
     header = struct.pack(">IIBBBBB", size, size, 8, 6, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows, 9)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in chunks)
@@ -84,14 +123,29 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def _pixel(i: int, j: int, size: int) -> tuple[int, int, int, int]:
-    x, y = (i + 0.5) / size * 2 - 1, 1 - (j + 0.5) / size * 2
+_Pixel = tuple[int, int, int, int]
+_BLUE, _RED, _WHITE, _CLEAR = (38, 84, 124, 255), (200, 85, 61, 255), (255, 255, 255, 255), (0, 0, 0, 0)
+
+
+def _of_model(x: float, y: float) -> _Pixel:
     radius, angle = math.hypot(x + 0.25, y), math.atan2(y, x + 0.25) % (2 * math.pi)
     rim = 0.3 + 0.3 * angle / (2 * math.pi)
     if radius < 0.08:
-        return 255, 255, 255, 255
+        return _WHITE
     if radius < rim:
-        return 38, 84, 124, 255
-    if x > -0.25 and abs(y + 0.55) < 0.045:
-        return 200, 85, 61, 255
-    return 0, 0, 0, 0
+        return _BLUE
+    return _RED if x > -0.25 and abs(y + 0.55) < 0.045 else _CLEAR
+
+
+def _of_loop(x: float, y: float) -> _Pixel:
+    """A bus: three lines in a frame."""
+    if max(abs(x), abs(y)) > 0.8:
+        return _BLUE
+    return _BLUE if min(abs(y - at) for at in (-0.4, 0.0, 0.4)) < 0.07 else _WHITE
+
+
+def _of_flange(x: float, y: float) -> _Pixel:
+    """A flange: a disc with four holes."""
+    if min(math.hypot(x - a, y - b) for a in (-0.45, 0.45) for b in (-0.45, 0.45)) < 0.13:
+        return _WHITE
+    return _RED if math.hypot(x, y) < 0.95 else _CLEAR

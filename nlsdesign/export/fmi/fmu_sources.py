@@ -13,7 +13,7 @@ from ..c.controller_code import check_discrete, header_text, source_text
 from ..c.controller_step import step_body
 from ..c.instructions import named_indices, print_statements
 from ..c.structures import member_paths
-from ..c.table_lookup import indexed_tables, look_up, table_data
+from ..c.table_lookup import indexed_tables, look_up, look_up_slopes, table_data
 from ..files import filled, shell
 from .fmu_variables import FmuLayout
 
@@ -148,7 +148,12 @@ def _held(layout: FmuLayout) -> tuple[Symbols, ca.SX, ca.SX]:
     given = [s.time, s.state, s.input, s.parameter, mode]
     derivative, indicators, _ = switching.branch.call(given)
     output, signal = switching.shown.call(given)
-    return s._replace(derivative=derivative, output=output, signal=signal), mode, ca.densify(indicators)
+    # An output that is a state or a signal is that one; so outputs may have been added to the model.
+    named = {v.name: s.state[i] for i, v in enumerate(layout.model.states)}
+    named |= {v.name: signal[i] for i, v in enumerate(layout.model.signals)}
+    outputs = [named[v.name] if v.name in named else output[i] for i, v in enumerate(layout.model.outputs)]
+    held = s._replace(derivative=derivative, output=ca.SX(ca.vertcat(*outputs)), signal=signal)
+    return held, mode, ca.densify(indicators)
 
 
 def _switched(layout: FmuLayout, s: Symbols, mode: ca.SX, indicators: ca.SX) -> str:
@@ -220,6 +225,8 @@ def _discrete(layout: FmuLayout, name: str) -> str:
     given = [path for path, v in zip(y, model.outputs, strict=True) if v.name in own]
     lookups, signals, looked_up = _signals(layout)
     _, known = step_body(model, name, DOUBLE)
+    directional, sloped = _directional(layout)
+    looked_up |= sloped
     missing = [t for t in indexed_tables(model) if t.columns(looked_up) and not t.columns(known)]
     values = {
         "name": name,
@@ -231,8 +238,47 @@ def _discrete(layout: FmuLayout, name: str) -> str:
         "states": [f"x[{i}] = before.{path};" for i, path in enumerate(x)],
         "outputs": [f"y[{i}] = outputs.{path};" for i, path in enumerate(given)],
         "signals": [*lookups, *signals],
+        "directional": directional,
     }
     return filled("fmu_discrete.c", values)
+
+
+def _directional(layout: FmuLayout) -> tuple[list[str], set[int]]:
+    """Return how what a sample shows changes in a direction, and the looked-up numbers used."""
+    model = layout.model
+    s = model.symbols()
+    groups = {
+        "x": (model.states, s.state),
+        "u": (model.inputs, s.input),
+        "p": (model.parameters, s.parameter),
+    }
+    places = {"u": "memory->inputs", "p": "memory->parameters"}
+    texts = {
+        letter: [f"{places[letter]}.{path}" for path in member_paths(group).values()]
+        if letter in places
+        else _cells(letter, len(group))
+        for letter, (group, _) in groups.items()
+    }
+    count = s.table.numel()
+    seeds = [ca.SX.sym(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
+    seeds.append(ca.SX.sym("dw", count))
+    of = [e for _, e in groups.values()] + [s.table]
+    results = [ca.jtimes(e, ca.vertcat(*of), ca.vertcat(*seeds)) for e in _own(layout, s)]
+    function = ca.Function("d", [*of, *seeds], [ca.densify(e) for e in results], {"cse": True})
+    given = [*texts.values(), [f"w{i}" for i in range(count)]]
+    given += [_cells(f"d{letter}", e.numel()) for letter, (_, e) in groups.items()]
+    given.append([f"dw{i}" for i in range(count)])
+    targets = [_cells(name, e.numel()) for name, e in zip(("dy", "ds"), results, strict=True)]
+    statements = print_statements(function, given, targets, real=DOUBLE)
+    sloped = named_indices(statements, "dw")
+    used = named_indices(statements, "w") | sloped
+    names = {v.name: (texts[letter][i], f"d{letter}[{i}]")
+             for letter in "xu" for i, v in enumerate(groups[letter][0])}  # fmt: skip
+    arguments = {name: text for name, (text, _) in names.items()}
+    columns = [names[table.argument][1] for table in model.tables for _ in table.columns]
+    changes = [f"const double dw{i} = slope{i} * {columns[i]};" for i in sorted(sloped)]
+    slopes = look_up_slopes(model, DOUBLE, arguments, sloped)
+    return [*look_up(model, DOUBLE, arguments, used), *slopes, *changes, *statements], used
 
 
 def _signals(layout: FmuLayout) -> tuple[list[str], list[str], set[int]]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +20,9 @@ from ...errors import ExportError
 from ...model.flat import FlatModel, Variable
 from ..c.status_bits import FIRST_INDEX_BIT, STATUS_BITS
 from .event_variables import indicator_variables, mode_variables
+from .expression_walk import EVERYTHING, Interval, ranges
+from .terminals import with_flange_outputs
+from .typical_sizes import typical_sizes, with_sizes
 
 RELATIVE_TOLERANCE = 1e-8
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
@@ -118,6 +122,9 @@ def layout(model: FlatModel) -> FmuLayout:
     continuous = model.sample_time is None
     changing = "continuous" if continuous else "discrete"
     _check_names(model)
+    model = with_flange_outputs(model)
+    sizes = typical_sizes(model)
+    model = _as_shown(model, sizes)
     outputs, signals = _named_once(model)
     given_out = {v.name for v in model.outputs}
     number = iter(range(10**9))
@@ -133,7 +140,7 @@ def layout(model: FlatModel) -> FmuLayout:
         for v in model.states
     )
     derivatives = tuple(
-        FmuVariable(next(number), _rate(s.variable), "local", changing, "calculated", s.reference)
+        FmuVariable(next(number), _rate(s.variable, sizes), "local", changing, "calculated", s.reference)
         for s in states
         if continuous
     )
@@ -154,10 +161,46 @@ def layout(model: FlatModel) -> FmuLayout:
     )
 
 
-def _rate(state: Variable) -> Variable:
+def _as_shown(model: FlatModel, sizes: Mapping[str, float]) -> FlatModel:
+    """Return the model with typical sizes, and with ranges that hold whatever the parameters are tuned to."""
+    s = model.symbols()
+    groups = [s.time, s.state, s.input, s.parameter, s.table]
+    # The guards of a sampled model keep its inputs in their range; those of a plant are only warned of.
+    bounds = [
+        [EVERYTHING],
+        [EVERYTHING] * len(model.states),
+        [(v.minimum, v.maximum) if model.sample_time else EVERYTHING for v in model.inputs],
+        [(v.minimum, v.maximum) for v in model.parameters],
+        [EVERYTHING] * s.table.numel(),
+    ]
+
+    def tuned(variables: Sequence[Variable], expressions: ca.SX) -> list[Variable]:
+        intervals = ranges(ca.Function("shown", groups, [ca.densify(expressions)]), bounds)
+        depends = ca.jacobian_sparsity(expressions, s.parameter).row()
+        return [
+            _widened(v, interval) if v.bounded and i in depends else v
+            for i, (v, interval) in enumerate(zip(variables, intervals, strict=True))
+        ]
+
+    signals = tuned(model.signals, s.signal) if model.sample_time else model.signals
+    return replace(
+        model,
+        states=with_sizes(model.states, sizes),
+        inputs=with_sizes(model.inputs, sizes),
+        outputs=with_sizes(tuned(model.outputs, s.output), sizes),
+        signals=with_sizes(signals, sizes),
+    )
+
+
+def _widened(v: Variable, interval: Interval) -> Variable:
+    return replace(v, minimum=min(v.minimum, interval[0]), maximum=max(v.maximum, interval[1]))
+
+
+def _rate(state: Variable, sizes: Mapping[str, float]) -> Variable:
     unit = state.unit + "^2" if state.unit.endswith("/s") else f"{state.unit}/s"
     text = f"Rate of change: {state.description}"
-    return Variable(f"der({state.name})", unit, text, nominal=state.nominal)
+    name = f"der({state.name})"
+    return Variable(name, unit, text, nominal=sizes[name])
 
 
 def _extra(model: FlatModel, reference: int) -> FmuVariable:

@@ -9,9 +9,11 @@ from xml.etree import ElementTree
 from ...locations import version as own_version
 from ...quantity import BASE, parse_unit
 from ..c.c_text import identifier
+from .authorship import Authorship, described
 from .dependencies import FmiUnknown, ModelStructure, model_structure
 from .fmu_sources import main_source
 from .fmu_variables import RELATIVE_TOLERANCE, FmuLayout, FmuVariable
+from .terminals import FLANGE, Terminal, terminals
 
 LOG_CATEGORIES = {
     "logStatusError": "What could not be done, and why",
@@ -22,7 +24,9 @@ LOG_CATEGORIES = {
 _SHOWN: Mapping[tuple[int, ...], str] = {(0, 0, 0, 0, 0, 1): "deg", (0, 0, -1, 0, 0, 1): "deg/s"}
 
 
-def model_description(layout: FmuLayout, *, version: str, token: str, step: float) -> str:
+def model_description(
+    layout: FmuLayout, *, version: str, token: str, step: float, authorship: Authorship | None = None
+) -> str:
     """Return ``modelDescription.xml``.
 
     Parameters
@@ -35,6 +39,8 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
         Instantiation token or GUID.
     step
         Communication step of the default experiment in s.
+    authorship
+        Author, licence and date; nothing but the licence of the shells by default.
     """
     model, two = layout.model, version == "2.0"
     root = _element(
@@ -43,7 +49,8 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
         fmiVersion=version,
         modelName=model.name,
         **{"guid" if two else "instantiationToken": token},
-        description=model.description,
+        description=described(model.description, model.origin),
+        **(authorship or Authorship()).attributes(model.origin),
         generationTool=f"nlsdesign {own_version()}",
         variableNamingConvention="structured",
         **({"numberOfEventIndicators": len(layout.indicators)} if two else {}),
@@ -59,6 +66,9 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
     if model.sample_time is None:
         experiment.set("tolerance", _text(RELATIVE_TOLERANCE))
     experiment.set("stepSize", _text(step))
+    if two and model.origin:
+        tool = _element(ElementTree.SubElement(root, "VendorAnnotations"), "Tool", name="nlsdesign")
+        _element(tool, "deck", name=model.origin.deck, sha256=model.origin.digest)
     variables = ElementTree.SubElement(root, "ModelVariables")
     for each in layout.everything:
         (_variable2 if two else _variable3)(variables, each)
@@ -66,6 +76,10 @@ def model_description(layout: FmuLayout, *, version: str, token: str, step: floa
     (_structure2 if two else _structure3)(structure, model_structure(layout))
     for each in () if two else layout.indicators:
         _element(structure, "EventIndicator", valueReference=each.reference)
+    if not two and model.origin:
+        notes = ElementTree.SubElement(root, "Annotations")
+        note = _element(notes, "Annotation", type="nlsdesign.deck")
+        _element(note, "deck", name=model.origin.deck, sha256=model.origin.digest)
     return _written(root)
 
 
@@ -84,14 +98,45 @@ def build_description(layout: FmuLayout) -> str:
     return _written(root)
 
 
-def terminals_and_icons() -> str:
-    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: the place of the icon."""
+def terminals_and_icons(layout: FmuLayout) -> str:
+    """Return ``terminalsAndIcons/terminalsAndIcons.xml`` of FMI 3.0: icon and terminals with their places.
+
+    Parameters
+    ----------
+    layout
+        Variables of the FMU.
+    """
     root = _element(None, "fmiTerminalsAndIcons", fmiVersion="3.0")
     picture = ElementTree.SubElement(root, "GraphicalRepresentation")
     corners = {"x1": -100.0, "y1": -100.0, "x2": 100.0, "y2": 100.0}
     _element(picture, "CoordinateSystem", **corners, suggestedScalingFactorTo_mm=0.1)
     _element(picture, "Icon", **corners)
+    every = terminals(layout.model)
+    group = ElementTree.SubElement(root, "Terminals") if every else root
+    beside = [each for each in every if each.picture == FLANGE]
+    for each in every:
+        # The bus on the left, flanges on the right, one above the other.
+        right = each in beside
+        x = 100.0 if right else -100.0
+        y = 100.0 - 200.0 * (beside.index(each) + 1) / (len(beside) + 1) if right else 0.0
+        _terminal(group, each, (x, y))
     return _written(root)
+
+
+def _terminal(parent: ElementTree.Element, each: Terminal, place: tuple[float, float]) -> None:
+    names = {"name": each.name, "matchingRule": each.rule, "terminalKind": each.kind}
+    terminal = _element(parent, "Terminal", **names, description=each.description)
+    for member in each.members:
+        _element(
+            terminal,
+            "TerminalMemberVariable",
+            variableName=member.variable,
+            memberName=member.name,
+            variableKind=member.kind,
+        )
+    x, y = place
+    corners = {"x1": x - 10.0, "y1": y - 10.0, "x2": x + 10.0, "y2": y + 10.0}
+    _element(terminal, "TerminalGraphicalRepresentation", **corners, iconBaseName=each.picture)
 
 
 def _model_exchange(root: ElementTree.Element, layout: FmuLayout, two: bool) -> None:
@@ -124,7 +169,7 @@ def _co_simulation(root: ElementTree.Element, layout: FmuLayout, two: bool) -> N
         canHandleVariableCommunicationStepSize=True,
         **({"canGetAndSetFMUstate" if two else "canGetAndSetFMUState": True}),
         **({"canSerializeFMUstate" if two else "canSerializeFMUState": True}),
-        **({"providesDirectionalDerivative" if two else "providesDirectionalDerivatives": continuous}),
+        **({"providesDirectionalDerivative" if two else "providesDirectionalDerivatives": True}),
     )
     if two:
         kind.set("canNotUseMemoryManagementFunctions", "true")
@@ -169,8 +214,9 @@ def _attributes(each: FmuVariable) -> dict[str, object]:
         attributes["min"] = v.minimum
     if v.maximum < math.inf:
         attributes["max"] = v.maximum
-    if each.causality not in ("parameter", "independent") and each.variability == "continuous":
-        attributes["nominal"] = abs(v.nominal) or 1.0
+    size = v.start if each.causality == "parameter" or each.variability == "constant" else v.nominal
+    if each.causality != "independent" and size:
+        attributes["nominal"] = abs(size)
     if each.has_start:
         attributes["start"] = v.start
     return attributes

@@ -49,3 +49,16 @@ static int32_t model_sample(model_memory *memory, const double u[], double x[], 
     return (int32_t)status;
 }
 
+/* How outputs and signals of the last sample change with the states before it, the inputs that it took and the
+   parameters. Gives 0 where guards have put something else in the place of an input or output. */
+static int model_directional(const model_memory *memory, int32_t status, const double x[], const double dx[],
+                             const double du[], const double dp[], double dy[], double ds[])
+{
+    if (((uint32_t)status & ~@NAME@_OUT_OF_TABLE) != 0u) {
+        return 0;
+    }
+    @directional@
+    (void)memory, (void)x, (void)dx, (void)du, (void)dp, (void)dy, (void)ds;
+    return 1;
+}
+

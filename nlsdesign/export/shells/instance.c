@@ -355,7 +355,6 @@ static int do_step(instance *me, double from, double length, int *event)
 static int derive(instance *me, const uint32_t unknowns[], size_t unknown_count, const uint32_t knowns[],
                   size_t known_count, const double seed[], double result[])
 {
-#if MODEL_CONTINUOUS
     const double *v = me->now.value;
     double in[MODEL_VALUES] = {0.0}, out[MODEL_VALUES] = {0.0};
 
@@ -364,15 +363,23 @@ static int derive(instance *me, const uint32_t unknowns[], size_t unknown_count,
         if (!known(me, r)) {
             return REFUSED;
         }
-        if (r != 0 && !within(r, MODEL_X, MODEL_STATES) && !within(r, MODEL_U, MODEL_INPUTS) &&
+        if (!(MODEL_CONTINUOUS && r == 0) && !within(r, MODEL_X, MODEL_STATES) && !within(r, MODEL_U, MODEL_INPUTS) &&
             !within(r, MODEL_P, MODEL_PARAMETERS)) {
             return say(me, REFUSED, "%s is not a known", model_variable[r].name);
         }
         in[r] += seed[k];
     }
     memcpy(out, in, sizeof out);
+#if MODEL_CONTINUOUS
     model_directional(v[0], &v[MODEL_X], &v[MODEL_U], &v[MODEL_P], &v[MODEL_M], in[0], &in[MODEL_X], &in[MODEL_U],
                       &in[MODEL_P], &out[MODEL_D], &out[MODEL_Y], &out[MODEL_S], &out[MODEL_Z]);
+#else
+    if (me->now.samples == 0 || !model_directional(&me->now.memory, me->now.status, &v[MODEL_X], &in[MODEL_X],
+                                                   &in[MODEL_U], &in[MODEL_P], &out[MODEL_Y], &out[MODEL_S])) {
+        return say(me, REFUSED, "there are derivatives of a sample that was taken as it was, status %ld",
+                   (long)me->now.status);
+    }
+#endif
     for (size_t k = 0; k < unknown_count; ++k) {
         if (!known(me, unknowns[k])) {
             return REFUSED;
@@ -380,10 +387,6 @@ static int derive(instance *me, const uint32_t unknowns[], size_t unknown_count,
         result[k] = out[unknowns[k]];
     }
     return ALL_WELL;
-#else
-    (void)unknowns, (void)unknown_count, (void)knowns, (void)known_count, (void)seed, (void)result;
-    return say(me, REFUSED, "a sampled model has no directional derivatives");
-#endif
 }
 
 #include "exchange.c"

@@ -4,7 +4,7 @@
 #include <float.h>
 
 enum { ORDER = MODEL_STATES > 0 ? MODEL_STATES : 1, STAGES = 6 };
-enum { MOST_ATTEMPTS = 1000000 };                /* in one communication step */
+enum { MOST_ATTEMPTS = 200000 };                 /* in one communication step */
 enum { INTEGRATED = 0, NO_STEP = 1, TOO_LONG = 2 };
 
 static const double RODAS_GAMMA = 0.25;

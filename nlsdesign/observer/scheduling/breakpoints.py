@@ -66,12 +66,12 @@ class FineEntries:
         left = np.arange(FIRST_CELLS)
         while len(left):
             middle = (angles[left] + angles[left + 1]) / 2.0
-            found = np.array([e.values for e in _finite(entries(middle))])
+            values_between = np.array([e.values for e in _finite(entries(middle))])
             straight = (values[:, left] + values[:, left + 1]) / 2.0
-            bent = np.max(weights * np.abs(found - straight), axis=0) > FINE_TOLERANCE
-            divided = bent & (angles[left + 1] - angles[left] > 2.0 * narrowest)
+            is_bent = np.max(weights * np.abs(values_between - straight), axis=0) > FINE_TOLERANCE
+            divided = is_bent & (angles[left + 1] - angles[left] > 2.0 * narrowest)
             angles = np.insert(angles, left + 1, middle)
-            values = np.insert(values, left + 1, found, axis=1)
+            values = np.insert(values, left + 1, values_between, axis=1)
             moved = left + np.arange(len(left))
             left = np.sort(np.concatenate([moved[divided], moved[divided] + 1]))
         fine = tuple(replace(e, values=v) for e, v in zip(known, values, strict=True))

@@ -168,7 +168,7 @@ class Compact:
         return Table(argument, float(self.angles[0]), step, columns, self.values)
 
 
-class Written(Protocol):
+class ObserverWithTable(Protocol):
     """An observer that was written for a table."""
 
     @property
@@ -200,7 +200,7 @@ class Draft:
     """
 
     plant: AngleScheduledPlant
-    write: Callable[[Compact], Written]
+    write: Callable[[Compact], ObserverWithTable]
 
 
 class Grid(ABC):

@@ -157,17 +157,17 @@ class TableTooLargeError(ConvergenceError):
 class _Search:
     """Tables by one number: the error that the sums may cause together, in the unit of the estimate."""
 
-    def __init__(self, trial: TableTrial, bytes_per_number: int) -> None:
-        self.trial, self.fine, self.each = trial, trial.fine, bytes_per_number
+    def __init__(self, watched: TableTrial, bytes_per_number: int) -> None:
+        self.trial, self.fine, self.each = watched, watched.fine, bytes_per_number
         self._weights = np.array([e.weight if e.weight > 0.0 else 1.0 for e in self.fine.entries])
-        rows = list(dict.fromkeys(e.row for e in trial.deciding))
+        rows = list(dict.fromkeys(e.row for e in watched.deciding))
         effects = [(row, self._effect(row) * len(rows)) for row in rows]
         self._effects = {row: effect for row, effect in effects if effect > 0.0}
 
     def _effect(self, row: str) -> float:
         """Return the torque error when all entries of one sum are read with the error of the probe."""
-        mine = np.array([e.row == row for e in self.fine.entries])
-        table = self.fine.placed(np.where(mine, PROBE, np.inf) / self._weights).with_breakpoints()
+        in_row = np.array([e.row == row for e in self.fine.entries])
+        table = self.fine.placed(np.where(in_row, PROBE, np.inf) / self._weights).with_breakpoints()
         return self.trial.error(table, only=row).largest
 
     def table(self, error: float, *, others: float = OTHERS) -> Compact:
@@ -185,17 +185,17 @@ class _Search:
         return replace(table, torque_error=self.trial.error(table))
 
     def within(self, error: float) -> Compact | None:
-        """Return the smallest table found whose torque error is at most a number."""
+        """Return the smallest table that was tried whose torque error is at most a number."""
         kept, tried, before = None, error, 0
         for _ in range(STEPS):
             table = self.judged(self.table(tried))
-            found, size = largest_of(table), table.size(self.each)
-            if found <= error and (kept is None or size < kept.size(self.each)):
+            caused, size = largest_of(table), table.size(self.each)
+            if caused <= error and (kept is None or size < kept.size(self.each)):
                 kept = table
-            if 0.8 * error <= found <= error or (found <= error and size == before):
+            if 0.8 * error <= caused <= error or (caused <= error and size == before):
                 break
             before = size
-            tried *= float(np.clip(0.92 * error / max(found, 1e-9 * error), 0.02, 50.0))
+            tried *= float(np.clip(0.92 * error / max(caused, 1e-9 * error), 0.02, 50.0))
         return kept
 
     def of_size(self, most: int) -> Compact | None:

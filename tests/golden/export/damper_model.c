@@ -102,3 +102,36 @@ static int32_t model_sample(model_memory *memory, const double u[], double x[], 
     return (int32_t)status;
 }
 
+/* How outputs and signals of the last sample change with the states before it, the inputs that it took and the
+   parameters. Gives 0 where guards have put something else in the place of an input or output. */
+static int model_directional(const model_memory *memory, int32_t status, const double x[], const double dx[],
+                             const double du[], const double dp[], double dy[], double ds[])
+{
+    if (((uint32_t)status & ~SCHEDULED_DAMPER_OUT_OF_TABLE) != 0u) {
+        return 0;
+    }
+    const double raw_0 = (memory->inputs.piston.speed + 1.0) * 1.0;
+    const double above_0 = raw_0 > 0.0 ? raw_0 : 0.0; /* NaN becomes the lower end */
+    const double place_0 = above_0 < 2.0 ? above_0 : 2.0;
+    const int32_t floor_0 = (int32_t)place_0;
+    const int32_t left_0 = floor_0 < 1 ? floor_0 : 1;
+    const double share_0 = place_0 - (double)left_0;
+    const double *const row_0 = table_0[left_0];
+    const double *const row_0_next = table_0[left_0 + 1];
+    const double w0 = row_0[0] + share_0 * (row_0_next[0] - row_0[0]);
+    const double per_0 = raw_0 > 0.0 && raw_0 < 2.0 ? 1.0 : 0.0;
+    const double slope0 = (row_0_next[0] - row_0[0]) * per_0;
+    const double dw0 = slope0 * du[0];
+    const double a9 = w0 * memory->inputs.piston.speed + memory->parameters.memory.gain * x[0];
+    const double a10 = memory->inputs.valve.opening * a9;
+    const int a12 = a10 <= 2.0;
+    const double a15 = (a12 ? 1.0 : 0.0) / ((a12 ? 1.0 : 0.0) + (2.0 <= a10 ? 1.0 : 0.0));
+    const double a28 = memory->inputs.piston.speed * dw0 + w0 * du[0] + (x[0] * dp[0] + memory->parameters.memory.gain * dx[0]);
+    const double a30 = a9 * du[1] + memory->inputs.valve.opening * a28;
+    const double a35 = exp(-memory->inputs.piston.speed);
+    dy[0] = (memory->inputs.piston.speed < 0.0) ? a15 * a30 : a35 * a30 - a10 * (a35 * du[0]);
+    ds[0] = 2.0 * a10 * a30;
+    (void)memory, (void)x, (void)dx, (void)du, (void)dp, (void)dy, (void)ds;
+    return 1;
+}
+

@@ -52,7 +52,7 @@ static const variable model_variable[MODEL_VALUES] = {
     {"solver.relative_tolerance", 1e-08, 1e-13, 0.01},
 };
 
-static const double model_nominal[MODEL_STATES > 0 ? MODEL_STATES : 1] = {0.001, 1.0, 10.0};
+static const double model_nominal[MODEL_STATES > 0 ? MODEL_STATES : 1] = {0.001, 2.0, 10.0};
 
 static void model_rates(double t, const double x[], const double u[], const double p[], const double m[], double f[])
 {

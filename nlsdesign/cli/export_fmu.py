@@ -1,0 +1,167 @@
+"""``nlsdesign export fmu``: plant, observer, controller, and both in one step, as FMUs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import NlsError
+from .observer import sample_time_option
+from .observer_kinds import kind_option, observer_of
+from .output import deck_option, measured_option, out_option, spring_option
+
+if TYPE_CHECKING:
+    from ..export import Authorship
+    from ..model.flat import FlatModel
+
+FILES = {
+    "plant": "plant",
+    "observer": "observer",
+    "controller": "controller",
+    "both": "observer_and_controller",
+}
+"""Name of the file, without its ending, by what is exported."""
+
+
+class _Models:
+    """The models of a deck, each designed once and only when it is asked for."""
+
+    def __init__(self, plant: FlatModel, sample_time: float, chosen: dict[str, str | None]) -> None:
+        self.plant, self.sample_time, self.chosen = plant, sample_time, chosen
+        self._made: dict[str, FlatModel] = {"plant": plant}
+
+    def __getitem__(self, what: str) -> FlatModel:
+        if what not in self._made:
+            makers: dict[str, Callable[[], FlatModel]] = {
+                "observer": lambda: observer_of(self.plant, self.sample_time, **self.chosen),
+                "controller": self._controller,
+                "both": self._both,
+            }
+            self._made[what] = makers[what]()
+        return self._made[what]
+
+    def _controller(self) -> FlatModel:
+        from ..control import torque_controller
+
+        return torque_controller(self.plant, sample_time=self.sample_time)
+
+    def _both(self) -> FlatModel:
+        from ..control import joined
+
+        return joined(self["observer"], self["controller"])
+
+    def possible(self) -> tuple[dict[str, FlatModel], dict[str, str]]:
+        """Return what this deck allows, and why the rest is left out."""
+        models: dict[str, FlatModel] = {"plant": self.plant}
+        reasons: dict[str, str] = {}
+        for what in ("observer", "controller", "both"):
+            try:
+                models[what] = self[what]
+            except NlsError as error:  # not every machine has one; the reason is printed
+                reasons[what] = str(error)
+        return models, reasons
+
+
+def _date(_context: click.Context, _parameter: click.Parameter, text: str | None) -> datetime | None:
+    if text is None:
+        return None
+    try:
+        date = datetime.fromisoformat(text)
+    except ValueError:
+        raise click.BadParameter(f"'{text}' is no date such as 2026-03-04T12:00:00+00:00") from None
+    if date.tzinfo is None:
+        raise click.BadParameter(f"'{text}' has no time zone; write it as {text}+00:00 or {text}Z")
+    return date
+
+
+@click.command("fmu")
+@deck_option
+@click.option(
+    "--what",
+    multiple=True,
+    type=click.Choice(list(FILES)),
+    help="What to write; by default all that the deck allows. `both` is observer and controller as one step. "
+    "Repeatable.",
+)
+@kind_option
+@sample_time_option
+@spring_option
+@measured_option
+@out_option("out/fmu")
+@click.option(
+    "--version", type=click.Choice(["2.0", "3.0"]), default="3.0", show_default=True, help="FMI version."
+)
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    help="For instance x86_64-windows, or `all`; this machine by default; repeatable.",
+)
+@click.option("--reference", is_flag=True, help="Write reference results beside each FMU.")
+@click.option("--author", default="", help="Of the model.")
+@click.option("--copyright", "copyright_", default="", help="Notice of copyright.")
+@click.option("--licence", default="", help="Licence of the model.")
+@click.option(
+    "--date",
+    callback=_date,
+    help="Of the export, as 2026-03-04T12:00:00Z; by default SOURCE_DATE_EPOCH or now.",
+)
+def export_fmus(
+    deck_name: str,
+    sample_time: float,
+    out: Path,
+    what: tuple[str, ...],
+    platforms: tuple[str, ...],
+    **others: Any,
+) -> None:
+    """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+    from ..export import Authorship
+    from ..model import flatten
+
+    chosen = {name: others[name] for name in ("kind", "spring", "measured")}
+    made = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen)
+    # Before anything is written: not every system has an observer.
+    if what:
+        models = {each: made[each] for each in dict.fromkeys(what)}
+        reasons: dict[str, str] = {}
+    else:
+        models, reasons = made.possible()
+    about = Authorship(others["author"], others["copyright_"], others["licence"], date=others["date"])
+    written = _write(models, out, others["version"], _systems(platforms), about)
+    if others["reference"]:
+        from ..export import write_reference
+
+        written += [
+            file for name in models for file in write_reference(models[name], out / f"{FILES[name]}.fmu")
+        ]
+    click.echo(f"written: {', '.join(str(path) for path in written)}")
+    for name, reason in reasons.items():
+        click.echo(f"left out: {name}: {reason}")
+
+
+def _systems(platforms: Sequence[str]) -> Sequence[str] | None:
+    from ..export import ALL_PLATFORMS
+
+    return (ALL_PLATFORMS if "all" in platforms else platforms) or None
+
+
+def _write(
+    models: dict[str, FlatModel],
+    out: Path,
+    version: str,
+    systems: Sequence[str] | None,
+    about: Authorship,
+) -> list[Path]:
+    from ..export import export_fmu
+
+    dated = about.dated()
+    return [
+        export_fmu(model, out / f"{FILES[name]}.fmu", version=version, platforms=systems, authorship=dated)
+        for name, model in models.items()
+    ]

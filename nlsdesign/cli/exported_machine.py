@@ -1,0 +1,99 @@
+"""Everything that runs a machine, from one deck: observer, controller and both as one step, and the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from ..errors import NlsError
+from .controller import controller_of
+from .observer_kinds import observer_of
+
+if TYPE_CHECKING:
+    from ..model import FlatModel
+
+export_option = click.option(
+    "--export",
+    "exports",
+    is_flag=True,
+    help="Write observer, controller and both as one step from the better deck as C, and all as FMUs.",
+)
+
+
+class ExportedMachine(NamedTuple):
+    """What was written, by path with words, and what could not be written, with reasons."""
+
+    files: dict[Path, str]
+    reasons: tuple[str, ...]
+
+    def content(self) -> dict[str, list[str]]:
+        """Return both for JSON."""
+        return {"exported": [str(path) for path in self.files], "not_exported": list(self.reasons)}
+
+    def words(self) -> list[str]:
+        """Return both in sentences."""
+        written = [f"exported: {', '.join(map(str, self.files))}"] if self.files else []
+        return [*written, *self.reasons]
+
+
+def export_machine(
+    plant: FlatModel,
+    out: Path,
+    *,
+    sample_time: float,
+    observer: FlatModel | None = None,
+    spring: str | None = None,
+    measured: str | None = None,
+) -> ExportedMachine:
+    """Write observer, controller and both as one step, as C and FMU, and the plant as FMU.
+
+    What fails leaves the others.
+
+    Parameters
+    ----------
+    plant
+        Flat model of a deck; all files name it.
+    out
+        Folder; C stands in ``c``.
+    sample_time
+        Of observer and controller, in s.
+    observer
+        Of the plant; by default the one that errs least over the spread of the deck.
+    spring, measured
+        Where the structure of the plant leaves them open.
+    """
+    from ..control import joined
+    from ..export import export_c, export_fmu
+
+    @cache
+    def observing() -> FlatModel:
+        return observer or observer_of(plant, sample_time, spring=spring, measured=measured)
+
+    @cache
+    def controlling() -> FlatModel:
+        return controller_of(plant, sample_time, law="scheduled", bandwidth=None, velocity_bandwidth=None)
+
+    models: dict[str, Callable[[], FlatModel]] = {
+        "plant": lambda: plant,
+        "observer": observing,
+        "controller": controlling,
+        "torque_loop": lambda: joined(observing(), controlling()),
+    }
+    files: dict[Path, str] = {}
+    reasons: list[str] = []
+    for name, made in models.items():
+        try:
+            model = made()
+            if model.sample_time is not None:
+                source = export_c(model, out / "c", name=name)
+                files |= {source.source: f"{name} in C99", source.header: f"interface of the {name}"}
+                files[source.selftest] = f"self-test of the {name}"
+            files[export_fmu(model, out / f"{name}.fmu")] = f"{name} as FMU"
+        except NlsError as error:
+            # The others are still of use; what is lacking is told with its reason.
+            reasons.append(f"the {name} is not exported: {error}")
+    return ExportedMachine(files, tuple(reasons))

@@ -1,0 +1,65 @@
+"""Sections on the diagnosed actuator under code from three decks."""
+
+from __future__ import annotations
+
+import nlsdesign as nls
+from nlsdesign.report import Chapter, FigureSection, Section, TableSection
+
+from .generated import AMPLITUDE, CYCLES, FREQUENCY, GeneratedCode
+
+
+def generated_sections(generated: GeneratedCode) -> list[Section]:
+    """Show what the deck behind the code is worth."""
+    return [
+        Chapter(
+            "What the deck behind the code is worth",
+            "The machine is the actuator as the diagnosis left it. Observer and controller are generated "
+            "from the published deck, from the designed one, whose spring this machine does not have, and "
+            "from the diagnosed deck. Each file names its deck by the digest that stands in the table; "
+            "`nlsdesign export check FOLDER --deck FILE` compares them.",
+        ),
+        _table(generated),
+        _figure(generated),
+    ]
+
+
+def _table(generated: GeneratedCode) -> TableSection:
+    rows = tuple(
+        (
+            deck,
+            kind,
+            each.origin.digest[:12],
+            f"{1e3 * each.torque_error:.0f}" if each.settled else "none",
+            f"{1e3 * each.estimate_error:.0f}" if each.settled else "none",
+            f"{each.peak_current:.1f}",
+        )
+        for (deck, kind), each in generated.under.items()
+    )
+    return TableSection(
+        "Torque errors under code from three decks",
+        ("code from", "observer", "digest of the deck", "torque, mN·m", "estimate, mN·m", "current, A"),
+        rows,
+        caption=f"Sine of {AMPLITUDE:g} N·m at {FREQUENCY:g} Hz wanted, rms over cycle {CYCLES}: spring "
+        "torque less wanted, estimated less spring torque; peak of the current. `best` has the least "
+        "expected error over the spread of its deck; the gains are the defaults. Where the numbers of the "
+        "deck hold, the cascade errs less: the diagnosed deck keeps its declared spreads, though records "
+        "know better.",
+    )
+
+
+def _figure(generated: GeneratedCode) -> FigureSection:
+    runs = {deck: each.run for (deck, kind), each in generated.under.items() if kind == "cascade"}
+    first = next(iter(runs.values()))
+    shown = first.time >= (CYCLES - 1) / FREQUENCY
+    lines = {
+        f"code from the {name} deck": (run["observer.spring.torque"] - run["plant.spring.torque"])[shown]
+        for name, run in runs.items()
+    }
+    return FigureSection(
+        "Error of the estimated torque under code from three decks",
+        nls.figures.over_time(first.time[shown], lines, quantity="estimated less true torque", unit="N*m"),
+        caption=f"Cycle {CYCLES} of the sine, observed by the cascade.",
+        means="What the code does not know of its machine, here the second relaxation of the rubber or the "
+        "whole spring, it puts into the torque.",
+        assumed="The diagnosed actuator stands for the machine; its records are simulated.",
+    )
