@@ -67,11 +67,6 @@ def controller_of(
         Of the scheduled law in Hz.
     velocity_bandwidth
         Of the velocity loop in Hz.
-
-    Raises
-    ------
-    BadParameter
-        If a bandwidth is given for a PID, which has gains.
     """
     from ..control import PidTorque, ScheduledTorque, VelocityLoop, torque_controller
 

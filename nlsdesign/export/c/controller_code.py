@@ -281,10 +281,9 @@ def _settled(model: FlatModel, name: str, real: Real) -> list[str]:
     # Without a measured input there are no gaps after which to resume.
     for which, verb in enumerate(("begin", "resume") if measured_inputs(model) else ("begin",)):
         words = "rests at its first readings" if which == 0 else "goes on after a gap in its readings"
-        lines += [f"/* Sets the states of a machine that {words}. */"]
-        lines += [f"static void {name}_{verb}({name}_state *state)", "{"]
-        lines += [f"    {line}" for line in settled_body(model, real, which) or ["(void)state;"]]
-        lines += ["}", ""]
+        body = settled_body(model, real, which) or ["(void)state;"]
+        text = filled("controller_settled.c", {"name": name, "verb": verb, "words": words, "body": body})
+        lines += [*text.splitlines(), ""]
     return lines
 
 
