@@ -42,6 +42,7 @@ EXPRESSIONS = {
     "error function": ca.erf(A),
     "length": ca.hypot(A, B),
     "comparison as number": (A < B) + 2 * (B <= C) + 4 * (A == 1.0) + 8 * (C != 1.0),
+    "equality": (A == B) + 2 * (B != C) + 4 * ca.logic_not(A - B) + ca.if_else(A * B == C, A, B),
     "logic": ca.logic_and(A < B, ca.logic_not(B < C)) + 2 * ca.logic_or(A < 0, C < 0),
     "logic of a number": ca.logic_not(A) + ca.logic_and(A, B),
     "choice": ca.if_else(A < B, ca.sin(A), ca.cos(B)),

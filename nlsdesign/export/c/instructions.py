@@ -42,7 +42,7 @@ _COMPARED = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _JOINED = {ca.OP_AND: "&&", ca.OP_OR: "||"}
 _LOGICAL = frozenset([*_COMPARED, *_JOINED, ca.OP_NOT])
 # Operations that use an operand twice; the operand becomes a constant with a name.
-_TWICE_NAMED = frozenset([ca.OP_SQ, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX])
+_TWICE_NAMED = frozenset([ca.OP_SQ, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX, ca.OP_EQ, ca.OP_NE])
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,11 @@ class _Printer:
     def condition(self, index: int) -> str:
         """Return a value as a condition, bracketed unless it is a name."""
         text = self.texts[index]
-        return text.within(_UNARY) if text.logical else f"({text.within(_SUM)} != {self.real.literal(0.0)})"
+        if text.logical:
+            return text.within(_UNARY)
+        zero, number = self.real.literal(0.0), text.within(_SUM)
+        # Not zero; NaN is not. Written without a comparison for equality, which compilers warn of.
+        return f"!({number} <= {zero} && {number} >= {zero})"
 
     def expression(self, node: _Node) -> _Text:
         """Return the C text of one operation."""
@@ -153,6 +157,11 @@ class _Printer:
             left, right = self.condition(operands[0]), self.condition(operands[1])
             return _Text(f"{left} {_JOINED[operation]} {right}", _JUNCTION, logical=True)
         left, right = (self.number(i, _SUM) for i in operands)
+        if operation in (ca.OP_EQ, ca.OP_NE):
+            equal = f"{left} <= {right} && {left} >= {right}"
+            if operation == ca.OP_NE:
+                return _Text(f"!({equal})", _UNARY, logical=True)
+            return _Text(equal, _JUNCTION, logical=True)
         return _Text(f"{left} {_COMPARED[operation]} {right}", _RELATION, logical=True)
 
     def _special(self, operation: int, operands: tuple[int, ...]) -> _Text:

@@ -17,7 +17,8 @@ from ...errors import ExportError, unknown_name
 from ..files import shell
 
 STRICT = (
-    "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror",
+    "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wfloat-equal",
+    "-Werror",
 )  # fmt: skip
 """Flags that the generated code must pass."""
 

@@ -120,11 +120,14 @@ static @real@ portable_fraction@f@(@real@ x, @real@ *k)
     const @real@ lost = x < @least_normal@ ? @denormal_power@ : @zero@;
     portable_number part;
     @word@ bits;
+    uint32_t biased;
 
     part.number = normal;
     bits = part.bits + (@one_bits@u - @root_half_bits@u);
     part.bits = (bits & @fraction_mask@u) + @root_half_bits@u;
-    *k = ((@real@)(int32_t)(bits >> @digits@u) - @bias@) - lost;
+    bits >>= @digits@u;
+    biased = (uint32_t)bits;
+    *k = ((@real@)biased - @bias@) - lost;
     return part.number - @one@;
 }
 

@@ -1,0 +1,38 @@
+"""Each deviation of generated C from MISRA C:2012 is argued, and none is from a required rule."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks import misra
+from nlsdesign.export import export_c
+from tests.hand_built import controller, observer
+
+needs_cppcheck = pytest.mark.skipif(misra.cppcheck() is None, reason="cppcheck is not installed")
+
+
+@needs_cppcheck
+@pytest.mark.parametrize("real", ["float", "double"])
+@pytest.mark.parametrize("model", [observer(), controller()], ids=["observer", "controller"])
+def test_every_deviation_is_advisory_and_argued(model, real, tmp_path):
+    counts = {"it": misra.deviations(export_c(model, tmp_path, real=real))}
+    assert counts["it"]["12.1"] > 0
+    assert misra.unargued(counts) == []
+
+
+@needs_cppcheck
+def test_a_new_deviation_is_noticed(tmp_path):
+    source = export_c(controller(), tmp_path)
+    text = source.source.read_text()
+    source.source.write_text(
+        text.replace("    return status;\n", "    goto end;\nend:\n    return status;\n", 1)
+    )
+    assert misra.unargued({"it": misra.deviations(source)}) == ["15.1"]
+
+
+def test_all_arguments_are_for_advisory_rules_and_stand_on_the_page(root):
+    page = (root / "docs" / "misra.md").read_text(encoding="utf8")
+    for rule, (category, _, argument) in misra.ARGUMENTS.items():
+        assert category == "advisory"
+        assert f"| {rule} | advisory |" in page
+        assert argument in page
