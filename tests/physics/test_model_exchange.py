@@ -384,3 +384,14 @@ def test_the_published_actuator_with_dry_friction_that_sticks(kind, version, tmp
     # Apart from the samples next to an event.
     inside = stuck & np.roll(stuck, 1) & np.roll(stuck, -1)
     assert np.all(run["motor.speed"][inside] == 0.0)
+
+
+def test_an_event_within_a_tiny_step_does_not_hang(sharp):
+    """A step far below the rounding of the clock."""
+    with opened(sharp["bouncing", "3.0"]) as unit:
+        unit.put({"wheel.angle": 0.0, "wheel.speed": -1.0})
+        unit.begin().run()
+        for length in (1e-290, 1e-300):
+            unit.step(length)
+        unit.step(STEP)
+        assert unit.get("wheel.speed") == [pytest.approx(0.6, rel=1e-9)]

@@ -3,7 +3,7 @@
    change, and the states that jump with them. Included, not compiled alone.
    Sources: Shampine and Thompson 2000; Chandrupatla 1997 (bracketing). */
 
-enum { MOST_EVENTS = 200, ACCUMULATED = 3 };
+enum { MOST_EVENTS = 200, MOST_TRIALS = 200, ACCUMULATED = 3 };
 static const double EVENT_WINDOW = 1e-7; /* so many events within this share of a step, at most of 1 s, have no end */
 static const double LOCATED = 1e-12;     /* accuracy of an event, likewise */
 
@@ -83,7 +83,7 @@ static double locate(trial *one, double length, double finest)
     /* At length zero a mode may just have changed, so the indicator is not asked there. */
     double a = length, fa = lasts(one, length), b = 0.0, fb = (double)INFINITY, share = 0.5, last = length;
 
-    while (fabs(b - a) > finest) {
+    for (int round = 0; round < MOST_TRIALS && fabs(b - a) > finest; ++round) {
         const double least_share = 0.5 * finest / fabs(b - a);
         double c = a, fc = fa;
         last = a + fmin(fmax(share, least_share), 1.0 - least_share) * (b - a);
