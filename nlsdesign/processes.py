@@ -43,18 +43,18 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     # An interrupt between fork and the first line of a helper would end that helper, and the pool would wait
     # for it for ever. A request to end that comes there is lost where this process handles such requests, for
     # after a fork Python forgets what it has not handled. So neither is delivered until helpers are ready.
-    with _signals_held():
+    with signals_held():
         pool = multiprocessing.get_context("fork").Pool(cores, initializer=_made_ready)
     try:
         yield from pool.imap(_call, range(count))
     finally:
-        with _signals_held():
+        with signals_held():
             pool.terminate()
             pool.join()
 
 
 @contextlib.contextmanager
-def _signals_held() -> Iterator[None]:
+def signals_held() -> Iterator[None]:
     """Hold interrupts and requests to end back until the end of the block, where they are delivered."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:

@@ -2,70 +2,191 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from ..errors import ValueRangeError
-from ..quantity import typeset_unit
+from ..quantity import Quantity, quantity, typeset_unit
 from .output import json_option, show_json, show_table
-from .units import Number
+from .units import Number, parse_number
 
 if TYPE_CHECKING:
+    from ..export import Convergence, CoSimulation, FmuSystem, SamplesOf, Stepping, Wire
+    from ..export.cosimulation.coupling import Coupling
+    from ..progress import Progress
     from ..simulation import Sine
 
 T = TypeVar("T")
 _LATE = "late:"
+_SAMPLES = re.compile(r"(?P<count>[^a-z:]*)samples?(:(?P<instance>\w+))?$")
+_NUMBER = re.compile(r"(?P<number>[-+]?[\d.]+([eE][-+]?\d+)?)\s*(?P<unit>.*)$")
+
+
+WIRE_HELP = (
+    "Input and output as instance.variable. GAIN is a number, with a unit where both ends have different "
+    "ones: '*-1', '*0.02 m/rad'. DELAY is a time or a number of samples of the instance that computes the "
+    "value, or of another: '@2ms', '@1sample', '@1sample:controller'. TO=late:FROM is TO=FROM@1sample. "
+    "Repeatable."
+)
 
 
 @click.command("cosimulate")
-@click.option("--fmu", "fmus", multiple=True, required=True, metavar="INSTANCE=FILE", help="Repeatable.")
-@click.option("--wire", "wires", multiple=True, metavar="TO=FROM",
-              help="Input and output as instance.variable; TO=late:FROM reads the value of one "
-                   "communication step before; repeatable.")  # fmt: skip
+@click.option("--fmu", "fmus", multiple=True, metavar="INSTANCE=FILE", help="Repeatable.")
+@click.option("--system", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE.ssp",
+              help="An SSP archive instead of --fmu; wires and parameters are added to its own.")  # fmt: skip
+@click.option("--wire", "wires", multiple=True, metavar="TO=FROM[*GAIN][@DELAY]", help=WIRE_HELP)
 @click.option("--input", "inputs", multiple=True, metavar="INPUT=NUMBER|AMPLITUDE@HERTZ",
               help="A constant or a sine; repeatable.")  # fmt: skip
 @click.option("--set", "parameters", multiple=True, metavar="PARAMETER=NUMBER", help="Repeatable.")
-@click.option("--order", multiple=True, metavar="INSTANCE", help="Order in which the FMUs step; repeatable.")
+@click.option("--order", multiple=True, metavar="INSTANCE",
+              help="Order in which sampled FMUs compute; without it all read before any computes. "
+                   "Repeatable.")  # fmt: skip
 @click.option("--stop", type=Number("s"), required=True, help="End, for instance '5 s'.")
-@click.option("--step", type=Number("ms"), default=None, help="Communication step, for instance '1 ms'.")
+@click.option(
+    "--step", type=Number("ms"), default=None, help="Longest communication step, for instance '1 ms'."
+)
+@click.option("--coupling", type=click.Choice(["extrapolated", "iterated", "held"]), default="extrapolated",
+              show_default=True, help="Of continuous FMUs: second order, second order with roll-back, "
+                                      "first order.")  # fmt: skip
+@click.option(
+    "--patience", type=Number("s"), default=30.0, help="Longest call into an FMU; '30 s' by default."
+)
+@click.option("--halvings", type=click.IntRange(2, 10), default=None,
+              help="Also halve the step so often and print how the signals converge.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
 @json_option
-def cosimulation(stop: float, step: float | None, out: Path, as_json: bool, **given: tuple[str, ...]) -> None:
-    """Run FMUs together; numbers are in the units that the FMUs state for their variables."""
-    import numpy as np
+def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **given: Any) -> None:
+    """Run FMUs together; numbers are in the units that the FMUs state for their variables.
 
-    from ..export import cosimulate
+    The FMUs run in a process of their own. Row k of the file shows what holds at its time. Where continuous
+    FMUs are coupled or driven, the error of coupling is estimated by a second run with half the step.
+    """
+    import tempfile
 
-    joined = _pairs("--wire", given["wires"], _source)
-    run = cosimulate(
-        fmus=_pairs("--fmu", given["fmus"], Path),
-        wires=joined,
-        inputs=_pairs("--input", given["inputs"], _signal),
-        stop=stop,
-        step=step,
-        order=given["order"],
-        parameters=_pairs("--set", given["parameters"], float),
-    )
+    from ..export import convergence
+    from ..progress import Steps
+
+    steps = Steps()
+    with tempfile.TemporaryDirectory(prefix="nlsdesign-system-") as folder:
+        system = _system(given, Path(folder))
+        inputs = pairs("--input", given["inputs"], _signal)
+        stepping = _stepping(given["step"], given["coupling"], given["patience"], steps)
+        with steps.step("co-simulation"):
+            run = system.run(inputs=inputs, stop=stop, stepping=stepping)
+        study = None
+        if halvings is not None:
+            with steps.step("halving the step"):
+                study = convergence(system, inputs=inputs, stop=stop, stepping=stepping, halvings=halvings)
     run.trace.write_csv(out)
     if as_json:
-        ends = {n: {"last": float(v[-1]), "rms": float(np.sqrt(np.mean(v**2))), "unit": run.trace.units[n]}
-                for n, v in run.trace.signals.items()}  # fmt: skip
-        show_json({"file": out, "step": run.step, "delays": dict(run.delays), "signals": ends})
+        show_json(_as_json(run, study, out))
         return
-    rows = [(to, str(joined[to]), str(delay)) for to, delay in run.delays.items()]
-    show_table("Wires", ("input", "reads", "delay in steps"), rows)
-    signals = [
-        (n, f"{v.min():.4g}", f"{v.max():.4g}", f"{v[-1]:.4g}", typeset_unit(run.trace.units[n]))
+    _show(run, study, system.wires)
+    click.echo(f"written: {out}, {len(run.time)} rows at most {1e3 * run.step:g} ms apart")
+
+
+def _system(given: Mapping[str, Any], folder: Path) -> FmuSystem:
+    """Return the FMUs and wires that are given, or those of an archive and what is added to it."""
+    from ..export import FmuSystem, read_ssp
+
+    own = FmuSystem(
+        fmus=pairs("--fmu", given["fmus"], Path),
+        wires=pairs("--wire", given["wires"], read_wire),
+        parameters=pairs("--set", given["parameters"], float),
+        order=given["order"],
+    )
+    if given["system"] is None:
+        if not own.fmus:
+            hint = "write --fmu INSTANCE=FILE or --system FILE.ssp"
+            raise ValueRangeError("no FMU", "is given", next_step=hint)
+        return own
+    if own.fmus:
+        raise ValueRangeError("--system", "holds the FMUs already", next_step="leave --fmu out")
+    read = read_ssp(given["system"], folder)
+    return FmuSystem(
+        fmus=read.fmus,
+        wires={**read.wires, **own.wires},
+        parameters={**read.parameters, **own.parameters},
+        order=own.order or read.order,
+    )
+
+
+def _stepping(step: float | None, coupling: str, patience: float, progress: Progress) -> Stepping:
+    from ..export import Extrapolated, Held, Iterated, Stepping
+
+    chosen: Coupling = Extrapolated()
+    if coupling == "iterated":
+        chosen = Iterated()
+    elif coupling == "held":
+        chosen = Held()
+    return Stepping(step, coupling=chosen, patience=patience, progress=progress)
+
+
+def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[str, Any]:
+    import numpy as np
+
+    ends = {
+        n: {"last": float(v[-1]), "rms": float(np.sqrt(np.mean(v**2))), "unit": run.trace.units[n]}
+        | ({"error": run.errors[n]} if n in run.errors else {})
         for n, v in run.trace.signals.items()
-    ]
-    show_table("Signals", ("name", "smallest", "largest", "last", "unit"), signals)
-    click.echo(f"written: {out}, {len(run.time)} rows {1e3 * run.step:g} ms apart")
+    }
+    content = {"file": out, "step": run.step, "delays": dict(run.delays), "signals": ends}
+    if study is not None:
+        changes = {
+            n: {"differences": d, "orders": [None if math.isnan(o) else o for o in study.orders(n)]}
+            for n, d in study.differences.items()
+        }
+        content["convergence"] = {"steps": study.steps, "signals": changes}
+    return content
 
 
-def _pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
+def _show(run: CoSimulation, study: Convergence | None, wires: Mapping[str, str | Wire]) -> None:
+    from ..export.cosimulation.wires import as_wire
+
+    rows = []
+    for to, delay in run.delays.items():
+        wire = as_wire(wires[to])
+        rows.append((to, wire.source, str(wire.gain), f"{1e3 * delay:g} ms"))
+    show_table("Wires", ("input", "reads", "gain", "delay"), rows)
+    signals = []
+    for n, v in run.trace.signals.items():
+        error = f"{run.errors[n]:.1e}" if n in run.errors else "-"
+        unit = typeset_unit(run.trace.units[n])
+        signals.append((n, f"{v.min():.4g}", f"{v.max():.4g}", f"{v[-1]:.4g}", error, unit))
+    show_table("Signals", ("name", "smallest", "largest", "last", "coupling error", "unit"), signals)
+    if study is None:
+        return
+    heads = [f"{1e3 * step:g} ms" for step in study.steps[:-1]]
+    changes = []
+    for n, differences in study.differences.items():
+        orders = ["" if math.isnan(order) else f" (order {order:.2f})" for order in study.orders(n)]
+        cells = [f"{d:.2e}{order}" for d, order in zip(differences, ["", *orders], strict=True)]
+        changes.append((n, *cells))
+    show_table("Change when the step is halved", ("name", *heads), changes)
+
+
+def pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dict[str, T]:
+    """Return what ``NAME=VALUE`` options give, by name.
+
+    Parameters
+    ----------
+    option
+        Its name, for messages.
+    given
+        What was written.
+    read
+        Reads a value.
+
+    Raises
+    ------
+    ValueRangeError
+        If one is not ``NAME=VALUE``, is given twice, or its value cannot be read.
+    """
     values: dict[str, T] = {}
     for text in given:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -81,10 +202,57 @@ def _pairs(option: str, given: tuple[str, ...], read: Callable[[str], T]) -> dic
     return values
 
 
-def _source(text: str) -> str:
-    from ..export import Late
+def read_wire(text: str) -> Wire:
+    """Read ``FROM[*GAIN][@DELAY]``; ``late:FROM`` is ``FROM@1sample``.
 
-    return Late(text.removeprefix(_LATE)) if text.startswith(_LATE) else text
+    Parameters
+    ----------
+    text
+        What was written.
+
+    Raises
+    ------
+    ValueRangeError
+        If it cannot be read so.
+    """
+    from ..export import SamplesOf, Wire
+
+    late = text.startswith(_LATE)
+    rest, at, delay = text.removeprefix(_LATE).partition("@")
+    source, times, gain = (part.strip() for part in rest.partition("*"))
+    if not source or bool(times) != bool(gain) or bool(at) != bool(delay.strip()) or (late and at):
+        raise ValueRangeError(
+            f"--wire from '{text}'", "is not FROM[*GAIN][@DELAY]", next_step=f"write for instance {_EXAMPLES}"
+        )
+    waits = SamplesOf() if late else _delay(delay.strip()) if at else 0.0
+    return Wire(source, gain=_gain(gain) if gain else 1.0, delay=waits)
+
+
+_EXAMPLES = (
+    "'link.torque=actuator.load.reaction*-1' or 'plant.motor.current=controller.motor.current@1sample'"
+)
+
+
+def _gain(text: str) -> float | Quantity:
+    match = _NUMBER.match(text)
+    if not match:
+        raise ValueRangeError(f"gain '{text}' of a --wire", "does not start with a number")
+    return quantity(float(match["number"]), match["unit"]) if match["unit"] else float(match["number"])
+
+
+def _delay(text: str) -> float | SamplesOf:
+    from ..export import SamplesOf
+
+    samples = _SAMPLES.match(text)
+    if samples:
+        return SamplesOf(samples["instance"], float(samples["count"].strip() or 1.0))
+    match = _NUMBER.match(text)
+    if not match:
+        raise ValueRangeError(
+            f"delay '{text}' of a --wire", "is neither a time nor a number of samples",
+            next_step="write for instance '@2ms', '@1sample' or '@1sample:controller'",
+        )  # fmt: skip
+    return parse_number(f"{match['number']} {match['unit']}", "ms").number
 
 
 def _signal(text: str) -> Sine:

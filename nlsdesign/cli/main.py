@@ -17,6 +17,7 @@ from .decks import deck
 from .design import design
 from .diagnose import diagnose, simulate
 from .export import export
+from .export_ssp import export_ssp
 from .fit import fit
 from .materials import materials
 from .observer import observer
@@ -32,6 +33,7 @@ def program() -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
 
 
+export.add_command(export_ssp)
 for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, verify_certificate):
     observer.add_command(part)
 for command in (

@@ -5,11 +5,15 @@ from .c.examples import write_examples
 from .compilation.compiled_step import natively
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
-from .cosimulation.cosimulate import CoSimulation, cosimulate
-from .cosimulation.master import Late
+from .cosimulation.convergence import Convergence, convergence
+from .cosimulation.cosimulate import CoSimulation, FmuSystem, cosimulate
+from .cosimulation.coupling import Extrapolated, Held, Iterated, Stepping
+from .cosimulation.wires import Late, SamplesOf, Wire
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
+from .ssp.read_ssp import read_ssp
+from .ssp.write_ssp import WrittenSystem, write_ssp
 from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
 from .target.target_run import TargetMeasurement, TargetRun, measure_on_target
 
@@ -22,16 +26,28 @@ __all__ = [
     "CSource",
     "CoSimulation",
     "CompiledStep",
+    "Convergence",
+    "Extrapolated",
+    "FmuSystem",
+    "Held",
+    "Iterated",
     "Late",
     "Processor",
+    "SamplesOf",
+    "Stepping",
     "TargetMeasurement",
     "TargetRun",
+    "Wire",
+    "WrittenSystem",
+    "convergence",
     "cosimulate",
     "export_c",
     "export_fmu",
     "host_platform",
     "measure_on_target",
     "natively",
+    "read_ssp",
     "write_examples",
     "write_reference",
+    "write_ssp",
 ]

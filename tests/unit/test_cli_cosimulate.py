@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.export import Late, cosimulate, export_fmu
+from nlsdesign import quantity
+from nlsdesign.export import Late, SamplesOf, Wire, cosimulate, export_fmu
 from nlsdesign.simulation import Sine
 from tests.command_line import Run, run
 from tests.hand_built import controller, observer, plant
@@ -37,9 +38,8 @@ def words(fmus: dict[str, Path], **changed: str) -> list[str]:
     found = ["cosimulate", "--stop", "0.5 s", "--out", "y.csv", "--input", f"{DESIRED}=0.5@1"]
     for name, file in fmus.items():
         found += ["--fmu", f"{name}={file}"]
-    for target, source in (WIRES | changed).items():
+    for target, source in ({BACK[0]: f"late:{BACK[1]}"} | WIRES | changed).items():
         found += ["--wire", f"{target}={source}"]
-    found += ["--wire", "=late:".join(BACK)]
     for name in ORDER:
         found += ["--order", name]
     return found
@@ -65,7 +65,7 @@ def test_the_run_is_that_of_the_library(run: Run, fmus: dict[str, Path], tmp_pat
 def test_people_see_the_wires_and_the_signals(run: Run, fmus: dict[str, Path]) -> None:
     status, out, _ = run(*words(fmus))
     assert status == 0
-    assert "delay in steps" in out
+    assert "1 ms" in out
     assert "plant.motor.current" in out
     assert "written: y.csv" in out
 
@@ -80,6 +80,12 @@ def test_people_see_the_wires_and_the_signals(run: Run, fmus: dict[str, Path]) -
         (["--wire", "observer.motor.angle=plant.motor.speed"], "'observer.motor.angle' is given twice"),
         (["--input", f"{BACK[0]}=1"], "is driven by a wire and by a signal"),
         (["--fmu", "other=nothing.fmu", "--order", "other"], "nothing.fmu"),
+        (["--wire", "a.b=c.d@soon"], "is neither a time nor a number of samples"),
+        (["--wire", "a.b=c.d@2 kg"], "is not a unit like 'ms'"),
+        (["--wire", "a.b=c.d*much"], "does not start with a number"),
+        (["--wire", "a.b=*2"], "is not FROM[*GAIN][@DELAY]"),
+        (["--wire", "a.b=late:c.d@1ms"], "is not FROM[*GAIN][@DELAY]"),
+        (["--system", "nothing.ssp"], "holds the FMUs already"),
     ],
 )
 def test_a_mistake_is_named_and_nothing_is_written(
@@ -89,3 +95,62 @@ def test_a_mistake_is_named_and_nothing_is_written(
     assert status == 2
     assert said in err
     assert not (tmp_path / "y.csv").exists()
+
+
+def test_gain_and_delay_of_a_wire_are_those_of_the_library(run: Run, fmus: dict[str, Path]) -> None:
+    written = {
+        BACK[0]: f"{BACK[1]}*-0.5@2.5ms",
+        "observer.motor.current": "controller.motor.current*1e3 mA/A@2samples:controller",
+        "controller.torque.actual": "observer.spring.torque@0.5sample",
+    }
+    status, out, err = run(*words(fmus, **written), "--json")
+    assert status == 0, err
+    wires = {
+        **WIRES,
+        BACK[0]: Wire(BACK[1], gain=-0.5, delay=2.5e-3),
+        "observer.motor.current": Wire(
+            "controller.motor.current", gain=quantity(1e3, "mA/A"), delay=SamplesOf("controller", 2)
+        ),
+        "controller.torque.actual": Wire("observer.spring.torque", delay=SamplesOf(count=0.5)),
+    }
+    expected = cosimulate(fmus=fmus, wires=wires, inputs={DESIRED: Sine(0.5, 1.0)}, stop=0.5, order=ORDER)
+    found = json.loads(out)
+    assert found["delays"] == dict(expected.delays)
+    assert found["delays"][BACK[0]] == 2.5e-3
+    assert found["signals"]["plant.motor.angle"]["last"] == expected["plant.motor.angle"][-1]
+    assert found["signals"]["plant.motor.angle"]["rms"] > 0.01
+
+
+def test_a_driven_plant_shows_its_error_and_how_it_converges(run: Run, fmus: dict[str, Path]) -> None:
+    called = ["cosimulate", "--fmu", f"plant={fmus['plant']}", "--stop", "0.05 s", "--step", "1 ms"]
+    called += ["--input", "plant.motor.current=1@10", "--out", "y.csv", "--halvings", "3"]
+    status, out, err = run(*called, "--json")
+    assert status == 0, err
+    found = json.loads(out)
+    assert found["convergence"]["steps"] == [1e-3, 5e-4, 2.5e-4, 1.25e-4]
+    angle = found["convergence"]["signals"]["plant.motor.angle"]
+    assert angle["orders"] == pytest.approx([2.0, 2.0], abs=0.2)
+    assert found["signals"]["plant.motor.angle"]["error"] == pytest.approx(4 / 3 * angle["differences"][0])
+    _, out, _ = run(*called)
+    assert "Change when the step is halved" in out
+    assert "coupling error" in out
+
+
+def test_a_system_is_written_and_run(run: Run, fmus: dict[str, Path], tmp_path: Path) -> None:
+    given = words(fmus)
+    stop, out, drive = given.index("--stop"), given.index("--out"), given.index("--input")
+    described = [
+        w for i, w in enumerate(given) if i not in {0, stop, stop + 1, out, out + 1, drive, drive + 1}
+    ]
+    status, _, err = run("export", "ssp", *described, "--out", "loop.ssp")
+    assert status == 0
+    assert "an annotation, which other tools may ignore: the delay of 0.001 s" in err
+    called = ["cosimulate", "--system", "loop.ssp", "--stop", "0.5 s", "--input", f"{DESIRED}=0.5@1"]
+    status, _, err = run(*called, "--out", "system.csv")
+    assert status == 0, err
+    status, _, err = run(*given)
+    assert status == 0, err
+    assert (tmp_path / "system.csv").read_bytes() == (tmp_path / "y.csv").read_bytes()
+    status, _, err = run("cosimulate", "--stop", "1 s", "--out", "z.csv")
+    assert status == 2
+    assert "no FMU" in err

@@ -1,33 +1,51 @@
 """Several FMUs as one system: wired by name, stepped together, recorded.
 
-Order. Without ``order`` all inputs are read before any instance steps (Jacobi): the result does not depend on
-how the instances are listed, and the output that a *sampled* instance computes at a communication point
-reaches the others one step later. With ``order`` each instance reads what earlier ones have computed in the
-same step (Gauss-Seidel): sensors, observer and controller before the plant give a loop without computing
-delay; a wire from a :class:`Late` source keeps it, for instance when the plant gets the current of the
-previous sample. The result lists the delay of every wire in steps.
+Row k of a result shows what holds at its time: continuous values at that time, and what sampled instances
+have computed from values read at that time, as in a simulated :class:`~nlsdesign.control.ClosedLoop`.
+
+Order. Without ``order`` all sampled instances that are due read before any computes (Jacobi), as most masters
+do: what a sampled instance computes reaches the others one sample later. With ``order`` each reads what
+earlier ones have just computed (Gauss-Seidel): observer and controller before the plant give a loop without
+computing delay. A wire from an instance that stands later carries its previous sample. Any other delay is
+that of the :class:`~nlsdesign.export.cosimulation.wires.Wire`. No delay depends on the communication step;
+the result lists them in seconds.
 """
 
 from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...errors import ExportError, UnitError, ValueRangeError, unknown_name
-from ...quantity import parse_unit
+from ...errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
 from ...simulation.trace import Trace
+from .coupling import Stepping
+from .fmu_archive import unpack
+from .fmu_description import DESCRIPTION_FILE, FmuDescription, check_library, read_description
 from .fmu_instance import FmuInstance
-from .master import Signal, System, split_name
+from .isolation import IsolatedWork, Watch
+from .master import Master
+from .run_plan import Given, Link, Plan, points_of
+from .wires import Wire, as_wire, check_wires, delay_of, ends, gain_to, split_name
 
+Array = NDArray[np.float64]
+Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
+"""A function of time in s, or times and values between which it is linear and beyond which it is held."""
 DEFAULT_STEP = 1e-3
 """Communication step in s where no instance is sampled."""
+_MOST_ERROR = 0.5
+"""Share of the extent of a coupled signal above which its estimated error makes a run no result."""
+_AT_REST = 1e-9
+"""Extent below which a signal rests, whatever its unit; there the error is rounding."""
+_JUST_BEFORE = 1e-6
+"""Part of a step: signals from outside that jump at a communication point are also read so long before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,23 +55,28 @@ class CoSimulation:
     Parameters
     ----------
     trace
-        Outputs and inner signals of all instances as ``instance.variable``, and the inputs from outside, at
-        every communication point. What a sampled instance shows belongs to its last sample before it.
+        Outputs and inner signals of all instances as ``instance.variable``, and the driven inputs, at every
+        communication point. Row k shows what holds at its time: a sampled instance shows what it computed
+        from values read at that time, or holds since its last sample.
     step
-        Communication step in s.
+        Longest communication step in s.
     order
-        Order of stepping; empty when all inputs were read first.
+        Order of sampled instances; empty when all read before any computed.
     delays
-        By wire target: steps by which what it reads is late; −1 means that it reads the end of the step it is
-        about to take.
+        By wire target: age in s of what it reads, beyond the holding of samples.
+    errors
+        By signal: estimate of the largest error of coupling, in the unit of the signal, from a second run
+        with half the step and the order of the coupling. Empty where there is no such error, or it was not
+        asked for.
     """
 
     trace: Trace
     step: float
     order: tuple[str, ...]
-    delays: Mapping[str, int]
+    delays: Mapping[str, float]
+    errors: Mapping[str, float] = field(default_factory=dict)
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> Array:
         """Return one recorded signal.
 
         Parameters
@@ -64,38 +87,102 @@ class CoSimulation:
         return self.trace[name]
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Array:
         """Communication points in s."""
         return self.trace.time
 
 
-def cosimulate(
-    *,
-    fmus: Mapping[str, str | Path],
-    wires: Mapping[str, str],
-    inputs: Mapping[str, Signal],
-    stop: float,
-    step: float | None = None,
-    order: Sequence[str] = (),
-    parameters: Mapping[str, float] | None = None,
-) -> CoSimulation:
-    """Simulate FMUs together.
+@dataclass(frozen=True, kw_only=True)
+class FmuSystem:
+    """FMUs wired by name.
 
     Parameters
     ----------
     fmus
         FMU by name of the instance.
     wires
-        Source by target, for instance ``{"observer.motor.angle": "plant.motor.angle"}``; a source wrapped in
-        :class:`Late` is read as it was before the step, whatever the order.
+        Source by target.
+    parameters
+        Parameters and start values by ``instance.variable``.
+    order
+        See the head of this module.
+    """
+
+    fmus: Mapping[str, str | Path]
+    wires: Mapping[str, str | Wire] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
+
+    def run(
+        self,
+        *,
+        inputs: Mapping[str, Signal],
+        stop: float,
+        stepping: Stepping | None = None,
+        parts: int = 1,
+    ) -> CoSimulation:
+        """Simulate; see :func:`cosimulate`.
+
+        Parameters
+        ----------
+        inputs
+            Signals from outside by input.
+        stop
+            End in s.
+        stepping
+            Step, coupling, and limits.
+        parts
+            Parts into which each step is divided once more.
+
+        Raises
+        ------
+        ValueRangeError
+            If the end is not a positive number of seconds.
+        """
+        if not (math.isfinite(stop) and stop > 0.0):
+            raise ValueRangeError(f"stop={stop}", "must be a positive number of seconds")
+        check_order(self.order, self.fmus)
+        with ExitStack() as stack:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-")))
+            descriptions = unpacked_fmus(self.fmus, folder)
+            for description in descriptions.values():
+                check_library(description)
+            run = _Run(self, descriptions, inputs, stop, stepping or Stepping(), folder)
+            return run.result(parts)
+
+
+def cosimulate(
+    *,
+    fmus: Mapping[str, str | Path],
+    wires: Mapping[str, str | Wire],
+    inputs: Mapping[str, Signal],
+    stop: float,
+    step: float | Stepping | None = None,
+    order: Sequence[str] = (),
+    parameters: Mapping[str, float] | None = None,
+) -> CoSimulation:
+    """Simulate FMUs together.
+
+    The FMUs run in a process of their own: one that crashes or hangs ends with an error that names it.
+
+    Parameters
+    ----------
+    fmus
+        FMU by name of the instance.
+    wires
+        Source by target, for instance ``{"observer.motor.angle": "plant.motor.angle"}``; a
+        :class:`~nlsdesign.export.cosimulation.wires.Wire` adds a gain or a delay, a :class:`Late` one is late
+        by one sample.
     inputs
-        Signals from outside by input, held over each communication step.
+        Signals from outside by input. A sampled instance reads them at its samples, a continuous one gets
+        their value in the middle of each step.
     stop
         End in s; the start is 0.
     step
-        Communication step in s; by default the shortest sample time of the instances.
+        Longest communication step in s, by default the shortest sample time of the instances; or a
+        :class:`~nlsdesign.export.cosimulation.coupling.Stepping` with more choices.
     order
-        Instances in the order in which they step, see the head of this module.
+        Instances in the order in which they compute, see the head of this module.
     parameters
         Parameters and start values by ``instance.variable``.
 
@@ -104,42 +191,179 @@ def cosimulate(
     UnknownNameError
         If a wire, input or parameter names what does not exist, with the nearest that does.
     ExportError
-        If an FMU cannot be used, or an input is driven twice.
+        If an FMU is damaged, cannot be used, crashes or hangs, or an input is driven twice.
     UnitError
         If a wire joins different units.
     ValueRangeError
-        If sample times are no multiples of the step.
+        If step or stop is not possible.
     ConvergenceError
-        If an instance cannot take a step, with its own words.
+        If an instance cannot take a step, with its own words, or a coupling does not settle or converge.
     """
-    if not (math.isfinite(stop) and stop > 0.0):
-        raise ValueRangeError(f"stop={stop}", "must be a positive number of seconds")
-    _check_order(order, fmus)
-    with _instances(fmus) as instances:
-        _check_ends(instances, wires, inputs, parameters or {})
-        length = _communication_step(instances, step)
-        system = System(instances, wires, inputs, tuple(order))
-        for target, value in (parameters or {}).items():
-            instance, variable = split_name(target)
-            instances[instance].set({variable: value})
-        trace = system.run(stop, length)
-        return CoSimulation(trace, length, tuple(order), system.delays())
+    system = FmuSystem(fmus=fmus, wires=wires, parameters=parameters or {}, order=tuple(order))
+    return system.run(
+        inputs=inputs, stop=stop, stepping=step if isinstance(step, Stepping) else Stepping(step)
+    )
 
 
-@contextmanager
-def _instances(fmus: Mapping[str, str | Path]) -> Iterator[dict[str, FmuInstance]]:
-    """Yield loaded instances; afterwards, also after an error, all are freed and their files removed."""
-    with tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-") as folder, ExitStack() as stack:
-        instances: dict[str, FmuInstance] = {}
-        for number, (name, path) in enumerate(fmus.items()):
-            if not name.isidentifier():
-                raise ExportError(f"instance '{name}'", "must be one word without a dot")
-            instances[name] = FmuInstance(name, Path(path), Path(folder) / str(number))
-            stack.callback(instances[name].close)
-        yield instances
+class _Run:
+    """One run of a system whose archives are unpacked."""
+
+    def __init__(
+        self,
+        system: FmuSystem,
+        descriptions: Mapping[str, FmuDescription],
+        inputs: Mapping[str, Signal],
+        stop: float,
+        stepping: Stepping,
+        folder: Path,
+    ) -> None:
+        self._descriptions, self._inputs, self._folder = descriptions, inputs, folder
+        self._system, self._stepping, self._stop = system, stepping, stop
+        wires = {target: as_wire(source) for target, source in system.wires.items()}
+        check_wires(descriptions, wires)
+        check_signals(descriptions, wires, inputs, system.parameters)
+        self._links = tuple(self._link(target, wire) for target, wire in wires.items())
+        times = [each.sample_time for each in descriptions.values() if each.sample_time is not None]
+        self._step = min(times, default=DEFAULT_STEP) if stepping.step is None else stepping.step
+
+    def result(self, parts: int) -> CoSimulation:
+        """Run, and once more with half the step where that tells an error."""
+        plan = self._plan(parts)
+        if plan.coupled and self._stepping.coupling.rolls_back:
+            self._check_roll_back(plan)
+        rows = self._rows(plan)
+        self._check_finite(plan, rows)
+        columns = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(plan.columns)}
+        trace = Trace(plan.points, columns, {name: self._unit(name) for name in columns}, "co-simulation")
+        errors: dict[str, float] = {}
+        if plan.coupled and self._stepping.estimate:
+            finer = self._rows(self._plan(2 * parts))[::2]
+            order = self._stepping.coupling.order
+            largest = np.max(np.abs(rows - finer), axis=0) * 2**order / (2**order - 1)
+            errors = dict(zip(plan.columns, largest.tolist(), strict=True))
+            self._check_converges(plan, errors, rows)
+        return CoSimulation(trace, self._step, self._system.order, self._delays(), errors)
+
+    def _plan(self, parts: int) -> Plan:
+        points = points_of(self._descriptions, self._links, self._stop, self._step, parts)
+        signals = {name: _sampled_signal(signal, points) for name, signal in self._inputs.items()}
+        return Plan(
+            self._descriptions, self._links, signals, self._system.parameters, self._system.order, points,
+            self._stepping.coupling,
+        )  # fmt: skip
+
+    def _rows(self, plan: Plan) -> Array:
+        watch = Watch(tuple(plan.descriptions))
+
+        def work(rows: Array) -> None:
+            with ExitStack() as stack:
+                instances: dict[str, FmuInstance] = {}
+                for name, description in plan.descriptions.items():
+                    instances[name] = FmuInstance(description, watch)
+                    stack.callback(instances[name].close)
+                Master(plan, instances, watch).run(rows)
+
+        isolated = IsolatedWork(
+            work, watch, plan.points, len(plan.columns), self._folder, self._stepping.patience,
+            self._stepping.progress,
+        )  # fmt: skip
+        return isolated.result()
+
+    def _link(self, target: str, wire: Wire) -> Link:
+        order = self._system.order
+        to, of = split_name(target)[0], split_name(wire.source)[0]
+        fresh = bool(order) and order.index(of) < order.index(to)
+        gain = gain_to(self._descriptions, target, wire)
+        return Link(target, wire.source, gain, delay_of(self._descriptions, wire), fresh)
+
+    def _delays(self) -> dict[str, float]:
+        """Return the delay of each wire in s; a sampled source that computes later is one sample late."""
+        periods = {name: each.sample_time or 0.0 for name, each in self._descriptions.items()}
+        return {
+            link.target: link.delay or (0.0 if link.fresh else periods[split_name(link.source)[0]])
+            for link in self._links
+        }
+
+    def _check_roll_back(self, plan: Plan) -> None:
+        ends_of = [end for link in plan.coupling_links for end in (link.target, link.source)]
+        for name in dict.fromkeys(split_name(end)[0] for end in ends_of):
+            if not plan.descriptions[name].rolls_back:
+                raise ExportError(
+                    f"instance '{name}'",
+                    "cannot keep and restore its state, which this coupling needs",
+                    next_step="take coupling=Extrapolated()",
+                )
+
+    def _check_converges(self, plan: Plan, errors: Mapping[str, float], rows: Array) -> None:
+        """Refuse a run whose wires between continuous instances are mostly error."""
+        for link in plan.coupling_links:
+            extent = float(np.ptp(rows[:, plan.columns.index(link.source)]))
+            if errors[link.source] > _MOST_ERROR * extent and extent > _AT_REST:
+                raise ConvergenceError(
+                    f"wire from '{link.source}'",
+                    f"half the step changes it by about {errors[link.source]:.2g} of its {extent:.2g}: the "
+                    f"coupling does not converge in steps of {plan.points[1]:.3g} s",
+                    next_step="take a shorter step, or coupling=Iterated()",
+                )
+
+    def _check_finite(self, plan: Plan, rows: Array) -> None:
+        """Refuse a run in which an output is no number."""
+        for column, name in enumerate(plan.columns):
+            instance, variable = split_name(name)
+            lost = np.flatnonzero(~np.isfinite(rows[:, column]))
+            if len(lost) and self._descriptions[instance].variables[variable].causality == "output":
+                raise ConvergenceError(
+                    f"instance '{instance}' at {plan.points[lost[0]]:g} s",
+                    f"its output {variable} is no number",
+                )
+
+    def _unit(self, name: str) -> str:
+        instance, variable = split_name(name)
+        return self._descriptions[instance].variables[variable].unit or "1"
 
 
-def _check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
+def unpacked_fmus(fmus: Mapping[str, str | Path], folder: Path) -> dict[str, FmuDescription]:
+    """Unpack all archives and read their descriptions.
+
+    Parameters
+    ----------
+    fmus
+        FMU by name of the instance.
+    folder
+        Gets a folder for each; its owner removes it.
+
+    Raises
+    ------
+    ExportError
+        If an FMU is damaged, or the name of an instance is not one word.
+    """
+    descriptions: dict[str, FmuDescription] = {}
+    for number, (name, path) in enumerate(fmus.items()):
+        if not name.isidentifier():
+            raise ExportError(f"instance '{name}'", "must be one word without a dot")
+        place = folder / str(number)
+        unpack(f"instance '{name}' ({path})", Path(path), place, needs=DESCRIPTION_FILE)
+        descriptions[name] = read_description(name, Path(path), place)
+    return descriptions
+
+
+def check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
+    """Check that an order is empty or names each instance once.
+
+    Parameters
+    ----------
+    order
+        Names of instances.
+    fmus
+        By name of the instance.
+
+    Raises
+    ------
+    UnknownNameError
+        If an instance does not exist, with the nearest that does.
+    ValueRangeError
+        If some are missing or named twice.
+    """
     for name in order:
         if name not in fmus:
             raise unknown_name("instance in order", name, fmus)
@@ -147,65 +371,56 @@ def _check_order(order: Sequence[str], fmus: Mapping[str, str | Path]) -> None:
         raise ValueRangeError(f"order={tuple(order)}", f"must name each of {', '.join(fmus)} once")
 
 
-def _check_ends(
-    instances: Mapping[str, FmuInstance],
-    wires: Mapping[str, str],
+def check_signals(
+    descriptions: Mapping[str, FmuDescription],
+    wires: Mapping[str, Wire],
     inputs: Mapping[str, Signal],
     parameters: Mapping[str, float],
 ) -> None:
-    names: dict[str, list[str]] = {"input": [], "output": [], "any": []}
-    for instance in instances.values():
-        for variable in instance.variables.values():
-            names["any"].append(f"{instance.name}.{variable.name}")
-            names.setdefault(variable.causality, []).append(names["any"][-1])
-    for kind, given, valid in (
-        ("wire to input", wires, names["input"]),
-        ("wire from output", wires.values(), names["output"]),
-        ("signal for input", inputs, names["input"]),
-        ("parameter", parameters, names["any"]),
-    ):
+    """Check that what is given from outside exists and is driven once.
+
+    Parameters
+    ----------
+    descriptions
+        By instance.
+    wires, inputs
+        Wires and signals by target.
+    parameters
+        By ``instance.variable``.
+
+    Raises
+    ------
+    UnknownNameError
+        If an input or parameter does not exist, with the nearest that does.
+    ExportError
+        If an input is driven twice.
+    """
+    valid = {
+        "signal for input": (inputs, ends(descriptions, "input")),
+        "parameter": (parameters, ends(descriptions)),
+    }
+    for kind, (given, names) in valid.items():
         for name in given:
-            if name not in valid:
-                raise unknown_name(kind, name, valid)
+            if name not in names:
+                raise unknown_name(kind, name, names)
     for name in inputs:
         if name in wires:
             raise ExportError(
                 f"input '{name}'", "is driven by a wire and by a signal", next_step="remove one of them"
             )
-    for target, source in wires.items():
-        _check_units(instances, target, source)
 
 
-def _check_units(instances: Mapping[str, FmuInstance], target: str, source: str) -> None:
-    units = [_unit(instances, end) for end in (target, source)]
-    if None in units or units[0] == units[1]:
-        return
-    try:
-        one, other = (parse_unit(unit or "1") for unit in units)
-    except UnitError:
-        return  # a unit of a foreign FMU that cannot be read here
-    # Without the radian: torque is given in N·m and in N·m/rad.
-    if (one.factor, one.mechanical) != (other.factor, other.mechanical):
-        raise UnitError(f"wire '{target}' [{units[0]}]", f"reads '{source}', which is in [{units[1]}]")
+def _sampled_signal(signal: Signal, points: Array) -> Given:
+    """Return a signal at the points, just before them, and in the middle of the steps."""
+    lengths = np.diff(points)
+    left = points - np.concatenate([lengths[:1], lengths]) * _JUST_BEFORE
+    left[0] = points[0]
+    middle = np.append(points[:-1] + 0.5 * lengths, points[-1])
+    return Given(*(_values(signal, times) for times in (points, left, middle)))
 
 
-def _unit(instances: Mapping[str, FmuInstance], name: str) -> str | None:
-    instance, variable = split_name(name)
-    return instances[instance].unit(variable)
-
-
-def _communication_step(instances: Mapping[str, FmuInstance], step: float | None) -> float:
-    """Return the communication step, of which every sample time must be a multiple."""
-    times = {name: instance.sample_time for name, instance in instances.items() if instance.sample_time}
-    length = step if step is not None else min(times.values(), default=DEFAULT_STEP)
-    if not (math.isfinite(length) and length > 0.0):
-        raise ValueRangeError(f"step={length}", "must be a positive number of seconds")
-    for name, period in times.items():
-        samples = period / length
-        if round(samples) < 1 or abs(samples - round(samples)) > 1e-9 * samples:
-            raise ValueRangeError(
-                f"step={length:g} s",
-                f"the sample time of '{name}', {period:g} s, is no multiple of it",
-                next_step=f"take step={period:g} or a whole fraction of it",
-            )
-    return length
+def _values(signal: Signal, times: Array) -> Array:
+    if callable(signal):
+        return np.array([float(signal(time)) for time in times.tolist()])
+    given, values = (np.asarray(each, dtype=float) for each in signal)
+    return np.asarray(np.interp(times, given, values), dtype=float)

@@ -3,150 +3,45 @@
 from __future__ import annotations
 
 import ctypes
-import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import fmpy
-import fmpy.fmi2
-import fmpy.fmi3
-from fmpy.fmi1 import FMICallException
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import ConvergenceError, ExportError
+from .fmu_description import FmuDescription, FmuScalar
+from .isolation import Activity, Watch
+from .loaded_fmu import LoadedFmu, why
 
-_REAL, _INTEGER = ("Real", "Float64"), ("Integer", "Int32")
+Array = NDArray[np.float64]
+_STEPPING = int(Activity.STEPPING)
+_WARNING = 1
+"""The highest status with which both versions of FMI go on."""
 
 
-class FmuInstance:
-    """An FMU that has been unpacked, loaded and instantiated.
+class FmuInstance(LoadedFmu):
+    """A loaded FMU whose variables are set and read in place, and which is stepped.
 
     Parameters
     ----------
-    name
-        Name of the instance, for messages.
-    path
-        The FMU.
-    folder
-        Folder for its files; the owner of the folder removes it after :meth:`close`.
+    description
+        Of the FMU.
+    watch
+        Told what is called, so that a crash can be explained.
 
     Raises
     ------
     ExportError
-        If the file is no valid co-simulation FMU or has no binary for this machine.
+        If its library cannot be loaded or instantiated, or lacks a function.
     """
 
-    def __init__(self, name: str, path: Path, folder: Path) -> None:
-        self.name = name
-        self.messages: list[str] = []
-        description = _description(name, path)
-        self.variables: Mapping[str, Any] = {
-            v.name: v
-            for v in description.modelVariables
-            if v.type in _REAL + _INTEGER and not getattr(v, "dimensions", None)
-        }
-        self._two = description.fmiVersion == "2.0"
-        self._running = False
-        fmpy.extract(str(path), unzipdir=str(folder))
-        kind = fmpy.fmi2.FMU2Slave if self._two else fmpy.fmi3.FMU3Slave
-        self._fmu = self._load(kind, description, folder)
+    def __init__(self, description: FmuDescription, watch: Watch) -> None:
+        super().__init__(description, watch)
         try:
-            self._instantiate()
-        except Exception as error:
-            self._fmu.freeLibrary()
-            raise ExportError(
-                f"instance '{name}'", f"could not be made: {_why(self.messages, error)}"
-            ) from error
-
-    def _load(self, kind: Any, description: Any, folder: Path) -> Any:
-        identifier = description.coSimulation.modelIdentifier
-        where = "binaries/" + (fmpy.platform if self._two else fmpy.platform_tuple)
-        library = folder / where / (identifier + fmpy.sharedLibraryExtension)
-        if not library.is_file():
-            raise ExportError(
-                f"instance '{self.name}'",
-                f"the FMU has no binary for this machine ({where})",
-                next_step="export it with platforms=None on this machine, or name the platform",
-            )
-        here = os.getcwd()
-        try:
-            return kind(
-                guid=description.guid,
-                modelIdentifier=identifier,
-                unzipDirectory=str(folder),
-                instanceName=self.name,
-            )
-        except Exception as error:
-            raise ExportError(f"instance '{self.name}'", f"its library does not load: {error}") from error
-        finally:
-            os.chdir(here)  # fmpy does not restore it where loading fails
-
-    def _instantiate(self) -> None:
-        def log(status: int, message: bytes) -> None:
-            if status > 0:
-                self.messages.append(message.decode("utf-8", errors="replace"))
-
-        if self._two:
-            callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-            ctypes.memmove(
-                ctypes.byref(callbacks),
-                ctypes.byref(fmpy.fmi2.defaultCallbacks),
-                ctypes.sizeof(callbacks),
-            )
-            callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(
-                lambda _e, _n, status, _c, text: log(status, text)
-            )
-            self._fmu.instantiate(callbacks=callbacks)
-        else:
-            self._fmu.instantiate(logMessage=lambda _e, status, _c, text: log(status, text))
-
-    @contextmanager
-    def _explained(
-        self, what: str, kind: type[ExportError] | type[ConvergenceError] = ExportError
-    ) -> Iterator[None]:
-        try:
-            yield
-        except FMICallException as error:
-            raise kind(f"instance '{self.name}', {what}", _why(self.messages, error)) from error
-
-    @property
-    def sample_time(self) -> float | None:
-        """Sample time in s that the FMU states, ``None`` for a continuous one."""
-        period = self.variables.get("sample.time")
-        return float(period.start) if period is not None and period.variability == "constant" else None
-
-    def unit(self, variable: str) -> str | None:
-        """Return the unit of a variable, ``None`` if the FMU gives none.
-
-        Parameters
-        ----------
-        variable
-            Name of a variable.
-        """
-        described = self.variables[variable]
-        return described.unit or (described.declaredType.unit if described.declaredType else None)
-
-    def begin(self, start: float, stop: float) -> None:
-        """Enter the initialization mode.
-
-        Parameters
-        ----------
-        start, stop
-            Times in s.
-        """
-        with self._explained("initialization"):
-            if self._two:
-                self._fmu.setupExperiment(startTime=start, stopTime=stop)
-                self._fmu.enterInitializationMode()
-            else:
-                self._fmu.enterInitializationMode(startTime=start, stopTime=stop)
-
-    def run(self) -> None:
-        """Leave the initialization mode."""
-        with self._explained("initialization"):
-            self._fmu.exitInitializationMode()
-        self._running = True
+            self._step = self._step_function()
+        except AttributeError as error:
+            raise ExportError(f"instance '{self.name}'", f"could not be made: {error}") from error
 
     def set(self, values: Mapping[str, float]) -> None:
         """Set variables.
@@ -154,42 +49,107 @@ class FmuInstance:
         Parameters
         ----------
         values
-            Numbers in SI by name.
+            Numbers by name.
 
         Raises
         ------
         ExportError
             With the message of the FMU if it refuses.
         """
-        if values:
-            references = [self.variables[name].valueReference for name in values]
-            with self._explained(f"setting {', '.join(values)}"):
-                (self._fmu.setReal if self._two else self._fmu.setFloat64)(references, list(values.values()))
+        for name, value in values.items():
+            variable = self.description.variables[name]
+            self.watch(self.number, Activity.SETTING)
+            with self.explained(f"setting {name}"):
+                if variable.kind == "real":
+                    (self.fmu.setReal if self.two else self.fmu.setFloat64)([variable.reference], [value])
+                else:
+                    (self.fmu.setInteger if self.two else self.fmu.setInt32)(
+                        [variable.reference], [int(value)]
+                    )
 
-    def get(self, names: Sequence[str]) -> dict[str, float]:
-        """Return the values of variables.
+    def setter(self, names: Sequence[str], values: Array) -> Callable[[], None]:
+        """Return a function that sets real variables to what an array holds when it is called.
 
         Parameters
         ----------
         names
-            Names of real or integer variables.
-
-        Raises
-        ------
-        ExportError
-            With the message of the FMU if it refuses.
+            Of real variables.
+        values
+            Shape (n,), contiguous; the function reads it.
         """
-        values: dict[str, float] = {}
-        real, integer = (self._fmu.getReal, self._fmu.getInteger) if self._two else (
-            self._fmu.getFloat64, self._fmu.getInt32,
-        )  # fmt: skip
-        for types, read in ((_REAL, real), (_INTEGER, integer)):
-            chosen = [name for name in names if self.variables[name].type in types]
-            if chosen:
-                with self._explained("reading"):
-                    numbers = read([self.variables[name].valueReference for name in chosen])
-                values |= {name: float(number) for name, number in zip(chosen, numbers, strict=True)}
-        return values
+        variables = [self.description.variables[name] for name in names]
+        call = self._access("fmi2SetReal" if self.two else "fmi3SetFloat64", variables, values.ctypes.data)
+        return self._checked(call, Activity.SETTING, f"setting {', '.join(names)}", values)
+
+    def reader(self, variables: Sequence[FmuScalar], values: Array) -> Callable[[], None]:
+        """Return a function that reads variables into an array when it is called.
+
+        Parameters
+        ----------
+        variables
+            Reals first, then integers.
+        values
+            Shape (n,), contiguous; the function writes it.
+        """
+        reals = [v for v in variables if v.kind == "real"]
+        integers = [v for v in variables if v.kind != "real"]
+        numbers = np.zeros(len(integers), dtype=np.int32)
+        real = self._access("fmi2GetReal" if self.two else "fmi3GetFloat64", reals, values.ctypes.data)
+        read = self._checked(real, Activity.READING, "reading", values)
+        if not integers:
+            return read
+        whole = self._access("fmi2GetInteger" if self.two else "fmi3GetInt32", integers, numbers.ctypes.data)
+        read_whole = self._checked(whole, Activity.READING, "reading", numbers)
+
+        def read_all() -> None:
+            if reals:
+                read()
+            read_whole()
+            values[len(reals) :] = numbers
+
+        return read_all
+
+    def _access(self, function: str, variables: Sequence[FmuScalar], place: int) -> Callable[[], int]:
+        """Return a call that sets or reads variables at one place in memory."""
+        references = (ctypes.c_uint32 * max(1, len(variables)))(*[v.reference for v in variables])
+        native = self.fmu.dll[function]
+        component, count, at = self.fmu.component, len(variables), ctypes.addressof(references)
+        void, size = ctypes.c_void_p, ctypes.c_size_t
+        if self.two:
+            native.argtypes = [void, void, size, void]
+            # The default keeps the references alive as long as the call.
+            return lambda _kept=references: int(native(component, at, count, place))  # type: ignore[misc]
+        native.argtypes = [void, void, size, void, size]
+        return lambda _kept=references: int(native(component, at, count, place, count))  # type: ignore[misc]
+
+    def _checked(self, call: Callable[[], int], activity: int, what: str, kept: Any) -> Callable[[], None]:
+        """Return a call that raises where the FMU refuses; ``kept`` stays alive as long as it."""
+        watch, number, name, activity = self.watch, self.number, self.name, int(activity)
+
+        def checked(_kept: Any = kept) -> None:
+            watch(number, activity)
+            status = call()
+            if status > _WARNING:
+                raise ExportError(f"instance '{name}', {what}", why(self.messages, f"status {status}"))
+
+        return checked
+
+    def _step_function(self) -> Callable[[float, float], int]:
+        native, component = self.fmu.dll["fmi2DoStep" if self.two else "fmi3DoStep"], self.fmu.component
+        void, double, flag = ctypes.c_void_p, ctypes.c_double, ctypes.c_int if self.two else ctypes.c_bool
+        if self.two:
+            native.argtypes = [void, double, double, flag]
+            return lambda time, length: int(native(component, time, length, 0))
+        native.argtypes = [void, double, double, flag, void, void, void, void]
+        flags = [ctypes.c_bool() for _ in range(3)]
+        last = ctypes.c_double()
+        event, end, early = (ctypes.addressof(flag) for flag in flags)
+        reached = ctypes.addressof(last)
+
+        def step(time: float, length: float, _kept: Any = (flags, last)) -> int:
+            return int(native(component, time, length, False, event, end, early, reached))
+
+        return step
 
     def step(self, time: float, length: float) -> None:
         """Advance by one communication step.
@@ -204,30 +164,39 @@ class FmuInstance:
         ConvergenceError
             With the message of the FMU if it cannot.
         """
-        with self._explained(f"step from {time:g} s", ConvergenceError):
-            self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=length)
+        self.watch(self.number, _STEPPING)
+        status = self._step(time, length)
+        if status > _WARNING:
+            raise ConvergenceError(
+                f"instance '{self.name}', step from {time:g} s", why(self.messages, f"status {status}")
+            )
 
-    def close(self) -> None:
-        """Terminate, free the instance and unload its library; never fails."""
-        try:
-            if self._running:
-                self._fmu.terminate()
-        except FMICallException:
-            pass  # it failed before, which was reported
-        finally:
-            self._fmu.freeInstance()
+    def keep_state(self) -> Any:
+        """Return a copy of the state, to be given back to :meth:`forget_state`."""
+        self.watch(self.number, Activity.ROLLING_BACK)
+        with self.explained("keeping its state"):
+            return self.fmu.getFMUstate() if self.two else self.fmu.getFMUState()
 
+    def restore_state(self, state: Any) -> None:
+        """Go back to a state that was kept.
 
-def _why(messages: Sequence[str], error: BaseException) -> str:
-    """Return the last message of the FMU, or that of fmpy without one."""
-    return messages[-1] if messages else str(error)
+        Parameters
+        ----------
+        state
+            From :meth:`keep_state`.
+        """
+        self.watch(self.number, Activity.ROLLING_BACK)
+        with self.explained("going back to an earlier state"):
+            (self.fmu.setFMUstate if self.two else self.fmu.setFMUState)(state)
 
+    def forget_state(self, state: Any) -> None:
+        """Free a state that was kept.
 
-def _description(name: str, path: Path) -> Any:
-    try:
-        description = fmpy.read_model_description(str(path))
-    except Exception as error:
-        raise ExportError(f"instance '{name}' ({path})", f"is not a valid FMU: {error}") from error
-    if description.coSimulation is None or description.fmiVersion == "1.0":
-        raise ExportError(f"instance '{name}' ({path})", "is not a co-simulation FMU of FMI 2.0 or 3.0")
-    return description
+        Parameters
+        ----------
+        state
+            From :meth:`keep_state`.
+        """
+        self.watch(self.number, Activity.ROLLING_BACK)
+        with self.explained("freeing a state"):
+            (self.fmu.freeFMUstate if self.two else self.fmu.freeFMUState)(state)

@@ -1,173 +1,209 @@
-"""The master algorithm: order of steps, and the age of the values that each instance reads."""
+"""The master algorithm: when each instance steps, and the age of the values that it reads.
+
+At a communication point t: continuous instances stand at t and show their outputs there. Values that are late
+arrive at the inputs. Then the sampled instances that are due read their inputs and compute what holds from t
+on; what is not late reaches the others at once. This is the row of the result. Then the continuous instances
+are stepped to the next point. A sampled instance is stepped once per sample, by its own sample time, so
+nothing depends on the communication step but the error of coupling.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TypeAlias, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
-from ...simulation.trace import Trace
+from ...errors import ConvergenceError
+from .feeds import Curve
 from .fmu_instance import FmuInstance
+from .instance_inputs import ConnectedInputs, InstanceInputs, due_by_row
+from .isolation import Watch
+from .run_plan import Plan
+from .wires import split_name
 
-Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
-"""A function of time in s, or times and values between which it is linear and beyond which it is held."""
-
-
-def split_name(name: str) -> tuple[str, str]:
-    """Return instance and variable of ``instance.variable``.
-
-    Parameters
-    ----------
-    name
-        The first word is the instance.
-    """
-    instance, _, variable = name.partition(".")
-    return instance, variable
+Array = NDArray[np.float64]
+Values = Callable[[InstanceInputs], list[float]]
+_ROUNDS = 50
+"""Most rounds in which direct feedthrough between continuous instances settles."""
+_SETTLED = 1e-12
+"""Relative change of what has settled."""
+_TINY = 1e-18
+"""What counts as zero whatever the unit."""
 
 
-class Late(str):
-    """Source of a wire that is read as it was before the step, one communication step old."""
-
-
-class System:
-    """Instances, wires between them and external signals.
+class Master:
+    """Instances that run together; fills one row per communication point.
 
     Parameters
     ----------
+    plan
+        What is run.
     instances
-        By name.
-    wires
-        Source by target.
-    inputs
-        Signal by input.
-    order
-        Order of stepping; empty if all inputs are read before any instance steps.
+        By name, freshly made.
+    watch
+        Told how far the run is.
     """
 
-    def __init__(
-        self,
-        instances: Mapping[str, FmuInstance],
-        wires: Mapping[str, str],
-        inputs: Mapping[str, Signal],
-        order: tuple[str, ...],
-    ) -> None:
-        self._instances = instances
-        self._order = order
-        self._late = frozenset(target for target, source in wires.items() if isinstance(source, Late))
-        self._wires = {name: _of(name, wires) for name in instances}
-        self._inputs = {
-            name: {variable: _function(signal) for variable, signal in _of(name, inputs).items()}
-            for name in instances
-        }
-        self._shown = {
-            name: [v.name for v in instance.variables.values() if v.causality in ("output", "local")]
-            for name, instance in instances.items()
-        }
-        self._latest: dict[str, float] = {}
-        self._before: dict[str, float] = {}
+    def __init__(self, plan: Plan, instances: Mapping[str, FmuInstance], watch: Watch) -> None:
+        self._plan, self._instances, self._watch = plan, instances, watch
+        self._points: list[float] = plan.points.tolist()
+        self._row = 0
+        self._due = due_by_row(plan)
+        columns = {name: i for i, name in enumerate(plan.columns)}
+        self.now: Array = np.zeros(len(columns))
+        self._read: dict[str, Callable[[], None]] = {}
+        for name, instance in instances.items():
+            shown = instance.description.shown
+            first = columns[f"{name}.{shown[0].name}"] if shown else 0
+            self._read[name] = instance.reader(shown, self.now[first : first + len(shown)])
+        self._connected = self._initialised()
+        self._inputs = self._connected.inputs
+        links = plan.coupling_links
+        sources = dict.fromkeys(link.source for link in links)
+        self.curves: Sequence[Curve] = [self._connected.curves[source] for source in sources]
+        ends = {split_name(end)[0] for link in links for end in (link.target, link.source)}
+        self._continuous = [name for name in instances if not plan.sampled(name)]
+        self._coupled = [name for name in self._continuous if name in ends]
+        self._driven = [name for name in self._continuous if self._inputs[name].feeds]
+        self._states: dict[str, object] = {}
 
-    def delays(self) -> dict[str, int]:
-        """Return the delay of each wire target in steps, see :class:`.cosimulate.CoSimulation`."""
-        late: dict[str, int] = {}
-        for name, wires in self._wires.items():
-            for variable, source in wires.items():
-                of, output = split_name(source)
-                sampled = self._instances[of].variables[output].variability == "discrete"
-                # A sampled source computes its output at the beginning of a step.
-                before = bool(self._order) and self._order.index(of) < self._order.index(name)
-                before = before and f"{name}.{variable}" not in self._late
-                late[f"{name}.{variable}"] = (1 if sampled else 0) - (1 if before else 0)
-        return late
-
-    def run(self, stop: float, step: float) -> Trace:
-        """Run from 0 to the end.
+    def run(self, rows: Array) -> None:
+        """Run from the first communication point to the last.
 
         Parameters
         ----------
-        stop, step
-            End and communication step in s.
-
-        Returns
-        -------
-        Trace
-            Everything shown, at every communication point.
+        rows
+            Shape (points, columns); filled.
         """
-        count = (
-            max(1, round(stop / step))
-            if abs(stop / step - round(stop / step)) < 1e-6
-            else int(stop / step) + 1
-        )
-        times = np.minimum(np.arange(count + 1) * step, stop)
-        self._initialise(stop)
-        rows = [self._row(0.0)]
-        for begin, end in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
-            self._before = dict(self._latest)
-            if not self._order:
-                for name in self._instances:
-                    self._apply(name, begin)
-            for name in self._order or self._instances:
-                if self._order:
-                    self._apply(name, begin)
-                self._instances[name].step(begin, end - begin)
-                if self._order:
-                    self._read(name)
-            for name in () if self._order else self._instances:
-                self._read(name)
-            rows.append(self._row(end))
-        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        return Trace(times, columns, {name: self._unit(name) for name in columns}, "co-simulation")
+        acts_at_once = self._plan.acts_at_once
+        curves, coupling = self._connected.curves.values(), self._plan.coupling
+        for row, time in enumerate(self._points):
+            self._row = row
+            self._watch.at_row(row)
+            for curve in curves:
+                curve.arrive(time, float(self.now[curve.column]))
+            present = partial(InstanceInputs.present, row=row, time=time)
+            self._settle(present)
+            if row in self._due:
+                self._sample(row, time)
+                if acts_at_once:
+                    self._settle(present)
+            for curve in curves:
+                curve.depart(float(self.now[curve.column]))
+            for name in self._driven:
+                self._show(name, self._inputs[name].present(row, time))
+            rows[row] = self.now
+            if row + 1 < len(self._points):
+                coupling.step(self, time, self._points[row + 1] - time)
 
-    def _initialise(self, stop: float) -> None:
-        for instance in self._instances.values():
-            instance.begin(0.0, stop)
+    def _initialised(self) -> ConnectedInputs:
+        """Bring all instances through initialization; return the wires between them."""
+        plan, instances = self._plan, self._instances
+        for target, value in plan.parameters.items():
+            name, variable = split_name(target)
+            instances[name].set({variable: value})
+        for name, instance in instances.items():
+            # A sampled instance computes at the end too, and then for the sample beyond it.
+            instance.begin(0.0, None if plan.sampled(name) else self._points[-1])
+        connected = ConnectedInputs(plan, instances, self.now)
+        for read in self._read.values():
+            read()
         # One round for each instance that a chain of direct feedthrough may have.
-        for _ in range(len(self._instances) + 1):
-            for name in self._instances:
-                self._read(name)
-            for name in self._instances:
-                self._apply(name, 0.0)
-        for name, instance in self._instances.items():
+        for _ in range(len(instances) + 1):
+            for name, inputs in connected.inputs.items():
+                if inputs.apply(inputs.first()):
+                    self._read[name]()
+        for name, instance in instances.items():
             instance.run()
-            self._read(name)
+            self._read[name]()
+        for inputs in connected.inputs.values():
+            inputs.begin()
+        return connected
 
-    def _read(self, name: str) -> None:
-        values = self._instances[name].get(self._shown[name])
-        self._latest |= {f"{name}.{variable}": value for variable, value in values.items()}
+    # --- at a communication point -----------------------------------------------------------------
 
-    def _apply(self, name: str, time: float) -> None:
-        seen = {
-            variable: self._before if f"{name}.{variable}" in self._late and self._before else self._latest
-            for variable in self._wires[name]
-        }
-        values = {variable: seen[variable][source] for variable, source in self._wires[name].items()}
-        values |= {variable: float(signal(time)) for variable, signal in self._inputs[name].items()}
-        self._instances[name].set(values)
+    def _sample(self, row: int, time: float) -> None:
+        """Let the sampled instances that are due read and compute."""
+        due = self._due[row]
+        if not self._plan.order:
+            for name in due:
+                self._take_in(name, row, time)
+        for name in due:
+            if self._plan.order:
+                self._take_in(name, row, time)
+            period = self._plan.descriptions[name].sample_time or 0.0
+            self._instances[name].step(round(time / period) * period, period)
+            self._read[name]()
+        self._connected.note_samples(due)
 
-    def _row(self, time: float) -> dict[str, float]:
-        given = {
-            f"{name}.{variable}": float(signal(time))
-            for name, signals in self._inputs.items()
-            for variable, signal in signals.items()
-        }
-        return self._latest | given
+    def _take_in(self, name: str, row: int, time: float) -> None:
+        values = self._inputs[name].present(row, time)
+        self._inputs[name].apply(values)
+        self._show(name, values)
 
-    def _unit(self, name: str) -> str:
-        instance, variable = split_name(name)
-        return self._instances[instance].unit(variable) or "1"
+    def _show(self, name: str, values: list[float]) -> None:
+        for column, value in zip(self._inputs[name].columns, values, strict=True):
+            self.now[column] = value
 
+    def _settle(self, values: Values) -> None:
+        """Set the inputs of continuous instances until direct feedthrough between them changes no more."""
+        columns = [curve.column for curve in self.curves]
+        for _ in range(_ROUNDS):
+            before = self.now[columns] if columns else self.now
+            changed = [n for n in self._driven if self._inputs[n].apply(values(self._inputs[n]))]
+            for name in changed:
+                self._read[name]()
+            if not columns or not changed:
+                return
+            sizes = np.maximum([curve.size for curve in self.curves], np.abs(before))
+            if np.all(np.abs(self.now[columns] - before) <= _SETTLED * sizes + _TINY):
+                return
+        raise ConvergenceError(
+            f"wires between {', '.join(self._coupled)} at {self._points[self._row]:g} s",
+            "form a loop of direct feedthrough that does not settle",
+            next_step="give one of the wires a delay",
+        )
 
-End = TypeVar("End")
+    # --- from one communication point to the next -------------------------------------------------
 
+    def advance(self) -> None:
+        """Take the present step with the slopes that the curves have."""
+        self._advance(self._continuous)
 
-def _of(instance: str, ends: Mapping[str, End]) -> dict[str, End]:
-    """Return the entries of one instance by variable."""
-    return {split_name(name)[1]: end for name, end in ends.items() if split_name(name)[0] == instance}
+    def again(self) -> None:
+        """Take the present step of coupled instances once more, from its beginning."""
+        for name in self._coupled:
+            self._instances[name].restore_state(self._states[name])
+            self._inputs[name].forget()
+        self._advance(self._coupled)
 
+    def rolling_back(self, work: Callable[[], None]) -> None:
+        """Do work within which a step may be taken again.
 
-def _function(signal: Signal) -> Callable[[float], float]:
-    if callable(signal):
-        return signal
-    times, values = (np.asarray(each, dtype=float) for each in signal)
-    return lambda time: float(np.interp(time, times, values))
+        Parameters
+        ----------
+        work
+            Calls :meth:`advance` once, then :meth:`again`.
+        """
+        for name in self._coupled:
+            self._states[name] = self._instances[name].keep_state()
+        work()
+        for name in self._coupled:
+            self._instances[name].forget_state(self._states.pop(name))
+
+    def _advance(self, names: Sequence[str]) -> None:
+        row = self._row
+        time = self._points[row]
+        length = self._points[row + 1] - time
+        for name in names:
+            inputs = self._inputs[name]
+            if inputs.moves:
+                inputs.apply(inputs.over(row, time, length))
+        for name in names:
+            self._instances[name].step(time, length)
+        for name in names:
+            self._read[name]()
+        if self.curves:
+            self._settle(partial(InstanceInputs.before, row=row + 1, time=time + length))

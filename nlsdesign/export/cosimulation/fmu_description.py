@@ -1,0 +1,181 @@
+"""What an FMU says about itself, as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from ...errors import ExportError
+from .foreign_text import fit_to_show
+
+DESCRIPTION_FILE = "modelDescription.xml"
+_KINDS = {"Real": "real", "Float64": "real", "Integer": "integer", "Int32": "integer"}
+
+
+@dataclass(frozen=True)
+class FmuScalar:
+    """A scalar variable of an FMU.
+
+    Parameters
+    ----------
+    name
+        As the FMU states it.
+    reference
+        Value reference.
+    causality, variability
+        As in FMI.
+    kind
+        ``"real"`` or ``"integer"``.
+    unit
+        ``None`` if the FMU gives none.
+    start
+        ``None`` if the FMU gives none.
+    """
+
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    kind: str
+    unit: str | None
+    start: float | None
+
+
+@dataclass(frozen=True)
+class FmuDescription:
+    """A co-simulation FMU that was unpacked.
+
+    Parameters
+    ----------
+    instance
+        Name of the instance.
+    folder
+        Where its files are.
+    version
+        ``"2.0"`` or ``"3.0"``.
+    identifier, token
+        Name of the library, and what it is instantiated with.
+    rolls_back
+        Whether its state can be kept and restored.
+    variables
+        Real and integer scalars by name.
+    """
+
+    instance: str
+    folder: Path
+    version: str
+    identifier: str
+    token: str
+    rolls_back: bool
+    variables: Mapping[str, FmuScalar]
+
+    @property
+    def sample_time(self) -> float | None:
+        """Sample time in s that the FMU states, ``None`` for a continuous one."""
+        period = self.variables.get("sample.time")
+        return period.start if period is not None and period.variability == "constant" else None
+
+    @property
+    def shown(self) -> tuple[FmuScalar, ...]:
+        """Outputs and inner signals, reals first."""
+        chosen = [v for v in self.variables.values() if v.causality in ("output", "local")]
+        return tuple(sorted(chosen, key=lambda v: v.kind != "real"))
+
+    @property
+    def library(self) -> Path:
+        """The binary for this machine."""
+        where = fmpy.platform if self.version == "2.0" else fmpy.platform_tuple
+        return self.folder / "binaries" / str(where) / f"{self.identifier}{fmpy.sharedLibraryExtension}"
+
+
+def read_description(instance: str, archive: Path, folder: Path) -> FmuDescription:
+    """Read the description of an FMU that was unpacked.
+
+    Parameters
+    ----------
+    instance
+        Name of the instance, for messages.
+    archive
+        The FMU, for messages.
+    folder
+        Where it was unpacked.
+
+    Raises
+    ------
+    ExportError
+        If it is no valid co-simulation FMU of FMI 2.0 or 3.0, or states no possible sample time.
+    """
+    what = f"instance '{instance}' ({archive})"
+    try:
+        read = fmpy.read_model_description(str(folder))
+        variables = {v.name: _variable(v) for v in read.modelVariables if _usable(v)}
+    except Exception as error:
+        # Whatever a damaged description makes the XML and FMI libraries raise.
+        raise ExportError(what, f"is not a valid FMU: {_brief(error)}") from error
+    offered = read.coSimulation
+    if offered is None or read.fmiVersion == "1.0":
+        raise ExportError(what, "is not a co-simulation FMU of FMI 2.0 or 3.0")
+    if not str(offered.modelIdentifier).isidentifier():
+        raise ExportError(
+            what, f"is not a valid FMU: '{fit_to_show(offered.modelIdentifier)}' is no model identifier"
+        )
+    version = "2.0" if read.fmiVersion == "2.0" else "3.0"
+    rolls_back = bool(offered.canGetAndSetFMUstate)
+    description = FmuDescription(
+        instance, folder, version, offered.modelIdentifier, read.guid, rolls_back, variables
+    )
+    _check_sample_time(what, description)
+    return description
+
+
+def check_library(description: FmuDescription) -> None:
+    """Check that there is a binary for this machine.
+
+    Parameters
+    ----------
+    description
+        Of the FMU.
+
+    Raises
+    ------
+    ExportError
+        If there is none.
+    """
+    if not description.library.is_file():
+        place = description.library.parent.relative_to(description.folder).as_posix()
+        raise ExportError(
+            f"instance '{description.instance}'",
+            f"the FMU has no binary for this machine ({place})",
+            next_step="export it with platforms=None on this machine, or name the platform",
+        )
+
+
+def _check_sample_time(what: str, description: FmuDescription) -> None:
+    stated = description.variables.get("sample.time")
+    if stated is None or stated.variability != "constant":
+        return
+    if stated.start is None or not (math.isfinite(stated.start) and stated.start > 0.0):
+        raise ExportError(what, f"states a sample time of {stated.start} s, which is not possible")
+
+
+def _usable(variable: Any) -> bool:
+    return variable.type in _KINDS and not getattr(variable, "dimensions", None)
+
+
+def _variable(read: Any) -> FmuScalar:
+    unit = read.unit or (read.declaredType.unit if read.declaredType else None)
+    start = None if read.start is None else float(read.start)
+    return FmuScalar(
+        read.name, int(read.valueReference), read.causality, read.variability, _KINDS[read.type], unit, start
+    )
+
+
+def _brief(error: BaseException) -> str:
+    # What Python raises where something is missing names only that.
+    named = isinstance(error, LookupError) or not str(error).strip()
+    return fit_to_show(f"{type(error).__name__} {error}" if named else error)
