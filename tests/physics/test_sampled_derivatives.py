@@ -56,8 +56,17 @@ def computed(model: FlatModel, at: dict[str, float], names: list[str]) -> np.nda
     return np.array([by_name[name] for name in names])
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-@pytest.mark.parametrize("name", MODELS)
+QUICK = {("both", "3.0"), ("table by hand", "2.0")}
+
+
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [
+        pytest.param(name, version, marks=() if (name, version) in QUICK else pytest.mark.slow)
+        for name in MODELS
+        for version in ("2.0", "3.0")
+    ],
+)
 def test_derivatives_of_the_last_sample_are_those_of_the_equations(name, version, tmp_path):
     model = MODELS[name]
     knowns = [v.name for v in (*model.states, *model.inputs, *model.parameters)]
