@@ -275,3 +275,14 @@ def test_units_that_differ_by_the_radian_only_are_joined(tmp_path, loop):
     other = export_fmu(replace(base, inputs=inputs), tmp_path / "controller.fmu")
     run = plain(loop | {"controller": other})
     np.testing.assert_array_equal(run["plant.motor.angle"], plain(loop)["plant.motor.angle"])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is only the other way")
+def test_without_fork_the_fmus_run_in_this_process_with_the_same_result(loop, monkeypatch):
+    isolated = plain(loop)
+    monkeypatch.delattr(os, "fork")
+    here = plain(loop)
+    for name in isolated.trace.signals:
+        np.testing.assert_array_equal(here[name], isolated[name])
+    with pytest.raises(ExportError, match="current = nan"):
+        plain(loop, wires={}, inputs={"plant.motor.current": lambda t: math.nan})
