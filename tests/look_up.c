@@ -1,5 +1,5 @@
 /* Calls the look-up of a table with all floats whose bits are a multiple of a stride, NaN and infinities too, and
-   compares the cell that it finds with the one that counting gives. Prints the first argument that differs. */
+   holds the cell that it finds against its ends. Prints the first argument that is not in it. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -19,12 +19,8 @@ static int32_t found(float u, float *share)
 static int right(float u, int32_t cell)
 {
 #ifdef POINTS
-    int32_t counted = 0;
-
-    while (counted < CELLS - 1 && u >= POINTS[counted + 1]) {
-        ++counted;
-    }
-    return cell == counted;
+    return cell >= 0 && cell < CELLS && (cell == 0 || u >= POINTS[cell]) &&
+           (cell == CELLS - 1 || !(u >= POINTS[cell + 1]));
 #else
     (void)u;
     return cell >= 0 && cell < CELLS;
