@@ -18,6 +18,7 @@ from .units import Bytes, Number
 if TYPE_CHECKING:
     from ..model import FlatModel
     from ..observer import GridByTorqueError
+    from ..observer.scheduling.torque_grid import TableTooLargeError
 
 ATTEMPTS = 3
 """Designs until code and table together keep a size; a coarser table changes the code a little."""
@@ -136,13 +137,7 @@ def sized_observer(
         try:
             again = designed_observer(plant, sample_time=sample_time, grid=grid, **chosen)
         except TableTooLargeError as error:
-            raise ValueRangeError(
-                f"flash of {flash} B",
-                f"cannot be met beside {current.code} B of code: {error.words}; the smallest that keeps this "
-                f"has {(current.code or 0) + error.least} B",
-                next_step=f"allow {(current.code or 0) + error.least} B, a larger --table-error, or take "
-                "another --kind or --real float",
-            ) from None
+            raise _refused(flash, current.code or 0, error) from None
         # The kind is decided: a coarser table does not change which one errs least over the spread.
         again = replace(again, reason=designed.reason, expected=designed.expected)
         current = _sized(again, part_of(again.model), real, needed=True)
@@ -152,6 +147,15 @@ def sized_observer(
         f"flash of {flash} B", f"was not met within {ATTEMPTS} attempts",
         next_step=f"allow {(current.code or 0) + current.tables} B",
     )  # fmt: skip
+
+
+def _refused(flash: int, code: int, error: TableTooLargeError) -> ValueRangeError:
+    least = code + error.least
+    return ValueRangeError(
+        f"flash of {flash} B",
+        f"cannot be met beside {code} B of code: {error.words}; the smallest that keeps this has {least} B",
+        next_step=f"allow {least} B, a larger --table-error, or take another --kind or --real float",
+    )
 
 
 def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) -> GridByTorqueError:

@@ -52,7 +52,13 @@ class Bytes(_Count):
     name = "size"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Return the number of bytes."""
+        """Return the number of bytes.
+
+        Raises
+        ------
+        UnitError
+            If it is no size of memory.
+        """
         if isinstance(value, int):
             return value
         number, unit = split_number(str(value))

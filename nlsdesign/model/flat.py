@@ -310,8 +310,10 @@ class FlatModel:
         def changed(group: tuple[Variable, ...]) -> tuple[Variable, ...]:
             return tuple(_with_start(v, values[v.name]) if v.name in values else v for v in group)
 
+        numbers = {v.name: values[v.name] for v in self.parameters if v.name in values}
         return replace(
             self,
+            origin=self.origin and self.origin.with_values(numbers),
             parameters=changed(self.parameters),
             states=changed(self.states),
             inputs=changed(self.inputs),

@@ -190,6 +190,7 @@ def run_batch(
     runs = _number_of_runs([*(c.shape[0] for c in courses), values.shape[0], begin.shape[0]])
     state = np.broadcast_to(begin, (runs, begin.shape[1])).T.copy()
     values = np.broadcast_to(values, (runs, values.shape[1])).T.copy()
+    state = _begun(system, courses, state, values, set(start or {}))
     chunk = translate(_chunk(system, tuple(keep)))
     many = chunk.map(runs) if runs > 1 else chunk
     ramped = sum(name.startswith(f"{PLANT}.") for name in system.open_inputs)
@@ -210,6 +211,30 @@ def run_batch(
     finite = np.all(np.isfinite(state), axis=0)
     signals = {name: np.ascontiguousarray(kept[:, i]) for i, name in enumerate(keep)}
     return BatchTrace(time[:-1], signals, state.T.copy(), finite)
+
+
+def _begun(
+    system: SampledSystem, courses: Sequence[Array], state: Array, values: Array, given: set[str]
+) -> Array:
+    """Return the states, those of blocks from their first readings where none was given, (states, runs)."""
+    begins = tuple(
+        name
+        for name, block in system.blocks.items()
+        if block.begin is not None and not any(f"{name}.{v.name}" in given for v in block.states)
+    )
+    if not begins:
+        return state
+    runs = state.shape[1]
+    ramped = sum(name.startswith(f"{PLANT}.") for name in system.open_inputs)
+    rows = [np.zeros(runs), *(np.broadcast_to(course[:, 0], runs) for course in courses)]
+    rows += [np.zeros(runs)] * ramped
+    result: Array = _begin(system, begins).map(runs)(state, np.array(rows), values).full()
+    return result
+
+
+@lru_cache(maxsize=16)
+def _begin(system: SampledSystem, begins: tuple[str, ...]) -> ca.Function:
+    return _SampleWriter(system).begun(begins)
 
 
 def _defaults(system: SampledSystem, group: str) -> list[float]:
@@ -319,6 +344,23 @@ class _SampleWriter:
             [ca.densify(ca.vertcat(*after)), ca.densify(ca.vertcat(*kept))],
         )
 
+    def begun(self, begins: Sequence[str]) -> ca.Function:
+        """Return the states at the first sample: (state, time and inputs, parameters) -> (state)."""
+        system = self.system
+        first_waiting = sum(len(model.states) for model in system.owners.values())
+        waiting = self.state[first_waiting:]
+        self._read_plant(waiting[0] if waiting.numel() else None, self._wanted(()))
+        states = [self.own_states[PLANT]]
+        for owner, model in system.blocks.items():
+            state = self.own_states[owner]
+            if owner in begins and model.begin is not None:
+                seen = self._seen(owner, state)
+                state = model.begin(state, seen[0], self.own_parameters[owner], seen[1])[0]
+            self._evaluate(owner, state)
+            states.append(state)
+        after = ca.densify(ca.vertcat(*states, waiting))
+        return ca.Function("begun", [self.state, self.given, self.parameter], [after])
+
     def _parts(self, column: ca.MX, group: str) -> dict[str, ca.MX]:
         parts, first = {}, 0
         for owner, model in self.system.owners.items():
@@ -369,24 +411,29 @@ class _SampleWriter:
 
     def _blocks(self) -> list[ca.MX]:
         """Evaluate the blocks in their order; return their following states."""
-        following = []
-        for owner, model in self.system.blocks.items():
-            inputs = []
-            for v in model.inputs:
-                source = self.system.sources[f"{owner}.{v.name}"]
-                if source not in self.known:
-                    raise unknown_name(f"source of '{owner}.{v.name}'", source, self.known)
-                inputs.append(self.known[source])
-            state, u = self.own_states[owner], ca.vertcat(*inputs)
-            columns = [_looked_up(table, model, state, u) for table in model.tables]
-            step = ca.Function("step", *_step_of(model))
-            after, output = step(
-                state, u, self.own_parameters[owner], ca.vertcat(*columns) if columns else ca.MX(0, 1)
-            )
-            self.known |= {f"{owner}.{v.name}": u[i] for i, v in enumerate(model.inputs)}
-            self.known |= {f"{owner}.{v.name}": output[i] for i, v in enumerate(model.outputs)}
-            following.append(after)
-        return following
+        return [self._evaluate(owner, self.own_states[owner]) for owner in self.system.blocks]
+
+    def _seen(self, owner: str, state: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Return the inputs of a block and what it looks up."""
+        model, inputs = self.system.blocks[owner], []
+        for v in model.inputs:
+            source = self.system.sources[f"{owner}.{v.name}"]
+            if source not in self.known:
+                raise unknown_name(f"source of '{owner}.{v.name}'", source, self.known)
+            inputs.append(self.known[source])
+        u = ca.vertcat(*inputs)
+        columns = [_looked_up(table, model, state, u) for table in model.tables]
+        return u, ca.vertcat(*columns) if columns else ca.MX(0, 1)
+
+    def _evaluate(self, owner: str, state: ca.MX) -> ca.MX:
+        """Evaluate a block; return its following state."""
+        model = self.system.blocks[owner]
+        u, columns = self._seen(owner, state)
+        step = ca.Function("step", *_step_of(model))
+        after, output = step(state, u, self.own_parameters[owner], columns)
+        self.known |= {f"{owner}.{v.name}": u[i] for i, v in enumerate(model.inputs)}
+        self.known |= {f"{owner}.{v.name}": output[i] for i, v in enumerate(model.outputs)}
+        return after
 
     def _advance(self, acting: ca.MX | None) -> ca.MX:
         """Return the plant's state after one sample of classical Runge–Kutta steps."""

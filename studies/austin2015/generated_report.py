@@ -59,7 +59,7 @@ def _figure(generated: GeneratedCode) -> FigureSection:
         "Error of the estimated torque under code from three decks",
         nls.figures.over_time(first.time[shown], lines, quantity="estimated less true torque", unit="N*m"),
         caption=f"Cycle {CYCLES} of the sine, observed by the cascade.",
-        means="What the code does not know of its machine, here the second relaxation of the rubber or the "
-        "whole spring, it puts into the torque.",
+        means="What the code does not know of its machine, here the second relaxation and refitted numbers, "
+        "or the whole spring, it puts into the torque.",
         assumed="The diagnosed actuator stands for the machine; its records are simulated.",
     )

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.export import CSource
+from nlsdesign.control import joined
+from nlsdesign.export import CSource, Wire
 
 from .._published import Array
 
 READING = "plant.motor_encoder.reading"
 FROM_ENCODER = {"observer.motor.angle": READING, "controller.motor.angle": READING}
-WIRES = {
+WIRES: dict[str, str | Wire] = {
     **FROM_ENCODER,
     "observer.motor.current": "controller.motor.current",
     "controller.spring.torque": "observer.spring.torque",
@@ -28,8 +29,8 @@ class TorqueLoop:
 
     Parameters
     ----------
-    source, controller
-        C files of observer and controller.
+    source, controller, both
+        C files of observer, controller, and both as one step.
     fmus
         Of plant, observer and controller, and of the plant in FMI 2.
     cosimulated
@@ -40,6 +41,7 @@ class TorqueLoop:
 
     source: CSource
     controller: CSource
+    both: CSource
     fmus: tuple[Path, ...]
     cosimulated: nls.Trace
     whole: nls.Trace
@@ -59,10 +61,11 @@ def export_and_cosimulate(
     parts = {"plant": model, "observer": observer, "controller": controller}
     source = nls.export_c(observer, out / "c", name="observer")
     law = nls.export_c(controller, out / "c", name="controller")
+    both = nls.export_c(joined(observer, controller), out / "c", name="torque_loop")
     fmus = {name: nls.export_fmu(each, out / "fmu" / f"{name}.fmu") for name, each in parts.items()}
     second = nls.export_fmu(model, out / "fmu" / "plant_fmi2.fmu", version="2.0")
     desired = nls.sine("controller.spring.torque.desired", 0.8, 1.0)
     order = ("observer", "controller", "plant")
     run = nls.cosimulate(fmus=fmus, wires=WIRES, order=order, stop=stop, inputs=desired)
     loop = nls.ClosedLoop(plant=model, observer=observer, controller=controller, wires=FROM_ENCODER)
-    return TorqueLoop(source, law, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))
+    return TorqueLoop(source, law, both, (*fmus.values(), second), run.trace, loop.run(stop, inputs=desired))

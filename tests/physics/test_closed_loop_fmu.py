@@ -57,9 +57,9 @@ def test_co_simulated_loop_is_that_of_one_piece_at_every_step(
     desired = nls.sine("controller.spring.torque.desired", 0.6, 1.0, offset=0.2)
     encoder = {target: source for target, source in WIRES.items() if "encoder" in str(source)}
     loop = nls.ClosedLoop(**models, controller=controller, wires=encoder, substeps=substeps)
-    whole = loop.run(0.4, inputs=desired)
+    whole = loop.run(0.3, inputs=desired)
     for step in STEPS:
-        run = nls.cosimulate(fmus=given, wires=WIRES, inputs=desired, stop=0.4, order=ORDER, step=step)
+        run = nls.cosimulate(fmus=given, wires=WIRES, inputs=desired, stop=0.3, order=ORDER, step=step)
         assert run.step == step
         assert run.delays["plant.motor.current"] == loop.sample_time
         assert run.delays["controller.spring.torque"] == 0.0

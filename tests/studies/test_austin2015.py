@@ -10,25 +10,25 @@ import pytest
 
 from nlsdesign.cli.studies import claims, run_study
 from nlsdesign.components import Assembly
-from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.components.assembly.deck_writer import deck_digest, declare
 from nlsdesign.deck import load_deck
 from nlsdesign.model import flatten
 from nlsdesign.observer import read_certificate, verify
+from tests.command_line import Run, run
 
-EXPORTED = (
-    "c/observer.c",
-    "c/observer.h",
-    "fmu/plant.fmu",
-    "fmu/observer.fmu",
-    "fmu/controller.fmu",
-    "fmu/plant_fmi2.fmu",
-    "certified/observer.c",
-    "certified/certificate.json",
+__all__ = ["run"]
+
+GENERATED = (
+    *(f"c/{part}{end}" for part in ("observer", "controller") for end in (".c", ".h", "_selftest.c")),
+    *(f"fmu/{part}.fmu" for part in ("plant", "observer", "controller", "plant_fmi2")),
 )
+EXPORTED = (*GENERATED, "certified/observer.c", "certified/certificate.json")
+DECKS = {"published": "actuator.toml", "designed": "designed.toml", "diagnosed": "diagnosis/model.toml"}
 FILES = (
     "report.html", "actuator.toml", "designed.toml", "drawing/cam.dxf", "drawing/cam.svg", "drawing/cam.csv",
     "drawing/sheet.svg", "drawing/sheet.pdf", "diagnosis/verdict.json", "diagnosis/model.toml",
     *(f"{name}/{file}" for name in ("published", "designed") for file in EXPORTED),
+    *(f"diagnosed/{file}" for file in GENERATED),
 )  # fmt: skip
 
 
@@ -74,6 +74,33 @@ def test_the_study_keeps_its_claims(study: tuple[Path, dict[str, float]]) -> Non
     error = verdict["error"]["held_out"]
     assert error["after"] <= 1.3 * verdict["error"]["noise_floor"]
     assert error["before"] > 5.0 * error["after"]
+
+
+def test_code_belongs_to_the_deck_that_it_is_from(run: Run, study: tuple[Path, dict[str, float]]) -> None:
+    out, _ = study
+    digests = {name: deck_digest(declare(load_deck(out / deck))) for name, deck in DECKS.items()}
+    assert len(set(digests.values())) == 3
+    for name in DECKS:
+        header = (out / name / "c" / "observer.h").read_text("utf-8")
+        assert f'OBSERVER_DECK_DIGEST "{digests[name]}"' in header
+        for other, deck in DECKS.items():
+            status, text, _ = run("export", "check", str(out / name), "--deck", str(out / deck))
+            assert status == (0 if other == name else 1), text
+    diagnosed = declare(load_deck(out / DECKS["diagnosed"]))
+    assert diagnosed.parent is not None
+    assert diagnosed.parent.line()[-1].digest == digests["published"]
+
+
+def test_the_machine_runs_best_under_code_from_its_own_deck(study: tuple[Path, dict[str, float]]) -> None:
+    """The better deck is worth something if its code is generated: by the torque that the machine makes."""
+    _, results = study
+    for kind in ("cascade", "best"):
+        for what in ("torque", "estimate"):
+            own, old, other = (
+                results[f"code_from_{deck}_deck_{kind}_{what}_error_mNm_rms"]
+                for deck in ("diagnosed", "published", "designed")
+            )
+            assert own < 0.85 * old < 0.85 * other
 
 
 def test_the_designed_spring_tracks_better_everywhere(study: tuple[Path, dict[str, float]]) -> None:

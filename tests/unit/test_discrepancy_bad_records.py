@@ -12,7 +12,8 @@ import pytest
 
 from nlsdesign.cli import main
 from nlsdesign.components import Assembly
-from nlsdesign.components.assembly.deck_writer import write_deck
+from nlsdesign.components.assembly.deck_writer import deck_digest, declare, write_deck
+from nlsdesign.deck import load_deck
 from nlsdesign.discrepancy import ALL, diagnose, write_verdict
 from nlsdesign.discrepancy.reporting.advice import more_excitation
 from nlsdesign.errors import MeasurementError
@@ -111,6 +112,25 @@ def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
     assert not (out / "next_record.csv").exists()
     assert not (out / "regeneration.json").exists()
     assert (out / "notes.txt").exists(), "what is not ours stays"
+
+
+def test_code_of_the_better_deck_is_written_with_the_verdict(
+    rig: Assembly, clean: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    records, out = tmp_path / "records", tmp_path / "out"
+    write_records(records, {"a": constant(clean.copy()), "b": clean})
+    write_deck(rig, tmp_path / "deck.toml")
+    called = ["nlsdesign", "diagnose", "--deck", str(tmp_path / "deck.toml"), "--records", str(records)]
+    monkeypatch.setattr(sys, "argv", [*called, "--export", "--out", str(out)])
+    main()
+    better = declare(load_deck(out / "model.toml"))
+    assert better.name == f"{rig.name}_diagnosed_{deck_digest(better)[:8]}"
+    assert better.parent is not None
+    assert better.parent.digest == deck_digest(rig)
+    for name in ("observer", "controller", "torque_loop"):
+        assert f'_DECK_DIGEST "{deck_digest(better)}"' in (out / "c" / f"{name}.h").read_text("utf-8")
+        assert (out / f"{name}.fmu").exists()
+    assert (out / "plant.fmu").exists()
 
 
 def in_millinewton(rows: np.ndarray) -> np.ndarray:

@@ -198,6 +198,18 @@ def test_sizes_are_those_of_the_machine(actuator):
     assert sizes["der(motor.angle)"] == pytest.approx(sizes["motor.speed"], rel=0.05)
 
 
+def test_without_a_cam_the_largest_drive_gives_the_motion_and_nothing_is_made_up():
+    stiff = plant_of("austin2015_stiff_spring")
+    sizes = {each.variable.name: each.variable.nominal for each in layout(stiff).reals}
+    values = stiff.values
+    drive = values["motor.current_limit"] * values["motor.torque_constant"] * values["motor.gear_ratio"]
+    at = stiff.evaluate([sizes["motor.angle"], 0.0])
+    assert at["spring.torque"] == pytest.approx(drive, rel=0.05)
+    # No drive and no cam: neither motion nor speed is known.
+    arm = {each.variable.name: each.variable.nominal for each in layout(plant_of("dfki_pendulum")).reals}
+    assert (arm["arm.angle"], arm["arm.speed"]) == (1.0, 1.0)
+
+
 def test_sizes_see_through_gears_and_leave_stated_ones():
     one_sided = plant_of("one_sided_cable_drive")
     sizes = {each.variable.name: each.variable.nominal for each in layout(one_sided).reals}

@@ -50,7 +50,7 @@ def test_no_call_is_beyond_bounds_undefined_or_silently_not_finite(name, tmp_pat
     purposes = {"struck": PURPOSES, "plant": {"co-simulation": 0, "model exchange": 1}}
     for word, number in purposes.get(name, {"co-simulation": 0}).items():
         done = subprocess.run(
-            [tmp_path / "driver", str(number), "6000", "7"],
+            [tmp_path / "driver", str(number), "2500", "7"],
             capture_output=True, text=True, check=False, timeout=120,
         )  # fmt: skip
         assert (word, done.returncode, done.stderr) == (word, 0, "")

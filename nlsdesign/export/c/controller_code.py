@@ -16,9 +16,17 @@ from ...locations import version
 from ...model.flat import FlatModel, Variable
 from ..files import filled, write_all
 from .c_text import Real, comment, identifier, real_type, signature
-from .controller_step import measured_inputs, reading_constants, settled_body, step_body, take_body
+from .controller_step import (
+    measured_inputs,
+    numbers_of_parameters,
+    reading_constants,
+    settled_body,
+    step_body,
+    take_body,
+)
 from .elementary import elementary_functions, portable
 from .guarded_step import first_outputs
+from .parameter_numbers import parameter_statements
 from .provenance import interface_version, number_lines, origin_lines, origin_macros, stamped
 from .reading_guard import AGREEING, GAP, MOST
 from .self_test import selftest_source
@@ -160,6 +168,10 @@ def header_text(model: FlatModel, name: str, real: Real) -> str:
         else [],
         "readings": [f"{name}_reading readings[{count}]; /* in the order of the inputs */"] if count else [],
     }
+    derived = numbers_of_parameters(model).symbols.numel()
+    readings["derived"] = (
+        [f"{real.name} derived[{derived}]; /* follows from the parameters */"] if derived else []
+    )
     texts = values | _heads(name) | structures | readings
     texts |= {"provenance": origin_macros(model, name), "numbers": number_lines(model)}
     text = filled("controller.h", texts | {"interface": "0u"})
@@ -202,6 +214,7 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     real = portable(real)
     body, used = step_body(model, name, real)
     settled = _settled(model, name, real)
+    derived = parameter_statements(model, numbers_of_parameters(model), real)
     tables = [table_data(each, real) for each in indexed_tables(model) if each.columns(used)]
     outputs = [_at(v, start) for v, start in zip(model.outputs, first_outputs(model, real), strict=True)]
     inputs = [_at(v, min(max(v.start, v.minimum), v.maximum)) for v in model.inputs]
@@ -209,7 +222,7 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
     values = {
         "title": _title(model),
         "tables": [
-            *elementary_functions(real, [*body, *settled]),
+            *elementary_functions(real, [*body, *settled, *derived]),
             *(line for table in tables for line in (*table, "")),
         ],
         "start_parameters": initialiser(model.parameters, real),
@@ -217,6 +230,8 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
         "start_inputs": initialiser(inputs, real),
         "start_outputs": initialiser(outputs, real),
         "guards": _guards(model, real, names),
+        "derive": _derive(derived, name),
+        "derived": [f"{name}_derive(state);"] if derived else [],
         "assignments": _assignments(model, real),
         "start_readings": _start_readings(model, name, real),
         "settled": settled,
@@ -224,6 +239,13 @@ def source_text(model: FlatModel, name: str, real: Real) -> str:
         "body": body,
     }
     return filled("controller.c", {**names, **_heads(name), **values})
+
+
+def _derive(statements: list[str], name: str) -> list[str]:
+    """Return the function that computes what follows from the parameters, where anything does."""
+    if not statements:
+        return []
+    return [*filled("controller_derive.c", {"name": name, "statements": statements}).splitlines(), ""]
 
 
 def _guards(model: FlatModel, real: Real, names: dict[str, str]) -> list[str]:

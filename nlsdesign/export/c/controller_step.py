@@ -9,6 +9,7 @@ import casadi as ca
 from ...model.flat import FlatModel, Symbols, Variable
 from .c_text import Real
 from .instructions import named_indices, print_statements
+from .parameter_numbers import LETTER, ParameterNumbers, without_parameter_numbers
 from .reading_guard import mover, reading_numbers
 from .status_bits import index_bit
 from .structures import member_paths
@@ -43,20 +44,25 @@ def step_body(model: FlatModel, name: str, real: Real) -> tuple[list[str], set[i
         Number type.
     """
     s = model.symbols()
-    gap, used = _used_inputs(model, s)
-    results = ca.substitute([ca.densify(s.derivative), ca.densify(s.output)], [s.input], [used])
-    function = ca.Function("step", [s.state, s.input, s.parameter, s.table, gap], results, {"cse": True})
+    gap, numbers = _numbers(model, s)
+    function = ca.Function(
+        "step", [s.state, s.input, s.parameter, s.table, gap, numbers.symbols], numbers.results, {"cse": True}
+    )
     targets = [
         [f"const {real.name} {y}{i}" for i in range(function.numel_out(k))] for k, y in enumerate("fy")
     ]
     gaps = [f"{_GAP}{i}" for i in range(gap.numel())]
-    equations = print_statements(function, [*_names(model), gaps], targets, real=real)
+    equations = print_statements(function, [*_names(model), gaps, numbers.names], targets, real=real)
     looked_up = named_indices(equations, "w")
     tables = look_up(model, real, _arguments(model), looked_up)
     beyond = _beyond_tables(model, name, real)
     body = [
         *_loads(model, real, [*beyond, *tables, *equations]),
         *_gaps(model, real, equations),
+        *[
+            f"const {real.name} {LETTER}{i} = state->derived[{i}];"
+            for i in sorted(named_indices(equations, LETTER))
+        ],
         *beyond,
         *tables,
         *equations,
@@ -64,6 +70,23 @@ def step_body(model: FlatModel, name: str, real: Real) -> tuple[list[str], set[i
         *_stores(model, name, real),
     ]
     return body, looked_up
+
+
+def numbers_of_parameters(model: FlatModel) -> ParameterNumbers:
+    """Return the numbers that the step reads and that follow from the parameters alone.
+
+    Parameters
+    ----------
+    model
+        Discrete model.
+    """
+    return _numbers(model, model.symbols())[1]
+
+
+def _numbers(model: FlatModel, s: Symbols) -> tuple[ca.SX, ParameterNumbers]:
+    gap, used = _used_inputs(model, s)
+    results = ca.substitute([ca.densify(s.derivative), ca.densify(s.output)], [s.input], [used])
+    return gap, without_parameter_numbers(results, s.parameter)
 
 
 def settled_body(model: FlatModel, real: Real, which: int) -> list[str]:

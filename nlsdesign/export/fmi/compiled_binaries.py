@@ -59,9 +59,9 @@ def compiled_binaries(
 
     def binary(platform: Platform) -> bytes:
         kept = cache_folder() / "fmu" / _key(sources, main, name, platform)
-        found = _read(kept)
-        if found is not None:
-            return found
+        earlier = _read(kept)
+        if earlier is not None:
+            return earlier
         place = folder / platform.name
         place.mkdir(parents=True)
         for file, content in sources.items():

@@ -5,8 +5,9 @@ The rule, first what holds:
 1. a size that the model states (other than the 1 that stands for none);
 2. the largest magnitude of a finite range;
 3. of the motion of a body: where it brings the cam of a spring to the end of its contour; of the current of
-   a motor: its limit; of another force or torque on a body: the largest of a spring;
-4. of the speed of a body: what its largest acceleration gives over the size of its motion, √(a·q);
+   a motor: its limit; of a motion without cam: where spring or weight balance the largest drive; of another
+   force or torque on a body: the largest of a spring;
+4. of the speed of a body with such a motion: what its largest acceleration gives over it, √(a·q);
 5. of an inner state of a spring: its largest signal of the same unit there;
 6. of what is computed: its largest magnitude at 64 points within the sizes of states and inputs; of a sampled
    model in 400 samples of slow motion;
@@ -89,16 +90,19 @@ def _of_machine(model: FlatModel, sizes: Sizes) -> None:
         motor = body.motor
         if motor and units.get(motor.command or "") == "A" and values.get(motor.current_limit):
             sizes.setdefault(str(motor.command), values[motor.current_limit])
+    _of_balances(model, sizes)
     motions = [body.motion for body in model.bodies]
     rest = _largest(model, _points(model, sizes, only=[*motions, *units]))
     efforts = [rest.get(spring.effort, 0.0) for spring in model.springs]
     for body in model.bodies:
         for drive in body.drives:
-            if units[drive] == body.domain.effort_unit and max(efforts, default=0.0) > 0.0:
+            placed = body.motion in sizes and units[drive] == body.domain.effort_unit
+            if placed and max(efforts, default=0.0) > 0.0:
                 sizes.setdefault(drive, _rounded(max(efforts)))
     rest = _largest(model, _points(model, sizes, only=[*motions, *units]))
     for body in model.bodies:
-        speed = math.sqrt(rest.get(f"der({body.rate})", 0.0) * sizes.get(body.motion, 1.0))
+        # An importer takes absolute tolerances from sizes: nothing is made up of a motion that is not known.
+        speed = math.sqrt(rest.get(f"der({body.rate})", 0.0) * sizes.get(body.motion, 0.0))
         if speed > 0.0:
             sizes.setdefault(body.rate, _rounded(speed))
     state_units = {v.name: v.unit for v in model.states}
@@ -109,6 +113,18 @@ def _of_machine(model: FlatModel, sizes: Sizes) -> None:
             size = max((rest.get(name, 0.0) for name in alike), default=0.0)
             if size > 0.0:
                 sizes.setdefault(state, _rounded(size))
+
+
+def _of_balances(model: FlatModel, sizes: Sizes) -> None:
+    """Add the motions at which springs or weights balance the largest drive."""
+    for body in model.bodies:
+        drives = [drive for drive in body.drives if drive in sizes]
+        if body.motion in sizes or not drives:
+            continue
+        driven = _largest(model, _points(model, sizes, only=drives)).get(f"der({body.rate})", 0.0)
+        held = _largest(model, _points(model, {body.motion: 1.0}, only=[body.motion]))
+        if driven > 0.0 and held.get(f"der({body.rate})", 0.0) > 0.0:
+            sizes[body.motion] = _rounded(driven / held[f"der({body.rate})"])
 
 
 def _inside(spring: SpringNames) -> list[str]:

@@ -32,11 +32,13 @@ void @name@_defaults(@name@_parameters *parameters)
     *parameters = start_parameters;
 }
 
+@derive@
 @set_parameters@
 {
     uint32_t status = 0u;
 
     @assignments@
+    @derived@
     return status;
 }
 
@@ -48,6 +50,7 @@ void @name@_defaults(@name@_parameters *parameters)
     state->outputs = start_outputs;
     @start_readings@
     state->begun = 0u;
+    @derived@
     return parameters == NULL ? 0u : @name@_set_parameters(state, parameters);
 }
 

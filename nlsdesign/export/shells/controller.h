@@ -32,6 +32,7 @@ typedef struct {
     @name@_inputs inputs; /* as they were taken */
     @name@_outputs outputs; /* last good */
     @readings@
+    @derived@
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
 } @name@_state;
 

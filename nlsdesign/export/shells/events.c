@@ -4,7 +4,7 @@
 
 enum { MOST_AT_ONCE = 40 };
 enum { SETTLED = 0, ENDLESS = 1, DRIFTED = 2 };
-static const double MOST_DRIFT = 1e-3; /* largest change of a rate that is held, as a share of the nominal size */
+static const double MOST_DRIFT = 1e-4; /* largest change of a rate that is held, as a share of the nominal size */
 
 /* Of the switches that hold a rate; zero for the others. */
 typedef struct {

@@ -301,7 +301,7 @@ static int advance(instance *me, double from, double length, double *reached, in
 static int advance(instance *me, double from, double length, double *reached, int *event)
 {
     double *v = me->now.value;
-    const moment before = me->now;
+    const double before = me->now.elapsed, lost = me->now.lost;
 
     count_time(me, length);
     const double elapsed = me->now.elapsed + me->now.lost;
@@ -309,7 +309,8 @@ static int advance(instance *me, double from, double length, double *reached, in
     const double due = ceil((elapsed - rounding) / MODEL_SAMPLE_TIME - 1e-6);
     const double needed = due - (double)me->now.samples;
     if (!(rounding <= 0.25 * MODEL_SAMPLE_TIME) || !(needed <= (double)MOST_SAMPLES)) {
-        me->now = before;
+        me->now.elapsed = before;
+        me->now.lost = lost;
         return needed > (double)MOST_SAMPLES
                    ? say(me, REFUSED, "the step of %.9g s would need %.9g samples, one step takes at most %d", length,
                          needed, MOST_SAMPLES)

@@ -160,7 +160,7 @@ class _Reader:
                     raise self._refused("a LinearTransformation", "has an offset, which a wire has not")
             elif kind.endswith("Transformation"):
                 raise self._refused(f"a {kind}", "is not read, only a LinearTransformation")
-        units = [self._unit(connector) for connector in (source, target)]
+        units = [_unit(connector) for connector in (source, target)]
         of, to = units
         if of is None or to is None or of.text == to.text:
             return factor
@@ -169,16 +169,6 @@ class _Reader:
             text = "*".join(["1", *(f"{n}^{p}" for n, p in zip(BASE, exponents, strict=True) if p)])
             return Quantity(factor * to.factor / of.factor, text)
         return Quantity(factor, "1")
-
-    def _unit(self, connector: ElementTree.Element) -> Unit | None:
-        for kind in connector:
-            text = kind.get("unit")
-            if text:
-                try:
-                    return parse_unit(text)
-                except UnitError:
-                    return None  # a name of a foreign tool; the FMUs' own units are checked when it runs
-        return None
 
     def _number(self, element: ElementTree.Element, attribute: str, default: float = math.nan) -> float:
         text = element.get(attribute)
@@ -213,3 +203,14 @@ class _Reader:
             if kind.tag.rpartition("}")[2] in _NUMBERS:
                 return self._number(kind, "value")
         raise self._refused(f"parameter '{fit_to_show(row.get('name'))}'", "has no number as its value")
+
+
+def _unit(connector: ElementTree.Element) -> Unit | None:
+    for kind in connector:
+        text = kind.get("unit")
+        if text:
+            try:
+                return parse_unit(text)
+            except UnitError:
+                return None  # a name of a foreign tool; the FMUs' own units are checked when it runs
+    return None

@@ -186,8 +186,8 @@ class _Structure:
         return files
 
     def _own_parameters(self, name: str) -> dict[str, float]:
-        found = ((split_name(full), value) for full, value in self._parameters.items())
-        return {variable: value for (instance, variable), value in found if instance == name}
+        rows = ((split_name(full), value) for full, value in self._parameters.items())
+        return {variable: value for (instance, variable), value in rows if instance == name}
 
     def _open_inputs(self) -> list[tuple[str, FmuDescription, FmuScalar]]:
         opened = []

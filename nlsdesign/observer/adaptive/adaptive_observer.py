@@ -156,13 +156,8 @@ def design_adaptive_observer(
     points = operating_points(form, settings.duty)
     resolution = trust.unmodelled * points.torque
     prior = settings.prior or declared_prior(model)
-    directions = uncertain_directions(
-        form,
-        prior,
-        settings.duty,
-        resolution=trust.smallest * points.torque,
-        most=trust.most,
-    )
+    smallest = trust.smallest * points.torque
+    directions = uncertain_directions(form, prior, settings.duty, resolution=smallest, most=trust.most)
     step = adaptive_step(
         form, ObserverStep(plant, CascadeGain(), sample_time, reference), directions, form.model.values
     )
