@@ -31,9 +31,25 @@ static double error(REAL found, WIDE exact)
     if (found - found != 0) {
         return fabsl((long double)exact) > 0.999999L * LARGEST ? 1.0 : HUGE_VAL;
     }
+#if DIGITS == 24
+    {
+        /* The same by the exponent of a double, for all floats in a minute. */
+        const double size = fabs((double)exact);
+        uint64_t bits;
+        double per_unit;
+
+        (void)memcpy(&bits, &size, sizeof bits);
+        power = (int)(bits >> 52) - 1022;
+        power = power < LEAST ? LEAST : power;
+        bits = (uint64_t)(1023 + DIGITS - power) << 52;
+        (void)memcpy(&per_unit, &bits, sizeof bits);
+        return fabs((double)found - (double)exact) * per_unit;
+    }
+#else
     (void)frexpl((long double)exact, &power);
     power = power < LEAST ? LEAST : power;
     return (double)ldexpl(fabsl((long double)found - (long double)exact), DIGITS - power);
+#endif
 }
 
 static const struct {
