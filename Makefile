@@ -17,7 +17,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help study test thorough kernels mutation lint bench environment lock clean distclean
+.PHONY: help study test thorough kernels mutation lint bench masters targets environment lock clean distclean
 
 help:
 	@echo 'make study      run the study of the published actuator; the report goes to $(OUT)/report.html'
@@ -28,6 +28,8 @@ help:
 	@echo 'make mutation   break the package in places drawn by chance and list what no test notices'
 	@echo 'make lint       style and types only'
 	@echo 'make bench      the benchmarks: ratios against named peers'
+	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
+	@echo 'make targets    generated C on Cortex-M4F and M7 in an emulator: docs/targets.md'
 	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'
 	@echo 'make clean      remove what study, test and build have written'
 	@echo 'make distclean  remove .venv too'
@@ -64,12 +66,18 @@ mutation: environment
 bench: environment
 	$(BIN)/python -m benchmarks
 
+masters: environment
+	$(BIN)/python -m benchmarks.foreign_masters --write docs/fmi_masters.md
+
+targets: environment
+	$(BIN)/python -m benchmarks.targets --write docs/targets.md
+
 # Needs a network but no .venv, which a broken lock could not make. What is locked stays unless UPGRADE is given.
 lock:
 	'$(or $(PYTHON),python3)' -m venv .venv-lock
 	.venv-lock/bin/python -m pip install --quiet '$(UV)'
 	.venv-lock/bin/uv pip compile pyproject.toml \
-		--extra export --extra records --extra cma --extra test --extra lint --group build \
+		--extra export --extra records --extra cma --extra masters --extra test --extra lint --group build \
 		--universal --python-version 3.11 --generate-hashes --only-binary :all: \
 		--custom-compile-command 'make lock' --quiet $(UPGRADE) \
 		--output-file requirements/locked.txt
