@@ -70,7 +70,7 @@ masters: environment
 	$(BIN)/python -m benchmarks.foreign_masters --write docs/fmi_masters.md
 
 targets: environment
-	$(BIN)/python -m benchmarks.targets --write docs/targets.md
+	$(BIN)/python -m benchmarks.targets
 
 # Needs a network but no .venv, which a broken lock could not make. What is locked stays unless UPGRADE is given.
 lock:
