@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.export import CSource
+from nlsdesign.export import CSource, Wire
 
 from .._published import Array
 
 READING = "plant.motor_encoder.reading"
 FROM_ENCODER = {"observer.motor.angle": READING, "controller.motor.angle": READING}
-WIRES = {
+WIRES: dict[str, str | Wire] = {
     **FROM_ENCODER,
-    "observer.motor.current": "controller.motor.current",
+    "observer.motor.current": "controller.motor.current",  # stands later in the order: its last sample
     "controller.spring.torque": "observer.spring.torque",
     "plant.motor.current": nls.Late("controller.motor.current"),  # one sample to compute
 }
