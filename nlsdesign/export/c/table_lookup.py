@@ -17,7 +17,7 @@ from ...errors import ExportError
 from ...model.flat import FlatModel, Table
 from .c_text import Real, wrapped
 
-_FEW = 4
+_SEARCHED_WHOLE = 4
 """Cells up to which all are searched."""
 _PARTS = (16, 32, 64, 128, 256)
 """Equal parts of a range, each of which knows its first cell."""
@@ -280,8 +280,10 @@ def _starts(each: IndexedTable, real: Real) -> tuple[list[int], int]:
     assert points is not None
     kept = np.array([real.round(float(v)) for v in points])
     cells = len(kept) - 1
-    trials = [([], cells)] if cells <= _FEW else [_parted(kept, each, real, parts) for parts in _PARTS]
-    return min(trials, key=lambda trial: ((trial[1] - 1).bit_length(), len(trial[0])))
+    trials = (
+        [([], cells)] if cells <= _SEARCHED_WHOLE else [_parted(kept, each, real, parts) for parts in _PARTS]
+    )
+    return min(trials, key=lambda pair: ((pair[1] - 1).bit_length(), len(pair[0])))
 
 
 def _parted(kept: NDArray[np.float64], each: IndexedTable, real: Real, parts: int) -> tuple[list[int], int]:
