@@ -274,16 +274,16 @@ def _scale(each: IndexedTable, real: Real, parts: int) -> float:
 def _starts(each: IndexedTable, real: Real) -> tuple[list[int], int]:
     """Return the first cell to be searched for equal parts of the range, and how many cells may follow it.
 
-    As few parts are taken as leave the fewest halvings; up to four cells are searched without.
+    As few parts are taken as leave the fewest halvings; a few cells are searched without.
     """
     points = each.table.breakpoints
     assert points is not None
     kept = np.array([real.round(float(v)) for v in points])
     cells = len(kept) - 1
-    choices = (
+    trials = (
         [([], cells)] if cells <= _SEARCHED_WHOLE else [_parted(kept, each, real, parts) for parts in _PARTS]
     )
-    return min(choices, key=lambda choice: ((choice[1] - 1).bit_length(), len(choice[0])))
+    return min(trials, key=lambda pair: ((pair[1] - 1).bit_length(), len(pair[0])))
 
 
 def _parted(kept: NDArray[np.float64], each: IndexedTable, real: Real, parts: int) -> tuple[list[int], int]:
