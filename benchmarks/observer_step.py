@@ -93,10 +93,10 @@ def drivers(source: CSource) -> dict[str, str]:
 
 def without_guards(text: str) -> str:
     """The generated source with every guard taken out."""
-    text, inputs = re.subn(r"usable\((inputs->[\w.]+),.*\);", r"\1;", text)
-    text, checks = re.subn(r"if \(\(.* == 0\.0\) \{", "if (1) {", text)
+    text, inputs = re.subn(r"usable\((inputs->[\w.]+), .*?, &(state->[\w.]+), .*\);", r"\2 = \1;", text)
+    text, checks = re.subn(r"if \(\(.* >= 0\.0\) \{", "if (1) {", text)
     assert (inputs, checks) == (2, 2)
-    return re.sub(r"/\* Keeps one input.*?\n}\n", "", text, flags=re.DOTALL)
+    return re.sub(r"/\* Keeps one command.*?\n}\n", "", text, flags=re.DOTALL)
 
 
 def prepare(folder: Path) -> None:
