@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 DEVIATION, SPREAD, UNREST = "deviation", "standard_deviation", "unrest"
 """Endings of the name of the estimate: slow states, the deviation that the filter expects, and the factor on
 the noise that it reckons with."""
+FIRST_READING = 2.0
+"""Deviation of the angle at the start, in deviations of rounding: the filter begins at its first reading."""
 FOLLOWED = "followed"
 """Ending of the name of the angle: its measured value behind a filter."""
 
@@ -97,10 +99,13 @@ class _Variables:
         return tuple(states)
 
     def _initial_variances(self) -> Array:
-        """Return variances at the start: nothing is known of the angle, little of speed and inner states."""
+        """Return variances at the start: the angle is that of the first reading, the rest is little known.
+
+        A variance as large as the range would lose the digits of single precision in the first correction.
+        """
         sizes = self.plant.sizes / self.units
         first = (0.1 * sizes) ** 2
-        first[self.angle] = sizes[self.angle] ** 2
+        first[self.angle] = FIRST_READING**2
         first[self.speed] = (0.03 * sizes[self.speed]) ** 2
         return np.asarray(first, dtype=np.float64)
 

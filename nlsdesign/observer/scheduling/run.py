@@ -30,7 +30,8 @@ def observe(
         Input of the observer to signal of the trace where the names differ, for instance
         ``{"motor.angle": "motor_encoder.reading"}``.
     start
-        Start values of the memory, for instance those of :meth:`ObserverDesign.start`.
+        Start values of the memory, for instance those of :meth:`ObserverDesign.start`; by default those of a
+        machine that rests at the first readings.
 
     Returns
     -------
@@ -58,4 +59,15 @@ def observe(
             f"record '{trace.name}'", f"has no signal '{missing[0]}', which the observer needs"
         )
     inputs = {name: trace[signal] for name, signal in wires.items()}
-    return simulate(observer, trace.time, inputs=inputs, start=start)
+    begun = start if start is not None else _begun(observer, {n: float(v[0]) for n, v in inputs.items()})
+    return simulate(observer, trace.time, inputs=inputs, start=begun)
+
+
+def _begun(observer: FlatModel, first: Mapping[str, float]) -> dict[str, float]:
+    """Return the states with which an observer begins at its first readings, as generated code does."""
+    if observer.begin is None:
+        return {}
+    x, u = observer.start(observer.states), [first[v.name] for v in observer.inputs]
+    w = observer.look_up(x.tolist(), u)
+    begun = np.array(observer.begin(x, u, observer.start(observer.parameters), w)[0], dtype=float).ravel()
+    return {v.name: float(value) for v, value in zip(observer.states, begun, strict=True)}
