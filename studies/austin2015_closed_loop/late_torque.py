@@ -32,4 +32,24 @@ def late_torque(observer: nls.FlatModel, samples: int) -> nls.FlatModel:
         ["time", "state", "input", "parameter", "table"],
         ["derivative", "output", "signal", "residual"],
     )
-    return replace(observer, states=(*observer.states, *states), equations=equations)
+    return replace(
+        observer,
+        states=(*observer.states, *states),
+        equations=equations,
+        begin=_with_delay_line(observer, observer.begin, held, 2),
+        expected=_with_delay_line(observer, observer.expected, held, 1),
+    )
+
+
+def _with_delay_line(
+    observer: nls.FlatModel, function: ca.Function | None, held: ca.SX, count: int
+) -> ca.Function | None:
+    """Return a function of the observer's states as one of all states; two results are states themselves."""
+    if function is None:
+        return None
+    known = observer.symbols()
+    results = function.call([known.state, known.input, known.parameter, known.table])
+    if count == 2:
+        results = [ca.vertcat(result, held) for result in results]
+    arguments = [ca.vertcat(known.state, held), known.input, known.parameter, known.table]
+    return ca.Function(function.name(), arguments, results)
