@@ -18,8 +18,9 @@ from tests.command_line import Run, run
 
 __all__ = ["run"]
 
+PARTS = ("observer", "controller", "torque_loop")
 GENERATED = (
-    *(f"c/{part}{end}" for part in ("observer", "controller") for end in (".c", ".h", "_selftest.c")),
+    *(f"c/{part}{end}" for part in PARTS for end in (".c", ".h", "_selftest.c")),
     *(f"fmu/{part}.fmu" for part in ("plant", "observer", "controller", "plant_fmi2")),
 )
 EXPORTED = (*GENERATED, "certified/observer.c", "certified/certificate.json")

@@ -16,6 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.deck import load_deck
 from nlsdesign.errors import ExportError
 from nlsdesign.export import CompiledStep, export_c
 from nlsdesign.export.c.guarded_step import GuardedModel
@@ -29,7 +31,9 @@ from nlsdesign.export.c.status_bits import (
     index_bit,
 )
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_program, run_compiler
+from nlsdesign.model import flatten
 from nlsdesign.model.flat import FlatModel, Table, Variable
+from nlsdesign.observer import design_adaptive_observer
 from tests.hand_built import controller, observer, plant
 
 MODELS = {"observer": observer(), "controller": controller()}
@@ -467,3 +471,12 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
     with pytest.raises(ExportError, match="No space left"):
         export_c(tuned, tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", ["figure_consistent", "as_printed", "stiff_spring"])
+def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
+    """Its covariance once began at the square of the range, which cost single precision its digits."""
+    plant = flatten(declare(load_deck(f"austin2015_{name}")))
+    source = export_c(design_adaptive_observer(plant).model, tmp_path, real="float")
+    program = compile_program([source.source, source.selftest], tmp_path / "selftest")
+    assert subprocess.run([program], check=False).returncode == 0
