@@ -164,6 +164,20 @@ def test_a_huge_sample_does_not_lock_an_observer_without_any_range(
     assert outputs[0] == pytest.approx(expected[0], abs=0.01)
 
 
+def test_a_restarted_observer_begins_anew_with_its_reading(tmp_path: Path) -> None:
+    model = replace(unguarded(cascade()), begin=cascade().begin)
+    step = CompiledStep(nls.export_c(model, tmp_path))
+    for k in range(12):
+        outputs, status = step([5e306 if k == 5 else 0.6, 0.0])
+        if status & STATE_RESTARTED:
+            break
+    (after, *_), status = step([0.6, 0.0])
+    assert status == 0
+    # At its first sample the torque of a machine that rests at this angle, not one that comes from zero.
+    assert after == pytest.approx(CompiledStep(nls.export_c(model, tmp_path))([0.6, 0.0])[0][0], rel=1e-12)
+    assert after > 1.0
+
+
 def stepped(model: nls.FlatModel, rows: list[list[float]]) -> list[int]:
     run = GuardedModel(model)
     return [run.step(row)[1] for row in rows]
