@@ -168,7 +168,7 @@ def test_a_restarted_observer_begins_anew_with_its_reading(tmp_path: Path) -> No
     model = replace(unguarded(cascade()), begin=cascade().begin)
     step = CompiledStep(nls.export_c(model, tmp_path))
     for k in range(12):
-        outputs, status = step([5e306 if k == 5 else 0.6, 0.0])
+        _, status = step([5e306 if k == 5 else 0.6, 0.0])
         if status & STATE_RESTARTED:
             break
     (after, *_), status = step([0.6, 0.0])
