@@ -46,10 +46,13 @@ def models() -> dict[str, FlatModel]:
     plant = nls.flatten(nls.declare(nls.load_deck(DECK)))
     cascade, adaptive = design_observer_with_details(plant).model, nls.design_observer(plant)
     controller = nls.torque_controller(plant)
+    scheduled = nls.torque_controller(plant, law=nls.control.ScheduledTorque())
     return {
         "cascade observer": cascade,
         "controller": controller,
+        "scheduled controller": scheduled,
         "cascade observer and controller": joined(cascade, controller),
+        "cascade observer and scheduled controller": joined(cascade, scheduled),
         "adaptive observer": adaptive,
         "adaptive observer and controller": joined(adaptive, controller),
     }

@@ -71,6 +71,7 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
     from ..export import convergence
     from ..progress import Steps
 
+    _check_out(out, [*given["fmus"], *([str(given["system"])] if given.get("system") else [])])
     steps = Steps()
     with tempfile.TemporaryDirectory(prefix="nlsdesign-system-") as folder:
         system = _system(given, Path(folder))
@@ -125,6 +126,16 @@ def _stepping(step: float | None, coupling: str, patience: float, progress: Prog
     elif coupling == "held":
         chosen = Held()
     return Stepping(step, coupling=chosen, patience=patience, progress=progress)
+
+
+def _check_out(out: Path, reads: list[str]) -> None:
+    """Refuse to write over what is read."""
+    for words in reads:
+        file = Path(words.partition("=")[2] or words)
+        if out.exists() and file.exists() and file.samefile(out):
+            raise ValueRangeError(
+                f"--out {out}", "is an FMU or a system that is read", next_step="name another file: run.csv"
+            )
 
 
 def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import click
 from .controller import controller_of, export_controller, law_options
 from .export_check import check_exports
 from .export_fmu import export_fmus
-from .flash import flash_options, sized_observer
+from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
 from .output import deck_option, measured_option, out_option, spring_option
@@ -92,7 +92,10 @@ def sampled_part(
     law = {name: chosen[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
     others = {name: value for name, value in chosen.items() if name not in law}
     if what == CONTROLLER:
-        return CONTROLLER, controller_of(plant, sample_time, **law), ()
+        if chosen["table_error"] is not None:
+            raise click.BadParameter("--table-error is of an observer; leave it out, or take --what both")
+        controller = controller_of(plant, sample_time, **law)
+        return CONTROLLER, controller, controller_size(controller, chosen["real"], chosen["flash"])
     if what == OBSERVER:
         sized = sized_observer(plant, sample_time, **others)
         return OBSERVER, sized.designed.model, sized.sentences

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import NlsError
+from .controller import controller_of, law_options
 from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
@@ -30,8 +31,10 @@ FILES = {
 class _Models:
     """The models of a deck, each designed once and only when it is asked for."""
 
-    def __init__(self, plant: FlatModel, sample_time: float, chosen: dict[str, str | None]) -> None:
-        self.plant, self.sample_time, self.chosen = plant, sample_time, chosen
+    def __init__(
+        self, plant: FlatModel, sample_time: float, chosen: dict[str, str | None], law: dict[str, Any]
+    ) -> None:
+        self.plant, self.sample_time, self.chosen, self.law = plant, sample_time, chosen, law
         self._made: dict[str, FlatModel] = {"plant": plant}
 
     def __getitem__(self, what: str) -> FlatModel:
@@ -45,9 +48,7 @@ class _Models:
         return self._made[what]
 
     def _controller(self) -> FlatModel:
-        from ..control import torque_controller
-
-        return torque_controller(self.plant, sample_time=self.sample_time)
+        return controller_of(self.plant, self.sample_time, **self.law)
 
     def _both(self) -> FlatModel:
         from ..control import joined
@@ -88,6 +89,7 @@ def _date(_context: click.Context, _parameter: click.Parameter, text: str | None
     "Repeatable.",
 )
 @kind_option
+@law_options
 @sample_time_option
 @spring_option
 @measured_option
@@ -125,7 +127,8 @@ def export_fmus(
     from ..model import flatten
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
-    made = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen)
+    law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
+    made = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen, law)
     # Before anything is written: not every system has an observer.
     if what:
         models = {each: made[each] for each in dict.fromkeys(what)}

@@ -149,11 +149,40 @@ def sized_observer(
     )  # fmt: skip
 
 
+def controller_size(controller: FlatModel, real: str, flash: int | None) -> tuple[str, ...]:
+    """Return what is to be known of the size of a controller.
+
+    Parameters
+    ----------
+    controller
+        Discrete.
+    real
+        ``"double"`` or ``"float"``.
+    flash
+        Most bytes on a Cortex-M4F.
+
+    Raises
+    ------
+    ValueRangeError
+        If the code takes more.
+    """
+    size = _measured(controller, real, needed=flash is not None)
+    if size is None:
+        return ("the flash of the code was not measured: no compiler",)
+    if flash is not None and size > flash:
+        raise ValueRangeError(
+            f"flash of {flash} B", f"the code of the controller takes {size} B on a Cortex-M4F",
+            next_step=f"allow {size} B, or take another --law or --real float",
+        )  # fmt: skip
+    return (f"flash on a Cortex-M4F: {size} B, without the C library",)
+
+
 def _refused(flash: int, code: int, error: TableTooLargeError) -> ValueRangeError:
     least = code + error.least
     return ValueRangeError(
         f"flash of {flash} B",
-        f"cannot be met beside {code} B of code: {error.words}; the smallest that keeps this has {least} B",
+        f"cannot be met beside {code} B of code: {error.words}; the smallest found that keeps this has "
+        f"{least} B",
         next_step=f"allow {least} B, a larger --table-error, or take another --kind or --real float",
     )
 
@@ -165,18 +194,23 @@ def _grid(plant: FlatModel, error: float | None, each: int, most: int | None) ->
 
 
 def _sized(designed: DesignedObserver, exported: FlatModel, real: str, *, needed: bool) -> SizedObserver:
+    tables = designed.design.compact.size(4 if real == "float" else 8)
+    whole = _measured(exported, real, needed=needed)
+    return SizedObserver(designed, None if whole is None else whole - tables, tables)
+
+
+def _measured(exported: FlatModel, real: str, *, needed: bool) -> int | None:
+    """Return the flash of code and tables in bytes."""
     from ..export import export_c
     from ..export.target.cross_build import controller_sizes
     from ..export.target.processors import CORTEX_M4F
 
-    tables = designed.design.compact.size(4 if real == "float" else 8)
     with tempfile.TemporaryDirectory() as folder:
         source = export_c(exported, Path(folder), real=real, name="part")
         try:
-            _, added = controller_sizes(source, CORTEX_M4F, Path(folder))
-            return SizedObserver(designed, added.flash - tables, tables)
+            return controller_sizes(source, CORTEX_M4F, Path(folder))[1].flash
         except ExportError:
             # Without the wheel of the compiler C is still written; only a budget cannot be judged.
             if needed:
                 raise
-            return SizedObserver(designed, None, tables)
+            return None

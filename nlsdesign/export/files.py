@@ -60,9 +60,19 @@ def write_all(texts: Mapping[Path, str]) -> None:
     ----------
     texts
         Content by path.
+
+    Raises
+    ------
+    ExportError
+        If a folder stands in the place of a file; then nothing is written.
     """
     if not texts:
         return
+    for each in texts:
+        if each.is_dir():
+            raise ExportError(
+                str(each), "is a folder, where a file is to be written", next_step="name another folder"
+            )
     (path, text), *rest = texts.items()
     with draft(path) as name:
         name.write_text(text, encoding="utf-8", newline="\n")

@@ -13,14 +13,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, Self
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import ValueRangeError
 from ...quantity import Quantity, same_dimension
 from ...symbolic import Expression
+from ..core.domain import Domain
 from ..core.element import Scope
 from ..core.part import Part, parameter
 from ..core.part_numbers import NotDeclared, Reading, read_as
@@ -166,6 +168,28 @@ class ReadingLimits(Reading):
         minimum=1e-6,
         maximum=1e4,
     )
+
+    def within(self, domain: Domain | None) -> Self:
+        """Return a copy whose numbers are checked.
+
+        Parameters
+        ----------
+        domain
+            Of the sensor.
+
+        Raises
+        ------
+        ValueRangeError
+            If the lowest reading is not below the highest.
+        """
+        checked = super().within(domain)
+        if not checked.lowest_reading.number < checked.highest_reading.number:
+            raise ValueRangeError(
+                f"lowest_reading = {checked.lowest_reading}, highest_reading = {checked.highest_reading}",
+                "leave no reading that could be used",
+                next_step="give the lowest reading below the highest",
+            )
+        return checked
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import ValueRangeError
 from ...model import FlatModel, Plausibility, Variable
 from ...model.declared_limits import declared_reading
 from .plant import AngleScheduledPlant
@@ -58,21 +59,26 @@ def with_plausible_inputs(
         As the observer sees it.
     angles
         Grid of its table, shape (n,).
+
+    Raises
+    ------
+    ValueRangeError
+        If the declared rate or stale time is less than what one sample allows.
     """
     angle, *others = observer.inputs
-    return replace(
-        observer,
-        inputs=(_plausible_angle(angle, model, plant, angles), *(_limited(v, model) for v in others)),
-    )
+    time = float(observer.sample_time or 0.0)
+    measured = _plausible_angle(angle, model, plant, angles, time)
+    return replace(observer, inputs=(measured, *(_limited(v, model) for v in others)))
 
 
 def _plausible_angle(
-    angle: Variable, model: FlatModel, plant: AngleScheduledPlant, angles: Array
+    angle: Variable, model: FlatModel, plant: AngleScheduledPlant, angles: Array, sample_time: float
 ) -> Variable:
     declared = declared_reading(model, angle.name)
     width, speed = float(angles[-1] - angles[0]), float(plant.sizes[plant.moving[1]])
     usual = (float(angles[0]) - width, float(angles[-1]) + width, FASTER * speed, float("inf"))
     lowest, highest, rate, stale = declared.limits or usual
+    _check_sampling(angle.name, rate, stale, declared.quantum, sample_time)
     drive = next((v.name for v in plant.inputs if _command_limit(v.name, model) is not None), None)
     can = Plausibility(
         rate,
@@ -82,6 +88,22 @@ def _plausible_angle(
         0.0 if drive is None else noticeable_change(plant, drive, angles, COUNTS * declared.quantum),
     )
     return replace(angle, minimum=lowest, maximum=highest, plausibility=can)
+
+
+def _check_sampling(name: str, rate: float, stale: float, quantum: float, sample_time: float) -> None:
+    """Refuse limits that no reading could keep at this sample time."""
+    if rate * sample_time < quantum:
+        raise ValueRangeError(
+            f"largest rate of '{name}' {rate:g} rad/s",
+            f"is less than one count per sample of {sample_time:g} s",
+            next_step=f"declare at least {quantum / sample_time:.3g} rad/s, or sample slower",
+        )
+    if stale < 2.0 * sample_time:
+        raise ValueRangeError(
+            f"stale time of '{name}' {stale:g} s",
+            f"is shorter than two samples of {sample_time:g} s",
+            next_step="declare a longer one, or sample faster",
+        )
 
 
 def _limited(variable: Variable, model: FlatModel) -> Variable:

@@ -111,14 +111,12 @@ class GridByTorqueError(Grid):
         """Return a coarser table within the size, or refuse with what it would cost."""
         each, most = self.bytes_per_number, self.most_bytes or 0
         largest = MOST_SHARE * search.trial.full_scale if self.torque_error is None else self.torque_error
-        coarser = search.of_size(most) if self.torque_error is None else None
+        coarser = search.of_size(most)
         if coarser is not None and largest_of(coarser) <= largest:
             return coarser
         least = table if self.torque_error is not None else search.within(largest) or table
-        cost = coarser if coarser is not None else search.of_size(most)
-        raise TableTooLargeError(
-            most, largest, None if cost is None else largest_of(cost), least.size(each), unit
-        )
+        cost = None if coarser is None else largest_of(coarser)
+        raise TableTooLargeError(most, largest, cost, least.size(each), unit)
 
 
 class TableTooLargeError(ConvergenceError):
