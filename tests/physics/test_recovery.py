@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
+from nlsdesign.components import Encoder, ReadingLimits
 from nlsdesign.components.assembly.moved_load import with_moved_load
 from nlsdesign.control import TorqueGains, joined
 from nlsdesign.errors import NlsError
@@ -333,3 +334,29 @@ def test_a_load_that_moves_has_the_same_guards() -> None:
     limits = [v.plausibility for v in controller.inputs if v.name == "motor.angle"]
     assert limits[0] is not None
     assert limits[0].largest_rate == 95.0
+
+
+@pytest.mark.parametrize(
+    ("changed", "rule"),
+    [
+        ({"lowest_reading": 1.5, "highest_reading": -1.5}, "leave no reading that could be used"),
+        ({"largest_rate": 0.001}, "less than one count per sample"),
+        ({"stale_time": 1e-4}, "shorter than two samples"),
+    ],
+)
+def test_limits_that_no_reading_can_keep_are_refused(changed: dict[str, float], rule: str) -> None:
+    numbers = {
+        "lowest_reading": -1.5,
+        "highest_reading": 1.5,
+        "largest_rate": 95.0,
+        "stale_time": 0.1,
+        **changed,
+    }
+
+    def observer() -> object:
+        encoder = Encoder(of="motor.angle", quantum=0.767e-3, limits=ReadingLimits(**numbers))
+        machine = nls.declare(nls.load_deck(DECK)).with_part("motor_encoder", encoder)
+        return design_observer_with_details(nls.flatten(machine))
+
+    with pytest.raises(NlsError, match=rule):
+        observer()

@@ -97,6 +97,15 @@ def test_a_mistake_is_named_and_nothing_is_written(
     assert not (tmp_path / "y.csv").exists()
 
 
+def test_an_fmu_that_is_read_is_not_written_over(run: Run, fmus: dict[str, Path], tmp_path: Path) -> None:
+    copy = tmp_path / "plant.fmu"
+    copy.write_bytes(fmus["plant"].read_bytes())
+    status, _, err = run("cosimulate", "--fmu", f"plant={copy}", "--stop", "0.1 s", "--out", "plant.fmu")
+    assert status == 2
+    assert "is an FMU or a system that is read" in err
+    assert copy.read_bytes() == fmus["plant"].read_bytes()
+
+
 def test_gain_and_delay_of_a_wire_are_those_of_the_library(run: Run, fmus: dict[str, Path]) -> None:
     written = {
         BACK[0]: f"{BACK[1]}*-0.5@2.5ms",

@@ -42,6 +42,15 @@ def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, 
     assert {name: (tmp_path / "again" / name).read_bytes() for name in names} == first
 
 
+def test_the_law_is_that_of_the_c_code(run: Run, tmp_path: Path) -> None:
+    asked = ("--what", "controller", "--out", "o")
+    for law, words in (((), "speed by tangent stiffness"), (("--law", "pid"), "PID on the")):
+        assert run(*WORDS, *asked, *law)[0] == 0
+        assert words in described(tmp_path / "o" / "controller.fmu").description
+        assert run("export", "c", *WORDS[2:4], "--what", "controller", "--out", "c", *law)[0] == 0
+        assert words in (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
+
+
 def test_what_is_asked_for_is_written_once_with_its_reference(run: Run, tmp_path: Path) -> None:
     asked = ("--what", "controller", "--what", "controller", "--reference", "--version", "2.0")
     status, out, err = run(*WORDS, "--out", "o", *asked)

@@ -132,3 +132,31 @@ def test_breakpoints_are_read_alike_in_an_fmu_and_in_a_batch(tmp_path: Path) -> 
             unit.step(0.1)
             assert unit.get("y[1]", "y[2]") == list(expected)
             assert np.array(many(at)).ravel() == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_budget_holds_for_a_controller_too(export: Run, tmp_path: Path) -> None:
+    status, out, _ = export("--what", "controller")
+    assert status == 0
+    size = int(re.search(r"flash on a Cortex-M4F: (\d+) B", out)[1])  # type: ignore[index]
+    status, _, err = export("--what", "controller", "--flash", "1kB", "--out", "p")
+    assert status == 2
+    assert f"takes {size} B" in err
+    assert not (tmp_path / "p").exists()
+    status, _, err = export("--what", "controller", "--table-error", "1mN*m", "--out", "p")
+    assert status == 2
+    assert "of an observer" in err
+
+
+def test_a_table_within_size_and_error_is_taken(export: Run) -> None:
+    """Asked for both, the smaller table was refused although it kept the error."""
+    status, out, err = export("--flash", "5.9kB", "--table-error", "2mN*m")
+    assert status == 0, err
+    assert "moves the torque by at most" in out
+
+
+def test_a_folder_in_the_place_of_a_file_stops_everything(export: Run, tmp_path: Path) -> None:
+    (tmp_path / "q" / "observer.h").mkdir(parents=True)
+    status, _, err = export("--out", "q")
+    assert status == 2
+    assert "is a folder" in err
+    assert [path.name for path in (tmp_path / "q").iterdir()] == ["observer.h"]

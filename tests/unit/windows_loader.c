@@ -22,6 +22,8 @@ static WINDOWS void *w_memset(void *a, int c, size_t n) { return memset(a, c, n)
 static WINDOWS double w_exp(double x) { return exp(x); }
 static WINDOWS double w_log1p(double x) { return log1p(x); }
 static WINDOWS double w_tanh(double x) { return tanh(x); }
+static WINDOWS double w_erf(double x) { return erf(x); }
+static WINDOWS double w_expm1(double x) { return expm1(x); }
 static WINDOWS double w_pow(double x, double y) { return pow(x, y); }
 static WINDOWS double w_ceil(double x) { return ceil(x); }
 static WINDOWS double w_fabs(double x) { return fabs(x); }
@@ -41,6 +43,7 @@ static const struct {
     {"malloc", (void *)w_malloc}, {"calloc", (void *)w_calloc}, {"free", (void *)w_free},
     {"strlen", (void *)w_strlen}, {"strcmp", (void *)w_strcmp}, {"memcmp", (void *)w_memcmp},
     {"memcpy", (void *)w_memcpy}, {"memset", (void *)w_memset}, {"exp", (void *)w_exp},
+    {"erf", (void *)w_erf},       {"expm1", (void *)w_expm1},
     {"log1p", (void *)w_log1p},   {"tanh", (void *)w_tanh},     {"pow", (void *)w_pow},
     {"ceil", (void *)w_ceil},     {"fabs", (void *)w_fabs},     {"sqrt", (void *)w_sqrt},
     {"fmax", (void *)w_fmax},     {"fmin", (void *)w_fmin},     {"__stdio_common_vsprintf", (void *)w_vsprintf},
