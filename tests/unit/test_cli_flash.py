@@ -73,7 +73,7 @@ def test_a_budget_that_cannot_be_met_is_refused_and_nothing_is_written(export: R
     status, out, error = export("--flash", "2kB")
     assert (status, out) == (2, "")
     assert "flash of 2000 B: cannot be met beside" in error
-    least = int(re.search(r"smallest that keeps this has (\d+) B", error)[1])
+    least = int(re.search(r"smallest found that keeps this has (\d+) B", error)[1])
     status, _, error = export("--flash", f"{least - 700} B", "--table-error", "1 mN·m")
     assert status == 2
     assert re.search(r"it would cost 0\.0\d+ N·m, more than 0.001 N·m|no table is that small", error)
