@@ -165,6 +165,8 @@ def scattered(design: Design, other: Design, draw: np.random.Generator) -> Desig
     )
 
 
+# Ten seconds; that no design nearby is better is tried in every run.
+@pytest.mark.slow
 def test_another_optimiser_finds_nothing_better() -> None:
     """SLSQP with differences on the equations of this file: least rubber of no larger size."""
     front = front_of(LeastRubber, LeastSize)

@@ -111,7 +111,7 @@ def test_half_the_sampling_rate_and_another_deck(tmp_path: Path) -> None:
         assert (faults > 300, worst <= 0.01, lost) == (True, True, 0)
 
 
-@pytest.mark.parametrize("real", ["float", "double"])
+@pytest.mark.parametrize("real", ["float", pytest.param("double", marks=pytest.mark.slow)])
 def test_ten_million_steps_with_faults(real: str, tmp_path: Path) -> None:
     faults, _, worst, lost = fuzzed(cascade(), tmp_path, real=real, samples=10_000_000)
     assert faults > 20_000

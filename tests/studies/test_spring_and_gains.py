@@ -83,6 +83,8 @@ def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
         assert numbers[f"{name}_pid_impedance_Nm_per_rad"] == pytest.approx(10.0 * np.pi / gain, rel=0.1)
 
 
+# Half a minute; the front and the margins of drawn machines are held by the tests beside it.
+@pytest.mark.slow
 def test_the_published_torque_curve_has_the_bandwidth_that_is_claimed(tmp_path: Path) -> None:
     numbers, expected = run_study(NAME, tmp_path, fast=True), claims(NAME)
     linear = [key for key in numbers if key.startswith("nonlinear_")]

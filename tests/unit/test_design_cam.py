@@ -210,6 +210,8 @@ def test_conflict_of_strain_and_pretension_is_named_with_what_each_would_have_to
     assert design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=wider).rms > 1.0
 
 
+# Ten seconds; other conflicts are named in every run.
+@pytest.mark.slow
 def test_conflict_with_the_target_is_named_too() -> None:
     """A lever arm within a cam of 20 mm and 5 N·m need a force of at least 5/(2·0.02) = 125 N."""
     keep = [*KEEP, MaximumCableTension(50.0), MaximumTorqueError(0.01)]

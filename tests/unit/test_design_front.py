@@ -57,6 +57,8 @@ def test_what_is_no_front_is_refused(goals: tuple[object, ...], points: int, wor
         pareto(MACHINE, target=TARGET, goals=goals, free=AREA, points=points)  # type: ignore[arg-type]
 
 
+# Ten seconds; conflicts of one design are named in every run.
+@pytest.mark.slow
 def test_limits_in_conflict_are_named_before_any_front() -> None:
     keep = [MinimumRadiusOfCurvature(10e-3), MaximumCamRadius(6e-3)]
     with pytest.raises(InfeasibleError, match="MaximumCamRadius"):

@@ -250,6 +250,8 @@ def test_a_give_is_rounded_to_the_side_that_is_enough(value: float, upper: bool,
     assert f"(to {end} mm)" in str(give)
 
 
+# Ten seconds; defaults that hold are tried in every run.
+@pytest.mark.slow
 def test_a_broken_default_and_the_end_of_a_range_are_said() -> None:
     """Limits that the designer has replaced by wider ones are not forgotten."""
     published = declare(load_deck("austin2015_as_printed"))

@@ -55,6 +55,8 @@ def test_an_effect_beside_a_wrong_number_is_named_and_the_number_said(tmp_path: 
     assert any(MODULUS in each for each in found.where)
 
 
+# Ten seconds; a wrong number beside an effect is tried in every run.
+@pytest.mark.slow
 def test_a_wrong_torque_constant_beside_friction_is_not_taken_for_effects(tmp_path: Path) -> None:
     """A gain of the cell and a weight would do too, with more numbers and strained moduli."""
     arm = ACTUATORS["arm"]
