@@ -12,7 +12,7 @@ from ..deck import deck_names, load_deck
 from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
-from .output import json_option, show_json, show_table
+from .output import examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -31,7 +31,11 @@ def list_decks() -> None:
     show_table("Decks", ("name", "description"), [(n, load_deck(n).description) for n in deck_names()])
 
 
-@deck.command()
+@deck.command(
+    epilog=examples(
+        "nlsdesign deck check austin2015_figure_consistent", "nlsdesign deck check my.toml --json"
+    )
+)
 @click.argument("deck_name", metavar="DECK")
 @json_option
 def check(deck_name: str, as_json: bool) -> None:

@@ -57,6 +57,18 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
+def examples(*lines: str) -> str:
+    """Return the epilog of a help text that shows commands, each on its line.
+
+    Parameters
+    ----------
+    lines
+        Whole commands, as they are typed.
+    """
+    # Click fills paragraphs anew unless they begin with this mark.
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
+
+
 def out_option(default: str = "out") -> Callable[[F], F]:
     """Return the option ``--out``.
 
