@@ -1,4 +1,4 @@
-"""``nlsdesign diagnose`` and ``nlsdesign simulate``: bench records against a deck."""
+"""``nlsdesign diagnose``: bench records against a deck."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..quantity import typeset_unit
 from .exported_machine import export_machine, export_option
 from .output import (
     deck_option,
@@ -21,7 +20,6 @@ from .output import (
     measured_option,
     out_option,
     show_json,
-    show_table,
     spring_option,
 )
 from .units import Number
@@ -32,7 +30,6 @@ if TYPE_CHECKING:
     from ..model import FlatModel
     from ..regeneration import Regeneration
     from ..report.sections import Section
-    from ..simulation import Trace
 
 _file = click.Path(path_type=Path, dir_okay=False)
 _mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
@@ -143,50 +140,3 @@ def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list
     if files:
         lines.append(f"written: {', '.join(content['files'])}")
     return content, "\n".join(lines), regeneration_sections(result, files)
-
-
-@click.command()
-@deck_option
-@click.option("--record", type=_file, required=True, help="CSV file with measured signals.")
-@_mapping
-@click.option("--out", type=_file, required=True, help="CSV file to write.")
-@json_option
-def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
-    """Drive the model with a measured record and write its predictions of the measured signals."""
-    from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..discrepancy import predict
-    from ..identification import load_record
-    from ..model import flatten
-
-    actuator = declare(load_deck(deck_name))
-    records = load_record(record, flatten(actuator), mapping=mapping)
-    (measured,) = records.records
-    predicted = predict(actuator, records, measured.name)
-    predicted.write_csv(out)
-    rows = agreement_rows(measured.trace, predicted)
-    if as_json:
-        rms = {name: float(value) for name, value, _ in rows}
-        show_json({"file": out, "rms": rms, "warnings": [str(each) for each in predicted.warnings]})
-        return
-    show_table(f"{record.name} against {actuator.name}", ("signal", "rms error", "unit"), rows)
-    for each in predicted.warnings:
-        click.echo(f"warning: {each}")
-    click.echo(f"written: {out}")
-
-
-def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
-    """Return name, rms error and unit of each predicted signal; a signal that is not measured should be zero.
-
-    Parameters
-    ----------
-    measured, predicted
-        At the same times.
-    """
-    import numpy as np
-
-    rows = []
-    for name, values in predicted.signals.items():
-        error = values - measured[name] if name in measured else values
-        rows.append((name, f"{float(np.sqrt(np.mean(error**2))):.4g}", typeset_unit(predicted.units[name])))
-    return rows
