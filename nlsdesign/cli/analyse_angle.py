@@ -14,11 +14,11 @@ from .output import (
     deck_option,
     json_option,
     measured_option,
-    out_option,
     show_json,
     show_table,
     spring_option,
 )
+from .overwriting import out_option
 from .units import Number
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ _HEADINGS = {
 )
 @measured_option
 @spring_option
-@out_option("out/analysis")
+@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg"))
 @json_option
 def analyse_angle(
     deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from .output import deck_option, out_option
+from .output import deck_option
+from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
@@ -81,7 +82,10 @@ def controller_of(
 @deck_option
 @law_options
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
-@out_option("out/controller")
+@out_option(
+    "out/controller",
+    writes=lambda given: [*c_names("controller"), *(["controller.fmu"] if given["fmu"] else [])],
+)
 @click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
 @click.option("--fmu", is_flag=True, help="Write an FMU for co-simulation (FMI 3.0) beside the C code.")
 def export_controller(

@@ -13,6 +13,7 @@ import click
 from ..errors import ValueRangeError
 from ..quantity import Quantity, quantity, typeset_unit
 from .output import json_option, show_json, show_table
+from .overwriting import out_file_option
 from .units import Number, parse_number
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ WIRE_HELP = (
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,
               help="Also halve the step so often and print how the signals converge.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
+@out_file_option(None, "CSV to write.")
 @json_option
 def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **given: Any) -> None:
     """Run FMUs together; numbers are in the units that the FMUs state for their variables.

@@ -13,6 +13,7 @@ from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
 from .output import examples, json_option, show_json, show_table
+from .overwriting import out_file_option
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -94,7 +95,7 @@ def show(deck_name: str, as_json: bool) -> None:
 @deck.command("from-rig")
 @click.argument("rig_toml", metavar="RIG.TOML", type=_file)
 @click.argument("cam_csv", metavar="CAM.CSV", type=_file)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
+@out_file_option(None, "Deck to write.")
 def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
     from ..components.assembly.deck_writer import write_deck

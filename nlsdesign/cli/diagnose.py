@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .exported_machine import export_machine, export_option
+from .exported_machine import MACHINE, export_machine, export_option
 from .output import (
     deck_option,
     json_option,
     measured_option,
-    out_option,
     show_json,
     spring_option,
 )
+from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
@@ -36,6 +36,15 @@ _mapping = click.option("--mapping", type=_file, default=None, help="TOML that m
 
 _OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
 """Not every diagnosis writes these; one of an earlier run in the same folder would contradict the verdict."""
+
+
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    names = ["verdict.json", "model.toml", "report.html", *_OF_THIS_RUN_ALONE]
+    parts = [*(["observer"] if given["again"] else []), *(MACHINE if given["exports"] else [])]
+    for part in dict.fromkeys(parts):
+        names += [f"{part}.fmu", *(f"c/{name}" for name in c_names(part) if part != "plant")]
+    return names
 
 
 @click.command()
@@ -53,7 +62,7 @@ _OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True, help="Of the observer.")
 @spring_option
 @measured_option
-@out_option("out/diagnosis")
+@out_option("out/diagnosis", writes=_writes)
 @json_option
 def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
@@ -67,6 +76,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..progress import Steps
     from ..report import verdict_sections, write_report
     from ..writing import make_folder
+    from ..written_files import discard
 
     command = shlex.join(["nlsdesign", *sys.argv[1:]])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
@@ -80,7 +90,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     verdict = replace(verdict, run=run)
     make_folder(out)
     for left_over in _OF_THIS_RUN_ALONE:
-        (out / left_over).unlink(missing_ok=True)
+        discard(out / left_over)
     write_verdict(verdict, out)
     if verdict.experiment is not None:
         write_command(verdict.experiment, out / "next_record.csv")

@@ -14,7 +14,8 @@ from .export_fmu import export_fmus
 from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
-from .output import deck_option, measured_option, out_option, spring_option
+from .output import deck_option, measured_option, spring_option
+from .overwriting import c_names, out_option
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -32,6 +33,14 @@ export.add_command(export_fmus)
 export.add_command(check_exports)
 
 
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    name = "torque_loop" if given["what"] == BOTH else given["what"]
+    further = (".hpp", "_example_posix.c", "_example_cortex_m.c", ".mk") if given["examples"] else ()
+    build = ["CMakeLists.txt"] if further else []
+    return [*c_names(name), *(f"{name}{ending}" for ending in further), *build]
+
+
 @export.command("c")
 @deck_option
 @click.option(
@@ -46,7 +55,7 @@ export.add_command(check_exports)
 @sample_time_option
 @spring_option
 @measured_option
-@out_option("out/c")
+@out_option("out/c", writes=_writes)
 @real_option
 @flash_options
 @click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")

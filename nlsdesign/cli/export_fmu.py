@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,8 @@ from ..errors import NlsError
 from .controller import controller_of, law_options
 from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
-from .output import deck_option, measured_option, out_option, spring_option
+from .output import deck_option, measured_option, spring_option
+from .overwriting import out_option
 
 if TYPE_CHECKING:
     from ..export import Authorship
@@ -79,6 +80,13 @@ def _date(_context: click.Context, _parameter: click.Parameter, text: str | None
     return date
 
 
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    stems = [FILES[each] for each in given["what"] or FILES]
+    further = ("_ref.csv", "_ref.opt", "_in.csv") if given["reference"] else ()
+    return [f"{stem}{ending}" for stem in stems for ending in (".fmu", *further)]
+
+
 @click.command("fmu")
 @deck_option
 @click.option(
@@ -93,7 +101,7 @@ def _date(_context: click.Context, _parameter: click.Parameter, text: str | None
 @sample_time_option
 @spring_option
 @measured_option
-@out_option("out/fmu")
+@out_option("out/fmu", writes=_writes)
 @click.option(
     "--version", type=click.Choice(["2.0", "3.0"]), default="3.0", show_default=True, help="FMI version."
 )

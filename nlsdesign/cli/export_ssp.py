@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from .cosimulate import WIRE_HELP, pairs, read_wire
+from .overwriting import out_file_option
 
 
 @click.command("ssp")
@@ -19,7 +20,7 @@ from .cosimulate import WIRE_HELP, pairs, read_wire
 )
 @click.option("--version", type=click.Choice(["1.0", "2.0"]), default="1.0", show_default=True,
               help="Of the standard.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="File to write.")
+@out_file_option(None, "File to write.")
 def export_ssp(version: str, out: Path, **given: tuple[str, ...]) -> None:
     """Write FMUs and their wires as one SSP archive, which other tools and 'cosimulate --system' run."""
     from ..export import write_ssp

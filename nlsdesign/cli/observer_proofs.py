@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .observer_certificate import CERTIFICATE, given_ranges, range_options, with_statement, write_proved
-from .output import DECK_HELP, measured_option, out_option, spring_option
+from .output import DECK_HELP, measured_option, spring_option
+from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def _roles(plant: FlatModel, options: dict[str, Any]) -> dict[str, str]:
 @deck_option
 @spring_option
 @measured_option
-@out_option("out/observer")
+@out_option("out/observer", writes=(CERTIFICATE,))
 @click.option("--published", is_flag=True, help="States of Austin et al. 2015 instead of the minimal ones.")
 @click.option("--decay", type=float, metavar="PER_SECOND", help="As fast as can be proved by default.")
 @click.option("--condition", type=float, default=100.0, show_default=True, help="Largest condition of P.")
@@ -73,7 +74,7 @@ def certify_continuous_gain(
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
 @spring_option
 @measured_option
-@out_option("out/observer")
+@out_option("out/observer", writes=(CERTIFICATE, *c_names("observer")))
 @click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
 @click.option("--limit", type=float, metavar="DEVIATIONS", help="Of the slow states; that of the adaptive "
               "observer by default.")  # fmt: skip

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -67,34 +64,6 @@ def examples(*lines: str) -> str:
     """
     # Click fills paragraphs anew unless they begin with this mark.
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
-
-
-def out_option(default: str = "out") -> Callable[[F], F]:
-    """Return the option ``--out``.
-
-    Parameters
-    ----------
-    default
-        Folder if none is given.
-    """
-    kind = click.Path(path_type=Path, file_okay=False)
-    text = "Folder for all files that are written."
-    return click.option(
-        "--out", type=kind, default=default, show_default=True, help=text, callback=_can_be_made
-    )
-
-
-def _can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
-    """Refuse, before any work, a folder that could not be written into; it is made with its first file."""
-    try:
-        place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
-    except OSError as error:
-        raise click.BadParameter(f"{folder} cannot be made: {error.strerror}") from None
-    if not place.is_dir():
-        raise click.BadParameter(f"{folder} cannot be made: {place} is a file")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise click.BadParameter(f"{folder} cannot be made: {place} is not writable")
-    return folder
 
 
 spring_option = click.option(

@@ -14,6 +14,7 @@ from ..errors import ValueRangeError, unknown_name
 from ..quantity import typeset_unit
 from .driving_signals import FORMS, read_input_file, read_inputs, read_pairs, size_in
 from .output import deck_option, examples, json_option, show_json, show_table
+from .overwriting import out_file_option
 from .units import Number, split_number
 
 if TYPE_CHECKING:
@@ -25,6 +26,11 @@ _file = click.Path(path_type=Path, dir_okay=False)
 _MOST_ROWS = 2_000_000
 _SHOWN_EVENTS = 5
 _FORWARD = ("inputs", "input_file", "stop", "step", "initial", "values", "signals", "friction", "readings")
+
+
+def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the suffixes of what stands beside the table."""
+    return () if given["record"] else (".svg", ".html")
 
 
 @click.command(
@@ -62,8 +68,7 @@ _FORWARD = ("inputs", "input_file", "stop", "step", "initial", "values", "signal
               help="CSV with measured signals, which drive the model instead.")  # fmt: skip
 @click.option("--mapping", type=_file, default=None,
               help="Of --record: TOML that maps columns to signals.")  # fmt: skip
-@click.option("--out", type=_file, default="out/simulation/run.csv", show_default=True,
-              help="CSV to write; picture and page stand beside it.")  # fmt: skip
+@out_file_option("out/simulation/run.csv", "CSV to write; picture and page stand beside it.", beside=_further)
 @json_option
 @click.pass_context
 def simulate(

@@ -110,7 +110,7 @@ def _beyond(
 ) -> Iterator[LimitReached]:
     for side, limit in ((-1.0, limits[0]), (1.0, limits[1])):
         over = side * (values - limit)
-        outside = np.flatnonzero(over > _ROUNDING * max(1.0, abs(limit))) if math.isfinite(limit) else []
-        if len(outside):
+        outside = np.flatnonzero(over > _ROUNDING * max(1.0, abs(limit)))
+        if math.isfinite(limit) and len(outside):
             furthest = float(values[int(np.argmax(over))])
             yield LimitReached(name, run.units[name], float(run.time[outside[0]]), furthest, limit, meaning)
