@@ -12,6 +12,7 @@ from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
     deck_option,
+    examples,
     json_option,
     measured_option,
     show_json,
@@ -34,7 +35,13 @@ _HEADINGS = {
 }
 
 
-@click.command("angle")
+@click.command(
+    "angle",
+    epilog=examples(
+        "nlsdesign analyse angle --deck austin2015_figure_consistent --to '45 deg' --count 10",
+        "nlsdesign analyse --deck austin2015_figure_consistent --from '-20 deg' --to '20 deg' --json",
+    ),
+)
 @deck_option
 @click.option("--from", "first", type=Number("deg"), default="0 deg", show_default=True, help="First angle.")
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")

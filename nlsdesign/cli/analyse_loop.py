@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ExportError
-from .output import deck_option, json_option, show_json, show_table
+from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
 from .units import Number
 
@@ -78,7 +78,13 @@ class _Evaluation:
         return result
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign analyse loop --deck austin2015_figure_consistent",
+        "nlsdesign analyse loop --deck austin2015_figure_consistent --law scheduled "
+        "--bandwidth '10 Hz' --amplitude '0.5 N*m' --json",
+    )
+)
 @deck_option
 @click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
               help="A PID, or speed by tangent stiffness.")  # fmt: skip

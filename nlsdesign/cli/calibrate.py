@@ -11,7 +11,7 @@ import click
 
 from ..errors import MeasurementError
 from ..writing import write_text
-from .output import deck_option, json_option, show_json, show_table
+from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
 
 if TYPE_CHECKING:
@@ -30,7 +30,12 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return ["joint_numbers.json", "calibration.json"]  # and the deck, whose name is read
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign observer calibrate --deck austin2015_figure_consistent --plan",
+        "nlsdesign observer calibrate --deck my.toml --kind hung_weight --records bench/weights",
+    )
+)
 @deck_option
 @click.option("--kind", "kinds", multiple=True, type=click.Choice(KINDS),
               help="What was done; repeatable, once for each --records.")  # fmt: skip

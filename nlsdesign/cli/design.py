@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import NlsError, ValueRangeError
-from .output import deck_option, json_option, show_json, show_table, spring_option
+from .output import deck_option, examples, json_option, show_json, show_table, spring_option
 from .overwriting import out_option
 from .units import parse_number
 
@@ -25,7 +25,15 @@ _FILES = (
 )
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign design --deck austin2015_figure_consistent --maximum '5 N*m' --angle '53 deg' "
+        "--shape 1 --free spring.cam.contour --free spring.pretension --free spring.rubber.area "
+        "--free spring.rubber.rest_length --limit 'MaximumCamRadius = {radius = \"20 mm\"}'",
+        "nlsdesign design --deck my.toml --task job.toml --out out/my_cam",
+        "nlsdesign design --deck my.toml --target-file curve.csv --goal 'TorqueError = {}' --dry-run",
+    )
+)
 @deck_option
 @click.option(
     "--task", "task_file", type=click.Path(path_type=Path, dir_okay=False), default=None,

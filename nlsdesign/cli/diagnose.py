@@ -14,13 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .exported_machine import MACHINE, export_machine, export_option
-from .output import (
-    deck_option,
-    json_option,
-    measured_option,
-    show_json,
-    spring_option,
-)
+from .output import deck_option, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
 from .units import Number
 
@@ -47,7 +41,12 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return names
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign diagnose --deck my.toml --records bench --out out/diagnosis",
+        "nlsdesign diagnose --deck my.toml --records bench --hold-out 'last*' --regenerate --json",
+    )
+)
 @deck_option
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of CSV files.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")

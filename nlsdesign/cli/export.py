@@ -14,7 +14,7 @@ from .export_fmu import export_fmus
 from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
-from .output import deck_option, measured_option, spring_option
+from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import c_names, out_option
 
 if TYPE_CHECKING:
@@ -41,7 +41,15 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return [*c_names(name), *(f"{name}{ending}" for ending in further), *build]
 
 
-@export.command("c")
+@export.command(
+    "c",
+    epilog=examples(
+        "nlsdesign export c --deck austin2015_figure_consistent",
+        "nlsdesign export c --deck austin2015_figure_consistent --what both --real float --flash 64kB "
+        "--examples",
+        "nlsdesign export c --deck my.toml --what controller --law pid --dry-run",
+    ),
+)
 @deck_option
 @click.option(
     "--what",
@@ -59,8 +67,9 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @real_option
 @flash_options
 @click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")
+@json_option
 def export_code(
-    deck_name: str, what: str, sample_time: float, out: Path, real: str, examples: bool, **chosen: Any
+    deck_name: str, what: str, sample_time: float, out: Path, real: str, as_json: bool, **chosen: Any
 ) -> None:
     """Write the torque observer, the torque controller, or both as one step, as C99 with a self-test.
 
@@ -72,14 +81,13 @@ def export_code(
     from ..model import flatten
 
     plant = flatten(declare(load_deck(deck_name)))
+    with_examples = chosen.pop("examples")
     name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     source = export_c(model, out, real=real, name=name)
     written = [source.header, source.source, source.selftest]
-    if examples:
+    if with_examples:
         written += write_examples(source)
-    for sentence in (model.description, *sentences):
-        click.echo(sentence)
-    click.echo(f"written: {', '.join(str(path) for path in written)}")
+    show_written(as_json, (model.description, *sentences), written, name=name)
 
 
 def sampled_part(

@@ -13,7 +13,7 @@ from ..errors import NlsError
 from .controller import controller_of, law_options
 from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
-from .output import deck_option, measured_option, spring_option
+from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import out_option
 
 if TYPE_CHECKING:
@@ -87,7 +87,13 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return [f"{stem}{ending}" for stem in stems for ending in (".fmu", *further)]
 
 
-@click.command("fmu")
+@click.command(
+    "fmu",
+    epilog=examples(
+        "nlsdesign export fmu --deck austin2015_figure_consistent --what plant",
+        "nlsdesign export fmu --deck austin2015_figure_consistent --platform all --version 2.0 --licence MIT",
+    ),
+)
 @deck_option
 @click.option(
     "--what",
@@ -120,12 +126,14 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     callback=_date,
     help="Of the export, as 2026-03-04T12:00:00Z; by default SOURCE_DATE_EPOCH or now.",
 )
+@json_option
 def export_fmus(
     deck_name: str,
     sample_time: float,
     out: Path,
     what: tuple[str, ...],
     platforms: tuple[str, ...],
+    as_json: bool,
     **others: Any,
 ) -> None:
     """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
@@ -151,8 +159,8 @@ def export_fmus(
         written += [
             file for name in models for file in write_reference(models[name], out / f"{FILES[name]}.fmu")
         ]
-    click.echo(f"written: {', '.join(str(path) for path in written)}")
-    for name, reason in reasons.items():
+    show_written(as_json, (), written, left_out=reasons)
+    for name, reason in {} if as_json else reasons.items():
         click.echo(f"left out: {name}: {reason}")
 
 

@@ -13,6 +13,7 @@ from .exported_machine import MACHINE, ExportedMachine, export_machine, export_o
 from .observer import sample_time_option
 from .output import (
     deck_option,
+    examples,
     json_option,
     measured_option,
     show_json,
@@ -33,7 +34,12 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return names
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign fit --deck my.toml --records bench --out out/fit",
+        "nlsdesign fit --deck my.toml --records bench --hold-out 'last*' --window '1 s' --json",
+    )
+)
 @deck_option
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")

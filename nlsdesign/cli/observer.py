@@ -10,16 +10,23 @@ import click
 
 from .observer_certificate import CERTIFICATE, range_options
 from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
-from .output import DECK_HELP, json_option, measured_option, show_json, spring_option
+from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
     from .observer_certificate import ToProve
 
-sample_time_option = click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
+sample_time_option = click.option(
+    "--sample-time", type=Number("ms"), default="1 ms", show_default=True,
+    help="Of what is computed in steps.",
+)  # fmt: skip
 real_option = click.option(
-    "--real", type=click.Choice(["double", "float"]), default="double", show_default=True
+    "--real",
+    type=click.Choice(["double", "float"]),
+    default="double",
+    show_default=True,
+    help="Type of the numbers in C.",
 )
 
 
@@ -30,7 +37,14 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     return [*proved, *c_names("observer"), *compared]
 
 
-@click.group(invoke_without_command=True)
+@click.group(
+    invoke_without_command=True,
+    epilog=examples(
+        "nlsdesign observer --deck austin2015_figure_consistent",
+        "nlsdesign observer --deck austin2015_figure_consistent --kind cascade --real float --json",
+        "nlsdesign observer --deck austin2015_figure_consistent --errors --draws 32",
+    ),
+)
 @click.pass_context
 @click.option("--deck", "deck_name", metavar="DECK", help=DECK_HELP)
 @sample_time_option

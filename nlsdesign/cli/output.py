@@ -54,6 +54,28 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
+def show_written(as_json: bool, sentences: Sequence[str], files: Sequence[Path], **more: Any) -> None:
+    """Print what was written, after sentences on it; or all of it as JSON.
+
+    Parameters
+    ----------
+    as_json
+        Whether JSON is printed.
+    sentences
+        What there is to know of the files.
+    files
+        That were written.
+    **more
+        Further content of the JSON.
+    """
+    if as_json:
+        show_json({"sentences": list(sentences), **more, "files": list(files)})
+        return
+    for sentence in sentences:
+        click.echo(sentence)
+    click.echo(f"written: {', '.join(map(str, files))}")
+
+
 def examples(*lines: str) -> str:
     """Return the epilog of a help text that shows commands, each on its line.
 
@@ -63,7 +85,23 @@ def examples(*lines: str) -> str:
         Whole commands, as they are typed.
     """
     # Click fills paragraphs anew unless they begin with this mark.
-    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
+    return "\b\nExamples:\n" + "\n".join(_continued(line) for line in lines)
+
+
+_LINE = 78
+"""Columns of a command in a help text."""
+
+
+def _continued(line: str) -> str:
+    """Return a command on lines that fit, each but the last with a mark that the shell reads on."""
+    first, *others = line.split(" --")
+    rows = [first]
+    for added in (f" --{part}" for part in others):
+        if len(rows[-1]) + len(added) > _LINE - 4:
+            rows.append(f"     {added}")
+        else:
+            rows[-1] += added
+    return "  " + " \\\n".join(rows)
 
 
 spring_option = click.option(

@@ -18,7 +18,7 @@ from ..locations import bundled, folder
 from ..quantity import with_unit
 from ..writing import make_folder
 from ..written_files import listed_files
-from .output import json_option, show_json, show_table
+from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
 
 
@@ -170,14 +170,24 @@ def study() -> None:
     """List and run design studies."""
 
 
-@study.command("list")
-def list_studies() -> None:
+@study.command("list", epilog=examples("nlsdesign study list", "nlsdesign study list --json"))
+@json_option
+def list_studies(as_json: bool) -> None:
     """List the studies that come with the project."""
     rows = [(name, (load_study(name).__doc__ or "").strip().splitlines()[0]) for name in study_names()]
+    if as_json:
+        show_json(dict(rows))
+        return
     show_table("Studies", ("name", "what it shows"), rows)
 
 
-@study.command()
+@study.command(
+    epilog=examples(
+        "nlsdesign study run hello",
+        "nlsdesign study run austin2015 --fast --out out/first_look",
+        "nlsdesign study run my_study.py --json",
+    )
+)
 @click.argument("name")
 @click.option(
     "--out",
