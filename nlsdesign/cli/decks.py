@@ -13,6 +13,7 @@ from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
 from .output import examples, json_option, show_json, show_table
+from .overwriting import out_file_option
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -25,10 +26,15 @@ def deck() -> None:
     """Check and show decks: every number with value, unit, source and spread."""
 
 
-@deck.command("list")
-def list_decks() -> None:
+@deck.command("list", epilog=examples("nlsdesign deck list", "nlsdesign deck list --json"))
+@json_option
+def list_decks(as_json: bool) -> None:
     """List the decks that come with the project."""
-    show_table("Decks", ("name", "description"), [(n, load_deck(n).description) for n in deck_names()])
+    rows = [(n, load_deck(n).description) for n in deck_names()]
+    if as_json:
+        show_json(dict(rows))
+        return
+    show_table("Decks", ("name", "description"), rows)
 
 
 @deck.command(
@@ -67,7 +73,9 @@ def _model_problems(assembly: Assembly) -> list[NlsError]:
     return []
 
 
-@deck.command()
+@deck.command(
+    epilog=examples("nlsdesign deck show austin2015_figure_consistent", "nlsdesign deck show my.toml --json")
+)
 @click.argument("deck_name", metavar="DECK")
 @json_option
 def show(deck_name: str, as_json: bool) -> None:
@@ -91,17 +99,22 @@ def show(deck_name: str, as_json: bool) -> None:
     show_table("Numbers", ("name", "value", "spread", "source"), rows)
 
 
-@deck.command("from-rig")
+@deck.command("from-rig", epilog=examples("nlsdesign deck from-rig rig.toml cam.csv --out my_rig.toml"))
 @click.argument("rig_toml", metavar="RIG.TOML", type=_file)
 @click.argument("cam_csv", metavar="CAM.CSV", type=_file)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
-def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
+@out_file_option(None, "Deck to write.")
+@json_option
+def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
     from ..components.assembly.deck_writer import write_deck
 
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
     write_deck(assembly, out)
-    click.echo(f"written: {out}, {len(assembly.quantities())} numbers; next: nlsdesign diagnose --deck {out}")
+    numbers = len(assembly.quantities())
+    if as_json:
+        show_json({"file": out, "numbers": numbers})
+        return
+    click.echo(f"written: {out}, {numbers} numbers; next: nlsdesign diagnose --deck {out}")
 
 
 def _short(given: Quantity) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .output import DECK_HELP, json_option, show_json, show_table
+from .output import DECK_HELP, examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
     from .exported_files import ExportedFile
@@ -18,7 +18,13 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
 """Exit status."""
 
 
-@click.command("check")
+@click.command(
+    "check",
+    epilog=examples(
+        "nlsdesign export check out/fmu",
+        "nlsdesign export check out/c --deck austin2015_figure_consistent --json",
+    ),
+)
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @json_option
