@@ -12,6 +12,8 @@ from ..deck import deck_names, load_deck
 from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
+from ..writing import write_text
+from .deck_new import force_option, new, refuse_to_replace
 from .output import examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
@@ -22,13 +24,45 @@ _file = click.Path(path_type=Path, dir_okay=False, exists=True)
 
 @click.group()
 def deck() -> None:
-    """Check and show decks: every number with value, unit, source and spread."""
+    """Begin, copy, check and show decks: every number with value, unit, source and spread."""
 
 
-@deck.command("list")
-def list_decks() -> None:
-    """List the decks that come with the project."""
-    show_table("Decks", ("name", "description"), [(n, load_deck(n).description) for n in deck_names()])
+deck.add_command(new)
+
+
+@deck.command("list", epilog=examples("nlsdesign deck list", "nlsdesign deck list --json"))
+@json_option
+def list_decks(as_json: bool) -> None:
+    """List the decks that come with the project, and the templates of `deck new`."""
+    from ..components.assembly.deck_template import load_template, template_names
+
+    decks = {name: load_deck(name) for name in deck_names()}
+    templates = {name: load_template(name) for name in template_names()}
+    if as_json:
+        show_json({
+            "decks": {n: {"description": d.description, "file": d.path} for n, d in decks.items()},
+            "templates": {
+                n: {"description": t.deck.description, "ready_for": t.ready_for} for n, t in templates.items()
+            },
+        })  # fmt: skip
+        return
+    show_table("Decks", ("name", "description"), [(n, d.description) for n, d in decks.items()])
+    rows = [(n, t.deck.description) for n, t in templates.items()]
+    show_table("Templates, for nlsdesign deck new --template", ("name", "description"), rows)
+
+
+@deck.command("copy", epilog=examples("nlsdesign deck copy austin2015_figure_consistent leg.toml"))
+@click.argument("deck_name", metavar="DECK")
+@click.argument("out", metavar="OUT.TOML", type=click.Path(path_type=Path, dir_okay=False))
+@force_option
+def copy_deck(deck_name: str, out: Path, force: bool) -> None:
+    """Copy a deck, such as one that comes with the project, into a file of one's own, with its comments."""
+    read = load_deck(deck_name)
+    if out.suffix != ".toml":
+        raise click.BadParameter(f"'{out}' does not end with .toml", param_hint="OUT.TOML")
+    refuse_to_replace(out, force)
+    write_text(out, read.path.read_text(encoding="utf-8-sig"))
+    click.echo(f"written: {out}; next: nlsdesign deck check {out}")
 
 
 @deck.command(
@@ -67,11 +101,17 @@ def _model_problems(assembly: Assembly) -> list[NlsError]:
     return []
 
 
-@deck.command()
+@deck.command(epilog=examples("nlsdesign deck show my.toml", "nlsdesign deck show my.toml --toml"))
 @click.argument("deck_name", metavar="DECK")
+@click.option("--toml", "as_toml", is_flag=True, help="Print the file as it stands, with its comments.")
 @json_option
-def show(deck_name: str, as_json: bool) -> None:
+def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
     """Draw the parts and list the numbers."""
+    if as_toml:
+        if as_json:
+            raise click.UsageError("--toml and --json exclude each other; give one")
+        click.echo(load_deck(deck_name).path.read_text(encoding="utf-8-sig"), nl=False)
+        return
     from ..components.assembly.deck_writer import declare
 
     assembly = declare(load_deck(deck_name))
