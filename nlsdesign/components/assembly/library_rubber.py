@@ -11,7 +11,7 @@ from ...errors import DeckError, NlsError
 from ..materials.library import material
 from ..materials.material_law import MaterialLaw, law_of
 from ..materials.relaxing_rubber import relaxing_law_of
-from ..materials.specimen import Area, Specimen
+from ..materials.specimen import Specimen, specimen
 from .part_text import part_lines
 
 MATERIAL, USING, LOSS = FIELDS = ("material", "using", "loss_tangent")
@@ -74,8 +74,7 @@ def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
 
 def _tables(law: MaterialLaw) -> dict[str, Any]:
     """Return the fields and tables of a piece of that rubber, as a deck would have them, without its sizes."""
-    sizes = Area(1e-4)  # type: ignore[arg-type]
-    piece = Specimen(rest_length=0.01, section=sizes, members=law.members, strength=law.strength)  # type: ignore[arg-type]
+    piece = specimen(rest_length=0.01, area=1e-4, strength=law.strength, **dict(law.members))
     tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
     return {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
 
@@ -84,11 +83,11 @@ def _merged(known: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of the library with what stands in the deck put over them."""
     result = {**known, **own}
     for key in own.keys() & known.keys():
-        both = known[key], own[key]
-        if isinstance(both[0], dict) and "component" in both[0] and isinstance(both[1], dict):
-            # Another component is another law, not other numbers of this one.
-            if both[1].get("component", both[0]["component"]) == both[0]["component"]:
-                result[key] = _merged(*both)
+        law, other = known[key], own[key]
+        is_law = isinstance(law, dict) and "component" in law and isinstance(other, dict)
+        # Another component is another law, not other numbers of this one.
+        if is_law and other.get("component", law["component"]) == law["component"]:
+            result[key] = _merged(law, other)
     return result
 
 
