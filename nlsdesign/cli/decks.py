@@ -18,6 +18,7 @@ from .output import examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
+    from .readiness import Readiness
 
 _file = click.Path(path_type=Path, dir_okay=False, exists=True)
 
@@ -73,8 +74,15 @@ def copy_deck(deck_name: str, out: Path, force: bool) -> None:
 @click.argument("deck_name", metavar="DECK")
 @json_option
 def check(deck_name: str, as_json: bool) -> None:
-    """Name every problem with line and column, and the share of numbers that are only assumed."""
-    from ..components.assembly.deck_writer import deck_problems, declare
+    """Name every problem with line and column, likely slips, and the commands that the deck is ready for.
+
+    Exit status 2 if the deck has a problem; a command that it is not ready for, or a warning, is none.
+    """
+
+    from ..components.assembly.deck_remarks import deck_remarks
+    from ..components.assembly.deck_writer import deck_digest, deck_problems, declare
+    from .range_remarks import range_remarks
+    from .readiness import readiness
 
     read = load_deck(deck_name)
     problems = deck_problems(read) or _model_problems(declare(read))
@@ -82,12 +90,36 @@ def check(deck_name: str, as_json: bool) -> None:
         for problem in problems:
             click.echo(f"error: {problem}", err=True)
         sys.exit(2)
-    shares = sources(declare(read).quantities())
+    machine = declare(read)
+    shares, commands = sources(machine.quantities()), readiness(machine)
+    remarks = [*deck_remarks(machine), *range_remarks(machine)]
     if as_json:
-        show_json({"deck": read.name, "numbers": len(declare(read).quantities()), **shares})
+        show_json({
+            "deck": read.name, "digest": deck_digest(machine), "numbers": len(machine.quantities()), **shares,
+            "warnings": remarks,
+            "commands": {
+                each.command: {"ready": each.ready, "reason": str(each.reason) if each.reason else None}
+                for each in commands
+            },
+        })  # fmt: skip
         return
-    click.echo(f"{read.path.name}: no problem in {len(declare(read).quantities())} numbers, "
+    click.echo(f"{read.path.name}: no problem in {len(machine.quantities())} numbers, "
                f"{100 * shares['assumed']:.0f} % of them only assumed")  # fmt: skip
+    for remark in remarks:
+        click.echo(f"warning: {remark}")
+    _show_readiness(commands)
+
+
+def _show_readiness(commands: list[Readiness]) -> None:
+    ready = [each.command + (f" (with {each.needs})" if each.needs else "") for each in commands if each.ready]
+    click.echo(f"ready for: {', '.join(ready) or 'no command'}")
+    reasons: dict[str, list[str]] = {}
+    for each in commands:
+        if not each.ready:
+            reasons.setdefault(str(each.reason), []).append(each.command)
+    if reasons:
+        rows = [(", ".join(names), reason) for reason, names in reasons.items()]
+        show_table("Not ready for", ("command", "why, and what to do"), rows)
 
 
 def _model_problems(assembly: Assembly) -> list[NlsError]:
