@@ -14,6 +14,7 @@ from .sensor_ranking import (
     SensorRanking,
     rank_sensors,
 )
+from .stated_ranges import RangeAtRest, ranges_at_rest
 from .stability import Stability, least_damped, sampled_poles
 from .sweep import Chart, Columns, PointView, View, over_angle
 
@@ -26,6 +27,7 @@ __all__ = [
     "Observability",
     "PlantMode",
     "PointView",
+    "RangeAtRest",
     "RankDrop",
     "RankDrops",
     "RankingAssumptions",
@@ -42,6 +44,7 @@ __all__ = [
     "over_angle",
     "rank_drops",
     "rank_sensors",
+    "ranges_at_rest",
     "rest_points",
     "sampled_poles",
 ]

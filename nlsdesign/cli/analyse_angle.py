@@ -63,17 +63,11 @@ def analyse_angle(
     from ..deck import load_deck
     from ..figures import observability_over_angle, stability_over_angle, write_figures
     from ..model import flatten
-    from ..model.roles import measured_motion, series_spring
+    from ..model.roles import series_spring
     from ..model.transform import with_outputs
 
     model = flatten(declare(load_deck(deck_name)))
-    torque, measured = series_spring(model, roles["spring"]).effort, measured_motion(model, roles["measured"])
-    unit = model.variable(measured).unit
-    if unit != "rad":
-        raise UnitError(
-            f"'{measured}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
-            next_step="name the angle of a body that turns, with --measured",
-        )  # fmt: skip
+    torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     if not last > first:
         raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
     angles = np.linspace(first, last, count)
@@ -102,6 +96,33 @@ def analyse_angle(
     else:
         click.echo(f"sensors are not ranked: {unranked}")
     click.echo(f"written: {', '.join(map(str, files))}")
+
+
+def swept_angle(model: FlatModel, measured: str | None) -> str:
+    """Return the angle that an analysis goes over.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    measured
+        Name of the state; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnitError
+        If it is no angle.
+    """
+    from ..model.roles import measured_motion
+
+    name = measured_motion(model, measured)
+    unit = model.variable(name).unit
+    if unit != "rad":
+        raise UnitError(
+            f"'{name}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
+            next_step="name the angle of a body that turns, with --measured",
+        )  # fmt: skip
+    return name
 
 
 def _ranking(model: FlatModel, angles: Any, measured: str, torque: str) -> tuple[SensorRanking | None, str]:

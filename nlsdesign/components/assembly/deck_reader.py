@@ -24,6 +24,7 @@ from ..mechanics.bodies import Body, Free
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
+from .library_rubber import FIELDS, takes_material, with_library_rubber
 from .renamed import NUMBERS, renamed
 
 _PARENT_FIELDS = ("name", "digest", "change", "parent")
@@ -75,6 +76,12 @@ class Builder:
         """
         before = len(self.problems)
         kind = self._kind(path, table)
+        if kind is not None and takes_material(kind) and any(key in table for key in FIELDS):
+            try:
+                table = with_library_rubber(self.deck, path, table)
+            except NlsError as error:
+                self.problems.append(error)
+                return None
         inner = {key: raw for key, raw in table.items() if _is_part(raw)}
         children = {key: self.part(f"{path}.{key}", raw) for key, raw in inner.items()}
         if kind is None:
