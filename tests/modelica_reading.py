@@ -33,7 +33,7 @@ class ReadModel:
     ) -> dict[str, float]:
         """Every unknown by its name; the vectors in the order of the text."""
         z = np.zeros(len(self.unknowns))
-        for _ in range(len(z) + 1):
+        for _ in range(len(z) + 4):  # the last rounds remove rounding
             before = z.copy()
             z[self.order] -= np.array(self.residual(time, state, inputs, parameters, z)).ravel()
             # Before its operands are known a value may not be finite; it is computed again.
@@ -58,8 +58,14 @@ def _compiled(text: str) -> Any:
     from pymoca.backends.casadi import generator
 
     (name,) = re.findall(r"^model (\w+)", text, re.MULTILINE)
-    # What pymoca lacks: the division of newer CasADi, and two functions of the language.
-    lacking = {"noEvent": lambda value: value, "atan2": lambda y, x: ca.atan2(y, x)}
+    # What pymoca lacks: the division of newer CasADi, and some functions of the language.
+    lacking = {
+        "noEvent": lambda value: value,
+        "asin": lambda x: ca.asin(x),
+        "acos": lambda x: ca.acos(x),
+        "atan": lambda x: ca.atan(x),
+        "atan2": lambda y, x: ca.atan2(y, x),
+    }
     with mock.patch.dict(generator.OP_MAP, {"/": "__truediv__"}):
         for function, meaning in lacking.items():
             setattr(ca.MX, function, meaning)

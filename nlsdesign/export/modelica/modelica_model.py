@@ -101,8 +101,8 @@ def _refuse(model: FlatModel) -> None:
         raise ExportError(
             f"model '{model.name}': '{model.switching.jumps[0]}'",
             "is sharp, and its sticking and impacts have no plain Modelica text",
-            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as FMU, "
-            "which holds the sharp form",
+            next_step="export the smooth form (--smooth, or flatten(smoothed(assembly))), or the plant as "
+            "FMU, which holds the sharp form",
         )
 
 
@@ -116,9 +116,7 @@ def _head(model: FlatModel) -> list[str]:
     ]
 
 
-def _declarations(
-    model: FlatModel, names: Mapping[str, str], equations: ModelicaEquations
-) -> Iterator[str]:
+def _declarations(model: FlatModel, names: Mapping[str, str], equations: ModelicaEquations) -> Iterator[str]:
     outputs, written = {v.name for v in model.outputs}, set[str]()
     groups = (
         ("parameter Real", model.parameters), ("input Real", model.inputs), ("Real", model.states),

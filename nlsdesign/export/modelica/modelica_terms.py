@@ -74,9 +74,7 @@ class Term:
         """Return the negation of a truth value."""
         truth = self.as_truth()
         text, strength = truth.opposite or ("", ATOM)
-        return replace(
-            truth, text=text, strength=strength, opposite=(truth.text, truth.strength), number=""
-        )
+        return replace(truth, text=text, strength=strength, opposite=(truth.text, truth.strength), number="")
 
 
 def kept(name: str, value: Term) -> Term:
@@ -183,15 +181,23 @@ def term(operation: int, operands: Sequence[Term]) -> Term:
     if operation == ca.OP_ADD and (whole := _whole_choice(*numbers)):
         return Term(whole, CHOICE, events=True, size=size)
     if operation in _FUNCTIONS:
-        return Term(f"{_FUNCTIONS[operation]}({', '.join(n.text for n in numbers)})", events=events, size=size)
+        return Term(
+            f"{_FUNCTIONS[operation]}({', '.join(n.text for n in numbers)})", events=events, size=size
+        )
     if operation not in _ARITHMETIC:
         raise ExportError(
-            f"operation {operation} of CasADi",
+            f"the function '{_name(operation)}' in the equations",
             "has no counterpart in Modelica",
             next_step="export an FMU, which Modelica tools import: nlsdesign export fmu",
         )
     text, strength = _ARITHMETIC[operation](*numbers)
     return Term(text, strength, events=events or operation in SERIES, size=size)
+
+
+def _name(operation: int) -> str:
+    """Return what CasADi calls an operation."""
+    known = (name for name in vars(ca) if name.startswith("OP_") and getattr(ca, name) == operation)
+    return next(known, f"number {operation}").removeprefix("OP_").lower()
 
 
 def _joined(operation: int, operands: Sequence[Term]) -> Term:

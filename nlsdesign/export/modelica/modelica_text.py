@@ -90,7 +90,10 @@ def string(text: str) -> str:
     text
         Any text; line breaks become spaces.
     """
-    return '"' + " ".join(text.split()).replace("\\", "\\\\").replace('"', '\\"') + '"'
+    flat = " ".join(text.split())
+    # A last backslash is followed by a space, as not every tool sees that it is escaped itself.
+    flat += " " if flat.endswith("\\") else ""
+    return '"' + flat.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def modelica_unit(unit: str) -> str:
