@@ -78,7 +78,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"jobs"}),
     "observer": ({"scheduling"}, {"certificates", "adaptive"}, {"spread"}),
     "control": ({"laws"}, {"loop"}, {"evaluation"}, {"tuning"}),
-    "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "target"}, {"ssp"}),
+    "export": ({"files"}, {"c"}, {"compilation"}, {"fmi", "cosimulation", "target", "modelica"}, {"ssp"}),
 }  # fmt: skip
 
 # library: the only places that may know it

@@ -1,4 +1,4 @@
-"""``nlsdesign export``: C code and FMUs."""
+"""``nlsdesign export``: C code, FMUs and Modelica text."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import click
 from .controller import controller_of, export_controller, law_options
 from .export_check import check_exports
 from .export_fmu import export_fmus
+from .export_modelica import export_modelica_text
 from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
@@ -25,11 +26,12 @@ OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 @click.group()
 def export() -> None:
-    """Write C code or FMUs."""
+    """Write C code, FMUs or Modelica text."""
 
 
 export.add_command(export_controller)
 export.add_command(export_fmus)
+export.add_command(export_modelica_text)
 export.add_command(check_exports)
 
 
