@@ -22,6 +22,7 @@ _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
 _MOST_LEVELS = 64
 """Names within names; the deepest deck of the project has seven."""
 _TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
+_MOST_BYTES = 2**24
 _MOST_DIGITS = 1000
 _TOO_MANY_DIGITS = re.compile(rf"[0-9A-Fa-f_]{{{_MOST_DIGITS}}}")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
@@ -235,13 +236,21 @@ def load_deck(name: str | Path) -> Deck:
     if not path.exists():
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
+    return read_deck(_text(path), path)
+
+
+def _text(path: Path) -> str:
     try:
+        if not path.is_file():
+            raise DeckError(str(path), "is no file", next_step="give a text file in UTF-8")
+        if path.stat().st_size > _MOST_BYTES:
+            rule = f"has {path.stat().st_size} bytes; a deck has at most {_MOST_BYTES}"
+            raise DeckError(str(path), rule, next_step="give a text file in TOML")
         # An editor may have put a byte order mark in front.
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        rule = f"cannot be read: {error}"
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:  # ValueError: no text in UTF-8, or no possible name of a file
+        rule = f"cannot be read: {getattr(error, 'strerror', None) or error}"
         raise DeckError(str(path), rule, next_step="give a text file in UTF-8") from None
-    return read_deck(text, path)
 
 
 def read_deck(text: str, path: Path) -> Deck:

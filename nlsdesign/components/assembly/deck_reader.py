@@ -186,7 +186,7 @@ class Builder:
         if "domain" not in table or "domain" not in self._keys(path, kind):
             return None
         known = {domain.name: domain for domain in kind.domains()}
-        if table["domain"] not in known:
+        if not isinstance(table["domain"], str) or table["domain"] not in known:
             rule = f"is {brief(table['domain'])}, not a domain of {kind.__name__}"
             self.problem(f"{path}.domain", rule, next_step=f"write one of: {', '.join(known)}")
             return None
