@@ -187,7 +187,9 @@ class Deck:
             raise DeckError(where, f"has a number of more than {_MOST_DIGITS} digits")
         for key in ("unit", "source"):
             if not isinstance(raw[key], str) or not raw[key].strip():
-                raise DeckError(where, f"{key} {brief(raw[key])} is not a text", next_step=f'write {key} = "..."')
+                raise DeckError(
+                    where, f"{key} {brief(raw[key])} is not a text", next_step=f'write {key} = "..."'
+                )
         try:
             factor = parse_unit(raw["unit"]).factor
             scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)

@@ -30,8 +30,20 @@ from .studies import study
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(version(), prog_name="nlsdesign")
-def program() -> None:
+@click.option(
+    "--with",
+    "packages",
+    multiple=True,
+    metavar="PACKAGE",
+    help="Package or .py file with parts, effects and rubbers of your own; before the command; repeatable.",
+)
+@click.pass_context
+def program(context: click.Context, packages: tuple[str, ...]) -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
+    if packages:
+        from ..extensions import extended_by, load_extension
+
+        context.with_resource(extended_by(*(load_extension(name) for name in packages)))
 
 
 export.add_command(export_ssp)

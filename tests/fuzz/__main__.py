@@ -16,7 +16,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from . import family_of, family_names
+from . import family_names, family_of
 from .cases import Outcome
 from .running import made_by, outcomes, shrunk
 

@@ -115,7 +115,9 @@ class Records:
         self._model = flatten(declare(load_deck("test_rig")))
         time = np.arange(ROWS) * 0.004
         angle = 0.7 * np.sin(5.0 * time)
-        self._columns = dict(zip(_HEADS, (time, angle, 2.0 * np.cos(5.0 * time), 40.0 * angle**2), strict=True))
+        self._columns = dict(
+            zip(_HEADS, (time, angle, 2.0 * np.cos(5.0 * time), 40.0 * angle**2), strict=True)
+        )
         self._csv = "\n".join([",".join(_HEADS), *(",".join(f"{v:.6g}" for v in row)
                                for row in np.column_stack(list(self._columns.values())))]) + "\n"  # fmt: skip
         self._binary = {".parquet": _parquet(self._columns), ".mat": _mat(self._columns),
@@ -210,7 +212,9 @@ def _text(chance: random.Random, text: str) -> bytes:
     if kind == 3:
         depth = chance.choice((10, 1000, 20000))
         deep = f"{'[' * depth}{']' * depth}"
-        return f"{text}\nx = {deep}\n".encode() if "=" in text else re.sub(r"\d", deep, text, count=1).encode()
+        return (
+            f"{text}\nx = {deep}\n".encode() if "=" in text else re.sub(r"\d", deep, text, count=1).encode()
+        )
     return damaged_tokens(chance, text).encode("utf-8", "surrogatepass")
 
 
@@ -254,7 +258,9 @@ def odd_csv(chance: random.Random, text: str) -> bytes:
     if kind == 8:
         return f"{head}\n{'9' * 200_000},1,2,3\n".encode() + "\n".join(rows).encode()
     if kind == 9:
-        return text.replace(chance.choice(_HEADS), chance.choice((*_HEADS, "", '"', "x" * 500, "θ [°]", "t [ms]"))).encode()
+        return text.replace(
+            chance.choice(_HEADS), chance.choice((*_HEADS, "", '"', "x" * 500, "θ [°]", "t [ms]"))
+        ).encode()
     if kind == 10:
         return f'{head}\n"{chance.choice(rows)}\n'.encode() + "\n".join(rows).encode()
     if kind == 11:

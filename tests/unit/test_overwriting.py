@@ -10,6 +10,7 @@ import pytest
 
 from nlsdesign.cli import overwriting
 from nlsdesign.errors import ExportError
+from nlsdesign.writing import write_table, write_text
 from nlsdesign.written_files import (
     LIST_NAME,
     discard,
@@ -18,7 +19,6 @@ from nlsdesign.written_files import (
     listed_files,
     refuse_to_lose,
 )
-from nlsdesign.writing import write_table, write_text
 from tests.command_line import Run, run
 
 __all__ = ["run"]

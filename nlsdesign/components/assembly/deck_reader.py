@@ -8,12 +8,13 @@ import importlib
 import inspect
 import pkgutil
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
 from ...deck import NUMBER_FIELDS, Deck, ParentDeck
-from ...errors import DeckError, NlsError, brief, nearest, unknown_name
+from ...errors import ArrangementError, DeckError, NlsError, brief, nearest, unknown_name
+from ...extensions import extension_modules
 from ...quantity import Quantity
 from ..core.domain import Domain
 from ..core.element import Combination, Element
@@ -39,15 +40,31 @@ def _modules() -> tuple[ModuleType, ...]:
 
 
 def component_classes() -> dict[str, type[Part]]:
-    """Return the components that a deck can name, by name: all public parts that are not abstract."""
+    """Return the components that a deck can name, by name: all public parts that are not abstract.
+
+    Those of packages that the present block is extended by are among them.
+
+    Raises
+    ------
+    ArrangementError
+        If two of them have one name.
+    """
+    own, brought = _parts_in(_modules()), _parts_in(extension_modules())
+    for name, kind in brought.items():
+        if own.setdefault(name, kind) is not kind:
+            rule = f"has the name of a component of {own[name].__module__}"
+            raise ArrangementError(f"{kind.__module__}.{name}", rule, next_step="give it another name")
+    return {name: own[name] for name in sorted(own) if not inspect.isabstract(own[name])}
+
+
+def _parts_in(modules: Sequence[ModuleType]) -> dict[str, type[Part]]:
     kinds = (
         kind
-        for module in _modules()
+        for module in modules
         for name, kind in vars(module).items()
         if inspect.isclass(kind) and kind.__module__ == module.__name__ and name[0] != "_"
     )
-    parts = {c.__name__: c for c in kinds if issubclass(c, Part) and c not in (Part, Tie)}
-    return {name: parts[name] for name in sorted(parts) if not inspect.isabstract(parts[name])}
+    return {c.__name__: c for c in kinds if issubclass(c, Part) and c not in (Part, Tie)}
 
 
 class Builder:
@@ -306,7 +323,9 @@ def _parent(builder: Builder, path: str, raw: object) -> ParentDeck | None:
         return None
     before = len(builder.problems)
     if not isinstance(raw, dict):
-        builder.problem(path, f"is {brief(raw)}, not a deck", next_step='write {name = "...", digest = "..."}')
+        builder.problem(
+            path, f"is {brief(raw)}, not a deck", next_step='write {name = "...", digest = "..."}'
+        )
         return None
     for key in raw:
         if key not in _PARENT_FIELDS:
