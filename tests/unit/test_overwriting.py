@@ -10,6 +10,7 @@ import pytest
 
 from nlsdesign.cli import overwriting
 from nlsdesign.errors import ExportError
+from nlsdesign.writing import write_table, write_text
 from nlsdesign.written_files import (
     LIST_NAME,
     discard,
@@ -18,7 +19,6 @@ from nlsdesign.written_files import (
     listed_files,
     refuse_to_lose,
 )
-from nlsdesign.writing import write_table, write_text
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -143,7 +143,8 @@ def test_a_command_repeats_itself_without_a_question_and_refuses_to_lose_an_edit
 def test_a_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
     calls = (CALL, ("design", "--deck", DECK), ("export", "c", "--deck", DECK, "--what", "both"),
              ("export", "fmu", "--deck", DECK), ("diagnose", "--deck", DECK, "--records", "r", "--export"),
-             ("study", "run", "hello"), ("observer", "--deck", DECK), ("fit", "--deck", DECK, "--records", "r"))  # fmt: skip
+             ("study", "run", "hello"), ("observer", "--deck", DECK),
+             ("fit", "--deck", DECK, "--records", "r"))  # fmt: skip
     listed = {}
     for words in calls:
         status, out, err = run(*words, "--dry-run")
