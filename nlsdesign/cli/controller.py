@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from .output import deck_option, out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -94,7 +95,8 @@ def export_controller(
     from ..export import export_c, export_fmu
     from ..model import flatten
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
     model = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
@@ -104,3 +106,4 @@ def export_controller(
     click.echo(str(model))
     click.echo(f"largest torque that the drive can hold: {most:.4g} N·m")
     click.echo(f"written: {', '.join(str(path) for path in written)}")
+    warn(range_remarks(declared))

@@ -11,6 +11,7 @@ import click
 
 from ..errors import NlsError, ValueRangeError
 from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
+from .range_remarks import range_remarks, warn
 from .units import parse_number
 
 if TYPE_CHECKING:
@@ -79,8 +80,11 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     if designed.met:
         with steps.step("drawings"):
             files += _drawn(designed, job, deck_name, out, remarks)
+    # The deck that is written, over the angles that were asked for.
+    ranges = range_remarks(designed.actuator, first=0.0, last=designed.target.last_angle)
+    warn(ranges)
     if as_json:
-        show_json({**_numbers(designed), "remarks": remarks, "files": files})
+        show_json({**_numbers(designed), "remarks": remarks, "warnings": ranges, "files": files})
     else:
         _show(designed, files)
         for remark in remarks:

@@ -15,6 +15,7 @@ from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
 from .output import deck_option, measured_option, out_option, spring_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -62,7 +63,8 @@ def export_code(
     from ..export import export_c, write_examples
     from ..model import flatten
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
     name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     source = export_c(model, out, real=real, name=name)
     written = [source.header, source.source, source.selftest]
@@ -70,6 +72,7 @@ def export_code(
         written += write_examples(source)
     for sentence in (model.description, *sentences):
         click.echo(sentence)
+    warn(range_remarks(declared, measured=chosen["measured"]))
     click.echo(f"written: {', '.join(str(path) for path in written)}")
 
 

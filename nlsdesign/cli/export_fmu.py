@@ -14,6 +14,7 @@ from .controller import controller_of, law_options
 from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, measured_option, out_option, spring_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..export import Authorship
@@ -128,7 +129,8 @@ def export_fmus(
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-    made = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen, law)
+    declared = declare(load_deck(deck_name))
+    made = _Models(flatten(declared), sample_time, chosen, law)
     # Before anything is written: not every system has an observer.
     if what:
         models = {each: made[each] for each in dict.fromkeys(what)}
@@ -146,6 +148,7 @@ def export_fmus(
     click.echo(f"written: {', '.join(str(path) for path in written)}")
     for name, reason in reasons.items():
         click.echo(f"left out: {name}: {reason}")
+    warn(range_remarks(declared, measured=chosen["measured"]))
 
 
 def _systems(platforms: Sequence[str]) -> Sequence[str] | None:
