@@ -3,7 +3,41 @@
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
+
+_TURNING = "\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+"""Marks that turn the direction of writing, so that a text reads otherwise than it is."""
+
+
+def visible(text: str) -> str:
+    r"""Return a text whose control characters are written out, so that it does nothing to a terminal.
+
+    Line ends and tabs stay; escapes, carriage returns and marks that turn the direction of writing do not.
+
+    Parameters
+    ----------
+    text
+        From a file or a command line.
+
+    Examples
+    --------
+    >>> print(visible("red \x1b[31m"))
+    red \x1b[31m
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        _code(each)
+        if (unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t") or each in _TURNING
+        else each
+        for each in text
+    )
+
+
+def _code(character: str) -> str:
+    number = ord(character)
+    return f"\\x{number:02x}" if number < 0x100 else f"\\u{number:04x}"
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
@@ -59,7 +93,7 @@ class NlsError(Exception):
             text += f"; did you mean '{self.did_you_mean}'?"
         if self.next_step:
             text += f" -> {self.next_step}"
-        return text
+        return visible(text)
 
     def at(self, place: str) -> NlsError:
         """Return the same error with the place in front of the thing.

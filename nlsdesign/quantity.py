@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from .errors import UnitError, ValueRangeError, nearest
+from .errors import UnitError, ValueRangeError, nearest, visible
 
 NOT_STATED = "not stated"
 _CHANGED = f"{NOT_STATED}; changed from"
@@ -53,8 +53,8 @@ _FOREIGN = {
     "ft": "304.8 mm for one foot", "mil": "25.4 um for one mil", "thou": "25.4 um for one thou",
     "C": "temperatures in K: 20 degrees Celsius are 293.15 K", "°C": "temperatures in K: 20 °C are 293.15 K",
     "degC": "temperatures in K: 20 degrees Celsius are 293.15 K", "sec": "'s'", "hr": "'h'", "turn": "'rev'",
-    "turns": "'rev'", "hp": "745.7 W for one hp", "percent": "'%'", "ohm": "'Ohm'", "L": "1e-3 m^3 for one litre",
-    "l": "1e-3 m^3 for one litre", "t": "1000 kg for one tonne",
+    "turns": "'rev'", "hp": "745.7 W for one hp", "percent": "'%'", "ohm": "'Ohm'",
+    "L": "1e-3 m^3 for one litre", "l": "1e-3 m^3 for one litre", "t": "1000 kg for one tonne",
 }  # fmt: skip
 _RUN_TOGETHER = re.compile(r"^(?P<head>[GMkcmµun]?(?:N|Pa|g|V|A|W|J|Ohm))(?P<tail>mm|cm|ms|m|s|h|rad)$")
 # Superscripts, and the Greek mu and the ohm sign that look like the micro sign and the Greek omega.
@@ -103,7 +103,7 @@ def _foreign(token: str, unit: str) -> UnitError | None:
         f"{match['head']}*{tail}" + (f"^{found[1]}" if found[1] else "")
     ), unit.strip().translate(_TO_ASCII).replace(" ", ""), count=1)  # fmt: skip
     return UnitError(
-        f"unit '{unit}'", f"'{token}' stands for a product, which needs its sign", did_you_mean=written,
+        f"unit '{unit}'", f"'{token}' stands for a product, which needs its sign",
         next_step=f"write '{written}'",
     )  # fmt: skip
 
@@ -251,6 +251,7 @@ class Quantity:
     def __post_init__(self) -> None:
         object.__setattr__(self, "_parsed", parse_unit(self.unit))
         object.__setattr__(self, "value", _plain(self.value))
+        object.__setattr__(self, "source", visible(self.source))
         if not self.values:
             raise ValueRangeError(with_unit("()", self.unit), "a row of numbers needs at least one")
         if not all(math.isfinite(item) for item in self.values):

@@ -14,8 +14,8 @@ from .sensor_ranking import (
     SensorRanking,
     rank_sensors,
 )
-from .stated_ranges import RangeAtRest, ranges_at_rest
 from .stability import Stability, least_damped, sampled_poles
+from .stated_ranges import RangeAtRest, ranges_at_rest
 from .sweep import Chart, Columns, PointView, View, over_angle
 
 __all__ = [
@@ -42,9 +42,9 @@ __all__ = [
     "empirical_gramian",
     "least_damped",
     "over_angle",
+    "ranges_at_rest",
     "rank_drops",
     "rank_sensors",
-    "ranges_at_rest",
     "rest_points",
     "sampled_poles",
 ]

@@ -78,7 +78,6 @@ def check(deck_name: str, as_json: bool) -> None:
 
     Exit status 2 if the deck has a problem; a command that it is not ready for, or a warning, is none.
     """
-
     from ..components.assembly.deck_remarks import deck_remarks
     from ..components.assembly.deck_writer import deck_digest, deck_problems, declare
     from .range_remarks import range_remarks
@@ -111,7 +110,9 @@ def check(deck_name: str, as_json: bool) -> None:
 
 
 def _show_readiness(commands: list[Readiness]) -> None:
-    ready = [each.command + (f" (with {each.needs})" if each.needs else "") for each in commands if each.ready]
+    ready = [
+        each.command + (f" (with {each.needs})" if each.needs else "") for each in commands if each.ready
+    ]
     click.echo(f"ready for: {', '.join(ready) or 'no command'}")
     reasons: dict[str, list[str]] = {}
     for each in commands:

@@ -168,6 +168,4 @@ def readiness(declared: Assembly) -> list[Readiness]:
             reasons[work.__name__] = None
         except NlsError as error:
             reasons[work.__name__] = error
-    return [
-        Readiness(name, reasons[work.__name__], _NEEDS.get(name, "")) for name, work in asked.items()
-    ]
+    return [Readiness(name, reasons[work.__name__], _NEEDS.get(name, "")) for name, work in asked.items()]
