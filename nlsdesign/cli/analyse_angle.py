@@ -12,13 +12,14 @@ from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
     deck_option,
+    examples,
     json_option,
     measured_option,
-    out_option,
     show_json,
     show_table,
     spring_option,
 )
+from .overwriting import out_option
 from .range_remarks import range_remarks, warn
 from .units import Number
 
@@ -35,7 +36,13 @@ _HEADINGS = {
 }
 
 
-@click.command("angle")
+@click.command(
+    "angle",
+    epilog=examples(
+        "nlsdesign analyse angle --deck austin2015_figure_consistent --to '45 deg' --count 10",
+        "nlsdesign analyse --deck austin2015_figure_consistent --from '-20 deg' --to '20 deg' --json",
+    ),
+)
 @deck_option
 @click.option("--from", "first", type=Number("deg"), default="0 deg", show_default=True, help="First angle.")
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
@@ -44,7 +51,7 @@ _HEADINGS = {
 )
 @measured_option
 @spring_option
-@out_option("out/analysis")
+@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg"))
 @json_option
 def analyse_angle(
     deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None

@@ -15,6 +15,7 @@ from ..quantity import Quantity, sources, with_unit
 from ..writing import write_text
 from .deck_new import force_option, new, refuse_to_replace
 from .output import examples, json_option, show_json, show_table
+from .overwriting import out_file_option
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -164,17 +165,22 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
     show_table("Numbers", ("name", "value", "spread", "source"), rows)
 
 
-@deck.command("from-rig")
+@deck.command("from-rig", epilog=examples("nlsdesign deck from-rig rig.toml cam.csv --out my_rig.toml"))
 @click.argument("rig_toml", metavar="RIG.TOML", type=_file)
 @click.argument("cam_csv", metavar="CAM.CSV", type=_file)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
-def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
+@out_file_option(None, "Deck to write.")
+@json_option
+def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
     from ..components.assembly.deck_writer import write_deck
 
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
     write_deck(assembly, out)
-    click.echo(f"written: {out}, {len(assembly.quantities())} numbers; next: nlsdesign diagnose --deck {out}")
+    numbers = len(assembly.quantities())
+    if as_json:
+        show_json({"file": out, "numbers": numbers})
+        return
+    click.echo(f"written: {out}, {numbers} numbers; next: nlsdesign diagnose --deck {out}")
 
 
 def _short(given: Quantity) -> str:
