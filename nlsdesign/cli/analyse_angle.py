@@ -20,6 +20,7 @@ from .output import (
     spring_option,
 )
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ def analyse_angle(
     from ..model.roles import series_spring
     from ..model.transform import with_outputs
 
-    model = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    model = flatten(declared)
     torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     if not last > first:
         raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
@@ -85,8 +87,10 @@ def analyse_angle(
         "observability": observability_over_angle({model.name: chart}, drops={model.name: drops}),
     }
     files = [out / "over_angle.csv", *write_figures(out, pictures)]
+    remarks = range_remarks(declared, first=first, last=last, measured=measured)
+    warn(remarks)
     if as_json:
-        show_json(_as_json(chart, drops, ranking) | {"file": files[0], "files": files})
+        show_json(_as_json(chart, drops, ranking) | {"warnings": remarks, "file": files[0], "files": files})
         return
     _show(chart, drops, model.name)
     if ranking is not None:

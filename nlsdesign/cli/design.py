@@ -13,6 +13,7 @@ from ..errors import NlsError, ValueRangeError
 from .design_kinds import KINDS, show_kinds
 from .output import DECK_HELP, examples, json_option, show_json, show_table, spring_option
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import parse_number
 
 if TYPE_CHECKING:
@@ -99,8 +100,11 @@ def design(context: click.Context, /, deck_name: str | None, out: Path, as_json:
     if designed.met:
         with steps.step("drawings"):
             files += _drawn(designed, job, deck_name, out, remarks)
+    # The deck that is written, over the angles that were asked for.
+    ranges = range_remarks(designed.actuator, first=0.0, last=designed.target.last_angle)
+    warn(ranges)
     if as_json:
-        show_json({**_numbers(designed), "remarks": remarks, "files": files})
+        show_json({**_numbers(designed), "remarks": remarks, "warnings": ranges, "files": files})
     else:
         _show(designed, files)
         for remark in remarks:

@@ -1,6 +1,6 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
-from .blocks.prediction_of_blocks import BandError, band_errors, predict
+from .blocks.prediction_of_blocks import BandError, band_errors, predict, ranges_left
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
@@ -33,6 +33,7 @@ __all__ = [
     "diagnose",
     "next_experiment",
     "predict",
+    "ranges_left",
     "records_of_run",
     "refit",
     "unnamed_part",
