@@ -142,7 +142,7 @@ def hand_built(expression: Any, x: Any, u: Any) -> FlatModel:
         lambda x, u: (
             ca.log1p(x * x) - ca.expm1(u) + ca.log1p(1e-9 * x * x) / 1e-9 + ca.expm1(1e-9 * u) / 1e-9
         ),
-        lambda x, u: ca.fmin(ca.fabs(x), ca.sign(u)) * ca.floor(x * 4) - ca.ceil(u) / ca.atan2(x, u),
+        lambda x, u: ca.fmin(ca.fabs(x), ca.sign(u)) * ca.floor(x * 4) - ca.ceil(u) / (4 + ca.atan2(x, u)),
         lambda x, u: ca.if_else(x > 0, ca.if_else(u > 0, 1, x), u) + ca.if_else(x > 0, 5, (u - x) ** 2),
         lambda x, u: ca.fmax(-ca.inf, x) + ca.fmin(u, ca.inf),
         lambda x, u: (
