@@ -120,8 +120,16 @@ def test_a_design_and_its_tolerance_as_frames() -> None:
     np.testing.assert_array_equal(torque["torque"] - torque["target"], torque["error"])
     assert np.max(np.abs(torque["error"])) == design.check.largest
     numbers = frames["numbers"].set_index("name")
-    assert numbers.loc["spring.pretension", "value"] == design.values["spring.pretension"].number
-    assert (numbers["unit"] == "m").all()
+    assert numbers.loc["spring.pretension", "value"] == pytest.approx(
+        1e3 * design.values["spring.pretension"].number
+    )
+    assert numbers.loc["spring.pretension", "unit"] == "mm"
+    arms = numbers.filter(like="spring.cam.lever_arm", axis=0)
+    assert tuple(arms["value"]) == design.values["spring.cam.lever_arm"].shown
+    assert set(arms["unit"]) == {"m"}
+    limit = frames["limits"].set_index("unit").loc["mm"].iloc[0]
+    shown = next(state for state in design.limits if state.unit == "mm")
+    assert limit["bound"] == pytest.approx(1e3 * shown.bound)
     assert len(numbers) == sum(len(q.values) for _, q in design.changes)
     assert set(frames["limits"].loc[frames["limits"]["active"], "limit"]) == set(design.active_limits)
     curves = frames["curves"]

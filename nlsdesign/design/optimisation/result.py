@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -306,7 +306,8 @@ class CamDesign:
         """Return ``pandas.DataFrame`` objects by name; needs pandas.
 
         ``numbers`` has the changed numbers, ``limits`` the state of each limit, ``torque`` the check against
-        the target over the angle, ``curves`` what the optimiser saw of cam and first rubber. All in SI.
+        the target over the angle, ``curves`` what the optimiser saw of cam and rubber. Rows of the first
+        two are in the unit that they name, the others in SI.
         """
         return design_frames(self)
 
@@ -321,8 +322,13 @@ class CamDesign:
         return "\n".join([*lines, "  limits", *(f"    {state}" for state in self.limits)])
 
 
+def _in_its_unit(state: LimitState) -> LimitState:
+    factor = parse_unit(state.unit).factor
+    return replace(state, value=state.value / factor, bound=state.bound / factor)
+
+
 def design_frames(design: CamDesign) -> dict[str, Any]:
-    """Return the tables of a design as data frames in SI.
+    """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`.
 
     Parameters
     ----------
@@ -332,9 +338,10 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
     rows = [
         (name if len(q.values) == 1 else f"{name}[{k}]", each, q.unit, q.source, q.spread)
         for name, q in design.changes
-        for k, each in enumerate(q.values, start=1)
+        for k, each in enumerate(np.atleast_1d(np.asarray(q.shown)).tolist(), start=1)
     ]
     keys = ("name", "value", "unit", "source", "spread")
+    limits = [_in_its_unit(state) for state in design.limits]
     check, curves = design.check, design.curves
     torque = {"torque": check.torques, "target": check.targets, "error": check.errors}
     over = {
@@ -349,9 +356,7 @@ def design_frames(design: CamDesign) -> dict[str, Any]:
         units |= {f"{path}.{what}": unit for path in by_path}
     return {
         "numbers": data_frame({key: [row[k] for row in rows] for k, key in enumerate(keys)}),
-        "limits": data_frame(
-            {f.name: [getattr(s, f.name) for s in design.limits] for f in fields(LimitState)}
-        ),
+        "limits": data_frame({f.name: [getattr(s, f.name) for s in limits] for f in fields(LimitState)}),
         "torque": data_frame(
             torque, units=dict.fromkeys(torque, "N*m"), index=Axis("angle", "rad", check.angles)
         ),
