@@ -10,6 +10,7 @@ from .reporting.circumstances import DiagnosisRun, records_of_run
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
+from .reporting.verdict_frames import verdict_frames
 
 __all__ = [
     "ALL",
@@ -37,6 +38,7 @@ __all__ = [
     "records_of_run",
     "refit",
     "unnamed_part",
+    "verdict_frames",
     "write_command",
     "write_refit",
     "write_verdict",
