@@ -15,7 +15,7 @@ from .calibrate import calibrate
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
-from .diagnose import diagnose, simulate
+from .diagnose import diagnose
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -24,6 +24,7 @@ from .observer import observer
 from .observer_certificate import verify_certificate
 from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
 from .parts import parts
+from .simulate import simulate
 from .studies import study
 
 
