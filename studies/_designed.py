@@ -131,7 +131,12 @@ def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
             nls.figures.torque_against_target(design.target, curve),
             caption="Torque of the flattened, changed assembly; nominal numbers.",
         ),
-        TableSection(f"Result of the design{behind}", ("quantity", "value"), tuple(design.rows())),
+        TableSection(
+            f"Result of the design{behind}",
+            ("quantity", "value"),
+            tuple(design.rows()),
+            caption="What was found, with the errors and how much of each limit is used.",
+        ),
         FigureSection(
             f"Use of each limit{behind}",
             nls.figures.limit_margins(design),
@@ -170,7 +175,12 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             nls.figures.torque_band(result),
             caption="Nine of ten springs lie within the band.",
         ),
-        TableSection("Tolerance", ("what", "value"), tuple(result.rows())),
+        TableSection(
+            "Tolerance",
+            ("what", "value"),
+            tuple(result.rows()),
+            caption="Torque errors of made springs, and what to do about them.",
+        ),
         TableSection(
             "Causes",
             (*head[:6], "share, trimmed", "halved, trimmed", "known, trimmed"),

@@ -188,6 +188,7 @@ def write(out: Path, joints: Iterable[Joint], power: TaskCurve, ankle: AnkleSpri
                 (r, c.rigid.heat, c.linear.heat if c.linear else "none", c.best.heat, c.two_branch or "none")
                 for r, c in joint.curves.items()
             ),
+            caption="Heat of the motor over one stride.",
             folded=True,
         )
         for joint in joints
