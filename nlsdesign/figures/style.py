@@ -6,8 +6,8 @@ in the light colours; inline in a report each of them becomes a CSS variable (se
 :mod:`nlsdesign.figures.svg`), so one rendering serves light, dark and print. Colour never carries meaning
 alone: lines differ in dashes, points in shape.
 
-A colour means the same on every page: ``AFTER``, ``BEFORE``, ``HOLDS``, ``LIMIT``. Only pictures of the mechanism
-give the colours to parts, and say so beside them.
+A colour means the same on every page: ``AFTER``, ``BEFORE``, ``HOLDS``, ``LIMIT``. Only pictures of the
+mechanism give the colours to parts, and say so beside them.
 """
 
 from __future__ import annotations

@@ -88,7 +88,10 @@ def key_numbers(results: Results) -> Section:
             before=f"{1e3 * results.cam.tolerance.quantiles[-1].value:.0f}",
         ),
         KeyNumber(
-            "tracking error at 5 Hz", f"{100 * new:.0f} %", "published → designed", before=f"{100 * old:.0f} %"
+            "tracking error at 5 Hz",
+            f"{100 * new:.0f} %",
+            "published → designed",
+            before=f"{100 * old:.0f} %",
         ),
         KeyNumber(
             "torque observer", f"{middle:.0f} mN·m rms",
