@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import DeckError, NlsError, UnitError, nearest, unknown_name
+from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name
 from .locations import folder
 from .quantity import Quantity, parse_unit
 
@@ -19,6 +19,12 @@ _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
 _HEADER = re.compile(rf"^\s*\[\[?\s*({_NAME})\s*\]")
 _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
+_MOST_LEVELS = 64
+"""Names within names; the deepest deck of the project has seven."""
+_TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
+_MOST_BYTES = 2**24
+_MOST_DIGITS = 1000
+_TOO_MANY_DIGITS = re.compile(rf"[0-9A-Fa-f_]{{{_MOST_DIGITS}}}")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
 
 
@@ -155,7 +161,7 @@ class Deck:
         where = self.place(full_name)
         if not isinstance(raw, dict):
             raise DeckError(
-                where, f"is the bare value {raw!r}; a number needs a unit and a source",
+                where, f"is the bare value {brief(raw)}; a number needs a unit and a source",
                 next_step='write {value = ..., unit = "...", source = "...", spread = ...}',
             )  # fmt: skip
         for key in raw:
@@ -176,10 +182,14 @@ class Deck:
         value, spread = raw["value"], raw.get("spread", 0.0)
         items = value if isinstance(value, list) else [value]
         if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in [*items, spread]):
-            raise DeckError(where, f"value {value!r} or spread {spread!r} is not a number")
+            raise DeckError(where, f"value {brief(value)} or spread {brief(spread)} is not a number")
+        if any(isinstance(v, Written) and len(v.text) > _MOST_DIGITS for v in [*items, spread]):
+            raise DeckError(where, f"has a number of more than {_MOST_DIGITS} digits")
         for key in ("unit", "source"):
             if not isinstance(raw[key], str) or not raw[key].strip():
-                raise DeckError(where, f"{key} {raw[key]!r} is not a text", next_step=f'write {key} = "..."')
+                raise DeckError(
+                    where, f"{key} {brief(raw[key])} is not a text", next_step=f'write {key} = "..."'
+                )
         try:
             factor = parse_unit(raw["unit"]).factor
             scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)
@@ -187,6 +197,9 @@ class Deck:
             return Quantity(in_si, raw["unit"], raw["source"], float(spread))
         except NlsError as error:
             raise error.at(where) from None
+        except OverflowError:
+            rule = f"{brief(value)} {raw['unit']} with spread {brief(spread)} is too large a number to compute with"
+            raise ValueRangeError(where, rule, next_step="correct the number or its unit") from None
 
 
 def _tables(path: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -225,13 +238,21 @@ def load_deck(name: str | Path) -> Deck:
     if not path.exists():
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
+    return read_deck(_text(path), path)
+
+
+def _text(path: Path) -> str:
     try:
+        if not path.is_file():
+            raise DeckError(str(path), "is no file", next_step="give a text file in UTF-8")
+        if path.stat().st_size > _MOST_BYTES:
+            rule = f"has {path.stat().st_size} bytes; a deck has at most {_MOST_BYTES}"
+            raise DeckError(str(path), rule, next_step="give a text file in TOML")
         # An editor may have put a byte order mark in front.
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        rule = f"cannot be read: {error}"
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:  # ValueError: no text in UTF-8, or no possible name of a file
+        rule = f"cannot be read: {getattr(error, 'strerror', None) or error}"
         raise DeckError(str(path), rule, next_step="give a text file in UTF-8") from None
-    return read_deck(text, path)
 
 
 def read_deck(text: str, path: Path) -> Deck:
@@ -247,19 +268,47 @@ def read_deck(text: str, path: Path) -> Deck:
     Raises
     ------
     DeckError
-        If the text is no TOML, or ``deck`` is not a table.
+        If the text is no TOML, ``deck`` is not a table, tables stand in tables without end, or a number has
+        thousands of digits.
     """
+    deep = _TOO_DEEP.search(text)
+    if deep:
+        raise _too_deep(f"{path.name}:{text.count(chr(10), 0, deep.start()) + 1}")
     try:
         tables = tomllib.loads(text, parse_float=Written)
     except tomllib.TOMLDecodeError as error:
         raise _not_toml(text, path, str(error)) from None
+    except RecursionError:
+        raise _too_deep(path.name) from None
+    except ValueError:  # of Python, for whole numbers of more digits than it reads
+        long = _TOO_MANY_DIGITS.search(text)
+        line = text.count("\n", 0, long.start() if long else 0) + 1
+        raise DeckError(f"{path.name}:{line}", f"has a number of more than {_MOST_DIGITS} digits") from None
+    if _levels(tables) > _MOST_LEVELS:
+        raise _too_deep(path.name)
     places = _places(text)
     head = tables.pop("deck", {})
     if not isinstance(head, dict):
         line, column = places.get("deck", (1, 1))
         raise DeckError(f"{path.name}:{line}:{column}: deck", "is not a table", next_step="write [deck]")
-    name, description = str(head.get("name", path.stem)), str(head.get("description", ""))
+    given = (head.get("name", path.stem), head.get("description", ""))
+    name, description = (each if isinstance(each, str) else brief(each) for each in given)
     return Deck(name, description, path, tables, places, head)
+
+
+def _levels(tables: Mapping[str, Any]) -> int:
+    """Return how many tables and lists stand within each other."""
+    levels, inner = 0, [tables]
+    while inner:
+        levels += 1
+        each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]
+        inner = [v for v in each if isinstance(v, dict | list)]
+    return levels
+
+
+def _too_deep(where: str) -> DeckError:
+    rule = f"has tables or lists within each other, more than {_MOST_LEVELS} deep"
+    return DeckError(where, rule, next_step="combine parts side by side instead of within each other")
 
 
 def _not_toml(text: str, path: Path, message: str) -> DeckError:

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
+
+_LONGEST_NAME = 120
+"""Longer names are compared with nothing: no name that exists is as long."""
+_LONGEST_RUN, _LONGEST_TEXT = 300, 2500
+"""Most characters of a run without blanks, and of one text of a message; what is longer is cut in its middle."""
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
@@ -17,6 +23,8 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
         The names that would have been accepted.
     """
     candidates = list(valid)
+    if len(name) > _LONGEST_NAME:
+        return None
     for candidate in candidates:
         if candidate.lower() == name.lower():
             return candidate
@@ -54,11 +62,11 @@ class NlsError(Exception):
         super().__init__(self._message())
 
     def _message(self) -> str:
-        text = f"{self.thing}: {self.rule}"
+        text = f"{fit_for_message(self.thing)}: {fit_for_message(self.rule)}"
         if self.did_you_mean:
-            text += f"; did you mean '{self.did_you_mean}'?"
+            text += f"; did you mean '{fit_for_message(self.did_you_mean)}'?"
         if self.next_step:
-            text += f" -> {self.next_step}"
+            text += f" -> {fit_for_message(self.next_step)}"
         return text
 
     def at(self, place: str) -> NlsError:
@@ -73,6 +81,44 @@ class NlsError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), self.thing, self.rule, self.did_you_mean, self.next_step)
+
+
+def fit_for_message(text: str) -> str:
+    """Return a text with control characters written out, and cut where it is very long.
+
+    Parameters
+    ----------
+    text
+        Holds names and numbers as somebody wrote them, who may not mean well.
+
+    Examples
+    --------
+    >>> fit_for_message("motor\x1b[2J")
+    'motor\\x1b[2J'
+    """
+    if len(text) > _LONGEST_TEXT:
+        text = _cut(text, _LONGEST_TEXT)
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
+    return re.sub(rf"\S{{{_LONGEST_RUN},}}", lambda run: _cut(run[0], _LONGEST_RUN), text)
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[: 2 * length // 3]}...{text[-length // 4 :]}"
+
+
+def brief(value: object) -> str:
+    """Return a value as Python writes it, for a message; a long one is cut.
+
+    Parameters
+    ----------
+    value
+        As read from a file.
+    """
+    try:
+        return _cut(repr(value), _LONGEST_RUN)
+    except ValueError:  # a whole number of more digits than Python writes
+        return "a number of thousands of digits"
 
 
 def _rebuild(

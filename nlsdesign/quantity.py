@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -15,6 +16,7 @@ _CHANGED = f"{NOT_STATED}; changed from"
 
 BASE = ("kg", "m", "s", "A", "K", "rad")
 
+_HIGHEST_POWER = 20
 _DEGREE = math.pi / 180.0
 # symbol -> (factor to SI, exponents of kg, m, s, A, K, rad)
 _ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
@@ -126,11 +128,24 @@ def parse_unit(text: str) -> Unit:
                 f"'{piece}' cannot be read",
                 next_step="write for instance 'N·m/rad' or 'N*m/rad'",
             )
-        power = sign * int(match["power"] or 1)
+        power = sign * _power(match["power"] or "1", text)
         one_factor, one = _atom(match["atom"], text)
         factor *= one_factor**power
         exponents = [total + power * each for total, each in zip(exponents, one, strict=True)]
+    if not sys.float_info.min <= factor <= sys.float_info.max:
+        raise UnitError(f"unit '{text}'", "is too large or too small a multiple of SI units to compute with")
     return Unit(text, factor, tuple(exponents))
+
+
+def _power(text: str, unit: str) -> int:
+    # The length comes first: whole numbers of thousands of digits are not read at all.
+    if len(text) <= len(str(-_HIGHEST_POWER)) and abs(int(text)) <= _HIGHEST_POWER:
+        return int(text)
+    raise UnitError(
+        f"unit '{unit}'",
+        f"'{text}' is no power of a unit; powers lie between -{_HIGHEST_POWER} and {_HIGHEST_POWER}",
+        next_step="write for instance 'kg*m^2'",
+    )
 
 
 def typeset_unit(unit: str) -> str:

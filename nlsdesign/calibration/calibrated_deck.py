@@ -335,7 +335,7 @@ def read_joint_numbers(path: Path) -> Prior:
             np.array(content["values"], dtype=float),
             0.5 * (covariance + covariance.T),
         )
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise MeasurementError(
             str(path), f"holds no numbers that are known jointly: {error}",
             next_step="give the joint_numbers.json of a calibration",

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ExportError
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import deck_option, examples, json_option, show_json, show_table
+from .overwriting import out_option
 from .units import Number
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
 """Number of the controller whose onset of limit cycling is looked for, by law."""
 _GAINS = ("proportional", "integral", "derivative")
+_FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "coupled_stability.svg")
 _FREQUENCIES = (0.1, 11.0, 20)
 
 
@@ -76,7 +78,13 @@ class _Evaluation:
         return result
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign analyse loop --deck austin2015_figure_consistent",
+        "nlsdesign analyse loop --deck austin2015_figure_consistent --law scheduled "
+        "--bandwidth '10 Hz' --amplitude '0.5 N*m' --json",
+    )
+)
 @deck_option
 @click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
               help="A PID, or speed by tangent stiffness.")  # fmt: skip
@@ -96,7 +104,7 @@ class _Evaluation:
               help="Of the load's angle where no torque is wanted.")  # fmt: skip
 @click.option("--delay", type=click.IntRange(0), default=1, show_default=True, help="In samples.")
 @click.option("--sample-time", type=Number("s"), default="1 ms", show_default=True, help="Of the controller.")
-@out_option("out/loop")
+@out_option("out/loop", writes=_FILES)
 @json_option
 @click.pass_context
 def loop(

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import NlsError, ValueRangeError
-from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
+from .output import deck_option, examples, json_option, show_json, show_table, spring_option
+from .overwriting import out_option
 from .units import parse_number
 
 if TYPE_CHECKING:
@@ -24,7 +25,15 @@ _FILES = (
 )
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign design --deck austin2015_figure_consistent --maximum '5 N*m' --angle '53 deg' "
+        "--shape 1 --free spring.cam.contour --free spring.pretension --free spring.rubber.area "
+        "--free spring.rubber.rest_length --limit 'MaximumCamRadius = {radius = \"20 mm\"}'",
+        "nlsdesign design --deck my.toml --task job.toml --out out/my_cam",
+        "nlsdesign design --deck my.toml --target-file curve.csv --goal 'TorqueError = {}' --dry-run",
+    )
+)
 @deck_option
 @click.option(
     "--task", "task_file", type=click.Path(path_type=Path, dir_okay=False), default=None,
@@ -49,7 +58,7 @@ _FILES = (
 @click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
 @click.option("--draws", type=int, default=None, help="Draws of the tolerance, else 1000; 0: none.")
 @spring_option
-@out_option("out/design")
+@out_option("out/design", writes=(*_FILES, "task_curve.svg", "task_motor.svg"))
 @json_option
 def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     """Design cam and rubber for a torque curve; exit status 1 if the design misses its target.
@@ -178,11 +187,12 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     from ..components.assembly.deck_writer import write_deck
     from ..figures import design_picture, limit_margins, tolerance_bars, torque_against_target, write_figures
     from ..writing import make_folder, write_text
+    from ..written_files import discard
 
     make_folder(out)
     for name in _FILES:
         # What an earlier run has left here belongs to another design.
-        (out / name).unlink(missing_ok=True)
+        discard(out / name)
     model, numbers = out / "model.toml", out / "design.json"
     write_deck(designed.actuator, model)
     # How many iterations it took depends on the processor, the design does not.

@@ -15,7 +15,7 @@ from .calibrate import calibrate
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
-from .diagnose import diagnose, simulate
+from .diagnose import diagnose
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -24,13 +24,26 @@ from .observer import observer
 from .observer_certificate import verify_certificate
 from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
 from .parts import parts
+from .simulate import simulate
 from .studies import study
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(version(), prog_name="nlsdesign")
-def program() -> None:
+@click.option(
+    "--with",
+    "packages",
+    multiple=True,
+    metavar="PACKAGE",
+    help="Package or .py file with parts, effects and rubbers of your own; before the command; repeatable.",
+)
+@click.pass_context
+def program(context: click.Context, packages: tuple[str, ...]) -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
+    if packages:
+        from ..extensions import extended_by, load_extension
+
+        context.with_resource(extended_by(*(load_extension(name) for name in packages)))
 
 
 export.add_command(export_ssp)

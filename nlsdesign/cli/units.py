@@ -110,6 +110,10 @@ def parse_number(text: str, unit: str) -> Quantity:
         raise UnitError(error.thing, error.rule, next_step=f"write '{with_unit('1', unit)}'") from None
     if not given and unit != "1":
         raise UnitError(f"'{text}'", "has no unit", next_step=f"write '{with_unit(text.strip(), unit)}'")
+    if not same_dimension(given or "1", unit) and unit == "1":
+        raise UnitError(
+            f"'{text}'", "stands for a pure number, without a unit", next_step=f"write '{number:g}'"
+        )
     if not same_dimension(given or "1", unit):
         raise UnitError(
             f"'{text}'",

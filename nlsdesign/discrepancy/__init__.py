@@ -1,6 +1,6 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
-from .blocks.prediction_of_blocks import predict
+from .blocks.prediction_of_blocks import BandError, band_errors, predict
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
@@ -13,6 +13,7 @@ from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
 
 __all__ = [
     "ALL",
+    "BandError",
     "BlockError",
     "Candidate",
     "Course",
@@ -28,6 +29,7 @@ __all__ = [
     "Separation",
     "Unknown",
     "Verdict",
+    "band_errors",
     "diagnose",
     "next_experiment",
     "predict",

@@ -16,6 +16,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from ..errors import ExportError
+from .instructions import read_instructions
 
 LONGEST = 60
 """A definition with more operations than this is shown as a function of what it depends on."""
@@ -194,7 +195,7 @@ class _Reader:
         self.definitions: dict[str, sympy.Expr] = {}
 
     def run(self, results: list[list[str]]) -> None:
-        steps = self._steps()
+        steps, self.results = read_instructions(self.function)
         names: dict[int, list[str]] = {}
         for (port, index), step in self.results.items():
             if port in (1, 2) and results[port][index] not in names.setdefault(step, []):
@@ -211,22 +212,6 @@ class _Reader:
             term = _Term(own, 0, frozenset([own]))
         self.definitions |= {name: term.value for name in names if name != str(term.value)}
         return term
-
-    def _steps(self) -> list[tuple[int, list[int], Any]]:
-        """Return the instructions with each operand as the number of the instruction that made it."""
-        steps: list[tuple[int, list[int], Any]] = []
-        held: dict[int, int] = {}
-        f = self.function
-        for k in range(f.n_instructions()):
-            operation, out, into = f.instruction_id(k), f.instruction_output(k), f.instruction_input(k)
-            if operation == ca.OP_OUTPUT:
-                self.results[out[0], out[1]] = held[into[0]]
-                continue
-            extra = f.instruction_constant(k) if operation == ca.OP_CONST else into
-            operands = [] if operation in (ca.OP_CONST, ca.OP_INPUT) else [held[i] for i in into]
-            steps.append((operation, operands, extra))
-            held[out[0]] = len(steps) - 1
-        return steps
 
     def _term(self, operation: int, operands: list[_Term], extra: Any) -> _Term:
         if operation == ca.OP_CONST:

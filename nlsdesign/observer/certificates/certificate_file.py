@@ -84,7 +84,7 @@ def read_certificate(path: str | Path) -> tuple[Proof, bool]:
     try:
         text = Path(path).read_text(encoding="utf-8")
         content = json.loads(text, parse_constant=_refuse)
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise MeasurementError(str(path), f"is no readable certificate ({error})") from None
     readers: dict[str, Callable[[dict[str, Any]], Proof]] = {
         FORMAT: _certificate,
@@ -99,7 +99,7 @@ def read_certificate(path: str | Path) -> tuple[Proof, bool]:
         )  # fmt: skip
     try:
         certificate = reader(content)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, NlsError) as error:
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError, NlsError) as error:
         raise MeasurementError(str(path), f"is no readable certificate ({error!r})") from None
     # The whole text is compared, so that no digit can be touched that the proof does not use.
     return certificate, certificate_text(certificate) == text
