@@ -50,7 +50,7 @@ _HEADINGS = {
 )
 @measured_option
 @spring_option
-@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg"))
+@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg", "report.html"))
 @json_option
 def analyse_angle(
     deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None
@@ -65,6 +65,7 @@ def analyse_angle(
     from ..model import flatten
     from ..model.roles import series_spring
     from ..model.transform import with_outputs
+    from ..report import write_analysis_report
 
     model = flatten(declare(load_deck(deck_name)))
     torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
@@ -85,6 +86,8 @@ def analyse_angle(
         "observability": observability_over_angle({model.name: chart}, drops={model.name: drops}),
     }
     files = [out / "over_angle.csv", *write_figures(out, pictures)]
+    page = out / "report.html"
+    files.append(write_analysis_report(page, chart, drops, model=model.name, ranking=ranking, files=files))
     if as_json:
         show_json(_as_json(chart, drops, ranking) | {"file": files[0], "files": files})
         return

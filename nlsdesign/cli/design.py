@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _FILES = (
+    "report.html",
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
 )
@@ -69,6 +70,7 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     from ..deck import load_deck
     from ..design import design_cam
     from ..progress import Steps
+    from ..report import write_design_report
 
     actuator, job = declare(load_deck(deck_name)), _job(**given)
     steps = Steps()
@@ -88,6 +90,9 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     if designed.met:
         with steps.step("drawings"):
             files += _drawn(designed, job, deck_name, out, remarks)
+    files.append(
+        write_design_report(out / "report.html", designed, deck=deck_name, remarks=remarks, files=files)
+    )
     if as_json:
         show_json({**_numbers(designed), "remarks": remarks, "files": files})
     else:

@@ -2,6 +2,8 @@
 
 from .calculation import OUTCOMES, CalculationSection, CalculationStep
 from .cam_section import CamSection
+from .command_pages import write_analysis_report, write_fit_report, write_observer_report
+from .design_sections import design_sections, tolerance_sections, write_design_report
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
 from .page import report_text, write_report
@@ -36,10 +38,16 @@ __all__ = [
     "TextSection",
     "VerdictSection",
     "comparison_table",
+    "design_sections",
     "numbers_table",
     "range_table",
     "regeneration_sections",
     "report_text",
+    "tolerance_sections",
     "verdict_sections",
+    "write_analysis_report",
+    "write_design_report",
+    "write_fit_report",
+    "write_observer_report",
     "write_report",
 ]

@@ -20,11 +20,13 @@ from nlsdesign.report import (
     TableSection,
     TextSection,
     comparison_table,
+    design_sections,
     numbers_table,
+    tolerance_sections,
     verdict_sections,
 )
 
-from .._designed import design_sections, drawing_section, tolerance_sections
+from .._designed import drawing_section
 from .evaluation_report import evaluation_sections
 from .generated_report import generated_sections
 from .loop_report import loop_sections
