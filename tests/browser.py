@@ -7,6 +7,7 @@ console are collected.
 from __future__ import annotations
 
 import base64
+import fcntl
 import itertools
 import json
 import os
@@ -78,7 +79,7 @@ class Tab:
     def look(self, width: int, *, height: int = 800, theme: str = "light") -> None:
         """Show the page on a screen of a width in CSS pixels."""
         self.ask(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+            "Emulation.setDeviceMetricsOverride", width=width, screenWidth=width, screenHeight=height, height=height, deviceScaleFactor=1,
             mobile=width < 600,
         )  # fmt: skip
         wanted = [{"name": "prefers-color-scheme", "value": theme}]
@@ -128,16 +129,25 @@ def browser() -> Iterator[Tab]:
     assert program is not None
     command_end, our_commands = os.pipe()
     our_answers, answer_end = os.pipe()
-    with tempfile.TemporaryDirectory() as profile:
+    # The browser listens at 3 and answers at 4; copies far above leave those two free.
+    ends = [fcntl.fcntl(each, fcntl.F_DUPFD_CLOEXEC, 64) for each in (command_end, answer_end)]
+
+    def place() -> None:
+        for end, number in zip(ends, (3, 4), strict=True):
+            os.dup2(end, number)
+
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         options = [
             "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe",
             "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run",
             f"--user-data-dir={profile}",
         ]  # fmt: skip
         started = subprocess.Popen(
-            ["/bin/sh", "-c", f'exec "$0" "$@" 3<&{command_end} 4>&{answer_end}', program, *options],
-            pass_fds=(command_end, answer_end), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            [program, *options], pass_fds=(3, 4), preexec_fn=place,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
+        for end in ends:
+            os.close(end)
         os.close(command_end)
         os.close(answer_end)
         with os.fdopen(our_commands, "wb") as commands, os.fdopen(our_answers, "rb", 1 << 20) as answers:

@@ -12,6 +12,7 @@ from .analyse import analyse
 from .analyse_angle import analyse_angle
 from .analyse_loop import loop
 from .calibrate import calibrate
+from .compare import compare
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
@@ -51,7 +52,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, study),
+    *(cosimulation, simulate, fit, diagnose, compare, study),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default

@@ -85,7 +85,9 @@ def write_design_report(
     words = [*(f"Missed: {design.miss}." for _ in range(design.miss is not None)), *remarks]
     sections: list[Section] = [NumbersSection("Key numbers", _key_numbers(design))]
     if words:
-        sections.append(TextSection("Remarks", "\n\n".join(words)))
+        sections.append(
+            TextSection("Remarks", "\n\n".join(f"{each[:1].upper()}{each[1:]}" for each in words))
+        )
     sections += [*_moved(design), *design_sections(design)]
     if design.tolerance is not None and design.tolerance.causes:
         sections += tolerance_sections(design.tolerance)

@@ -195,7 +195,7 @@ def _numbers(verdict: Verdict) -> list[Section]:
 
 
 def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
-    """Return the table of refitted numbers, those that left their declared range highlighted; none without any.
+    """Return the table of refitted numbers, highlighted those that left their declared range.
 
     Parameters
     ----------
@@ -219,8 +219,9 @@ def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
     )
     beyond = frozenset(i for i, n in enumerate(numbers) if abs(n.strain) > _EDGE)
     caption = (
-        f"Numbers that were declared with a spread, refitted {how}, with standard errors. The last column is how far each moved, in declared spreads: "
-        f"beyond 1 it has left what was declared{' (marked)' if beyond else '; none has'}."
+        f"Numbers that were declared with a spread, refitted {how}, with standard errors. The last column is "
+        "how far each moved, in declared spreads: beyond 1 it has left what was declared"
+        f"{' (marked)' if beyond else '; none has'}."
     )
     columns = ("number", "declared", "spread", "refitted", "unit", "moved")
     return [TableSection("Refitted numbers", columns, rows, caption=caption, marked=beyond)]
