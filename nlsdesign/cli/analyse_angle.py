@@ -51,7 +51,7 @@ _HEADINGS = {
 )
 @measured_option
 @spring_option
-@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg"))
+@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg", "report.html"))
 @json_option
 def analyse_angle(
     deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None
@@ -66,6 +66,7 @@ def analyse_angle(
     from ..model import flatten
     from ..model.roles import series_spring
     from ..model.transform import with_outputs
+    from ..report import write_analysis_report
 
     declared = declare(load_deck(deck_name))
     model = flatten(declared)
@@ -89,6 +90,8 @@ def analyse_angle(
     files = [out / "over_angle.csv", *write_figures(out, pictures)]
     remarks = range_remarks(declared, first=first, last=last, measured=measured)
     warn(remarks)
+    page = out / "report.html"
+    files.append(write_analysis_report(page, chart, drops, model=model.name, ranking=ranking, files=files))
     if as_json:
         show_json(_as_json(chart, drops, ranking) | {"warnings": remarks, "file": files[0], "files": files})
         return

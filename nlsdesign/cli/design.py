@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _FILES = (
+    "report.html",
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
 )
@@ -81,6 +82,7 @@ def design(context: click.Context, /, deck_name: str | None, out: Path, as_json:
     from ..deck import load_deck
     from ..design import design_cam
     from ..progress import Steps
+    from ..report import write_design_report
 
     actuator, job = declare(load_deck(deck_name)), _job(**given)
     steps = Steps()
@@ -103,6 +105,9 @@ def design(context: click.Context, /, deck_name: str | None, out: Path, as_json:
     # The deck that is written, over the angles that were asked for.
     ranges = range_remarks(designed.actuator, first=0.0, last=designed.target.last_angle)
     warn(ranges)
+    files.append(
+        write_design_report(out / "report.html", designed, deck=deck_name, remarks=remarks, files=files)
+    )
     if as_json:
         show_json({**_numbers(designed), "remarks": remarks, "warnings": ranges, "files": files})
     else:

@@ -12,6 +12,7 @@ from .analyse import analyse
 from .analyse_angle import analyse_angle
 from .analyse_loop import loop
 from .calibrate import calibrate
+from .compare import compare
 from .completion import COMPLETE, complete_names, completion
 from .cosimulate import cosimulation
 from .decks import deck
@@ -61,7 +62,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, study, completion),
+    *(cosimulation, simulate, fit, diagnose, compare, study, completion),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default

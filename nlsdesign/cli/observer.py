@@ -34,7 +34,7 @@ real_option = click.option(
 def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
     proved = [CERTIFICATE] if given["certified"] or given["kind"] == CERTIFIED else []
-    compared = ["errors.csv", "errors.json", "errors.svg"] if given["with_errors"] else []
+    compared = ["errors.csv", "errors.json", "errors.svg", "report.html"] if given["with_errors"] else []
     return [*proved, *c_names("observer"), *compared]
 
 
@@ -86,6 +86,7 @@ def observer(
     from ..export import export_c
     from ..model import flatten
     from ..observer import certified_design
+    from ..report import write_observer_report
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
@@ -112,6 +113,9 @@ def observer(
     statement = () if proved is None else proved.statement
     remarks = range_remarks(declared, measured=options["measured"])
     warn(remarks)
+    words = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
+    if errors is not None:
+        files.append(write_observer_report(out / "report.html", model, errors, words=words, files=files))
     if as_json:
         content = {
             "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),
@@ -120,7 +124,7 @@ def observer(
         }  # fmt: skip
         show_json(content | ({} if errors is None else {"errors": content_of(errors)}))
         return
-    for sentence in (str(chosen.design), *filter(None, [chosen.reason]), *statement):
+    for sentence in words:
         click.echo(sentence)
     if proved is None:
         click.echo("not certified; --kind certified or --certificate proves what can be proved")
