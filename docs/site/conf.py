@@ -6,6 +6,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from nlsdesign import locations
+from nlsdesign.figures.style import TONES
+
+FONTS = {"font-stack": "system-ui, sans-serif", "font-stack--monospace": "ui-monospace, monospace"}
 
 project = "nlsdesign"
 author = "the nlsdesign authors"
@@ -28,7 +31,8 @@ html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
 html_theme_options = {
-    "light_css_variables": {"font-stack": "system-ui, sans-serif", "font-stack--monospace": "ui-monospace, monospace"},
+    "light_css_variables": FONTS | {tone.name: tone.light for tone in TONES},
+    "dark_css_variables": {tone.name: tone.dark for tone in TONES},
     "navigation_with_keys": True,
 }
 html_math_renderer = "mathml"

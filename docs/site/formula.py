@@ -74,10 +74,14 @@ def mathml(formula: str, *, block: bool = False) -> str:
     block
         Whether it stands on a line of its own.
     """
-    text = unicodedata.normalize("NFD", formula)
-    inner = _Reader(text).row("")
+    inner = _Reader(_decomposed(formula)).row("")
     kind = ' display="block"' if block else ""
     return f'<math xmlns="http://www.w3.org/1998/Math/MathML"{kind}>{inner}</math>'
+
+
+def _decomposed(text: str) -> str:
+    """Return text with the marks above letters as characters of their own; signs such as ≠ stay whole."""
+    return "".join(unicodedata.normalize("NFD", c) if c.isalpha() else c for c in text)
 
 
 def _chunks(text: str) -> list[str]:
@@ -117,7 +121,7 @@ def _open(chunk: str) -> bool:
 
 def _operand(chunk: str) -> bool:
     core = chunk.rstrip(",.;:")
-    if not core or not _CHUNK.match(unicodedata.normalize("NFD", core)) or _unbalanced(core):
+    if not core or not _CHUNK.match(_decomposed(core)) or _unbalanced(core):
         return False
     words = re.findall(r"[A-Za-z]{3,}", re.sub(r"_(\w+|\(.*?\)|\{.*?\})", "", core))
     longer = [word for word in words if word not in _FUNCTIONS | _SIGNALS]
@@ -131,7 +135,7 @@ def _unbalanced(text: str) -> bool:
 def _chunk(chunk: str) -> str:
     """Return one chunk of prose, typeset where it is a symbol."""
     core = chunk.strip(",.;:")
-    symbol = re.search(r"[α-ωΑ-Ωµ₀-₉ᵢⱼₖₙₜ⟨√∫Σ]|_\w|\^|[\u0300-\u036f]", unicodedata.normalize("NFD", core))
+    symbol = re.search(r"[α-ωΑ-Ωµ₀-₉ᵢⱼₖₙₜ⟨√∫Σ]|_\w|\^|[\u0300-\u036f]", _decomposed(core))
     if not symbol or not _operand(core) or _unbalanced(core):
         return escape(chunk)
     before, after = chunk[: chunk.index(core)], chunk[chunk.index(core) + len(core) :]
