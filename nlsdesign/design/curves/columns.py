@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeasurementError, UnitError, nearest
-from ...quantity import name_and_unit, parse_unit, same_dimension, typeset_unit
+from ...quantity import parse_unit, same_dimension, typeset_unit
+from ...written_numbers import name_and_unit
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 
 from ...deck import Deck, read_deck
 from ...errors import DeckError, NlsError, UnitError, unknown_name
-from ...quantity import Quantity, quantity, split_number
+from ...quantity import Quantity, quantity
+from ...written_numbers import split_number
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
 from ..curves.target_files import read_band, read_target
