@@ -16,6 +16,7 @@ from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose, simulate
+from .docs import docs
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -38,7 +39,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, study),
+    *(cosimulation, simulate, fit, diagnose, study, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default
