@@ -27,7 +27,7 @@ help:
 	@echo 'make kernels    the tests under several kernels of linear algebra: same results on every processor'
 	@echo 'make mutation   break the package in places drawn by chance and list what no test notices'
 	@echo 'make lint       style and types only'
-	@echo 'make bench      the benchmarks: ratios against named peers'
+	@echo 'make bench      the benchmarks: ratios against named peers, docs/benchmarks.md'
 	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
 	@echo 'make targets    generated C on Cortex-M4F and M7 in an emulator: docs/targets.md'
 	@echo 'make wheels     build wheel and sdist, install and try each on every Python that is here'
