@@ -1,9 +1,9 @@
 """Location of the folders that are distributed with the package, and its version.
 
-The rule: in a wheel the top-level folders ``models`` and ``studies`` are packed into ``nlsdesign/_bundled/``,
-so that they do not spread over site-packages. In a checkout (also an editable install) there is no
-``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is checked too,
-because a folder named ``models`` next to an *installed* package belongs to another project.
+The rule: in a wheel the top-level folders ``models``, ``studies`` and ``docs`` are packed into
+``nlsdesign/_bundled/``, so that they do not spread over site-packages. In a checkout (also an editable
+install) there is no ``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is
+checked too, because a folder named ``models`` next to an *installed* package belongs to another project.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from .errors import UnknownNameError
 _PACKAGE: Final = Path(__file__).resolve().parent
 
 
-def folder(name: Literal["models", "studies"], *, package: Path = _PACKAGE) -> Path:
+def folder(name: Literal["models", "studies", "docs"], *, package: Path = _PACKAGE) -> Path:
     """Return the folder of that name that is distributed with the package.
 
     Parameters
     ----------
     name
-        ``"models"`` or ``"studies"``.
+        ``"models"``, ``"studies"`` or ``"docs"``.
     package
         Folder of the package ``nlsdesign``; another one only in tests.
 

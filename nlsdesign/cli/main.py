@@ -18,6 +18,7 @@ from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose
+from .docs import docs
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -62,7 +63,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, compare, study, completion),
+    *(cosimulation, simulate, fit, diagnose, compare, study, completion, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default
