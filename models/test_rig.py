@@ -118,7 +118,12 @@ class _Numbers:
         row = value if isinstance(value, list) else [value]
         if not row or not all(isinstance(v, int | float) and abs(v) < _LARGEST for v in row):
             raise DeckError(f"{self._file}: {table}.{field}", f"{brief(value)} is no number")
-        return quantity(tuple(row) if isinstance(value, list) else value, unit, source=f"{self._file}, {table}.{field}", spread=spread)
+        return quantity(
+            tuple(row) if isinstance(value, list) else value,
+            unit,
+            source=f"{self._file}, {table}.{field}",
+            spread=spread,
+        )
 
 
 def _rubber(numbers: _Numbers) -> Specimen:

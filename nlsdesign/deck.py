@@ -14,6 +14,7 @@ from typing import Any, Self
 from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name
 from .locations import folder
 from .quantity import Quantity, parse_unit
+from .reading import is_there, text_of
 
 _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
@@ -22,7 +23,6 @@ _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
 _MOST_LEVELS = 64
 """Names within names; the deepest deck of the project has seven."""
 _TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
-_MOST_BYTES = 2**24
 _MOST_DIGITS = 1000
 _TOO_MANY_DIGITS = re.compile(rf"[0-9A-Fa-f_]{{{_MOST_DIGITS}}}")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
@@ -187,7 +187,9 @@ class Deck:
             raise DeckError(where, f"has a number of more than {_MOST_DIGITS} digits")
         for key in ("unit", "source"):
             if not isinstance(raw[key], str) or not raw[key].strip():
-                raise DeckError(where, f"{key} {brief(raw[key])} is not a text", next_step=f'write {key} = "..."')
+                raise DeckError(
+                    where, f"{key} {brief(raw[key])} is not a text", next_step=f'write {key} = "..."'
+                )
         try:
             factor = parse_unit(raw["unit"]).factor
             scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)
@@ -196,7 +198,7 @@ class Deck:
         except NlsError as error:
             raise error.at(where) from None
         except OverflowError:
-            rule = f"{brief(value)} {raw['unit']} with spread {brief(spread)} is too large a number to compute with"
+            rule = f"{brief(value)} {raw['unit']}, spread {brief(spread)}, is too large to compute with"
             raise ValueRangeError(where, rule, next_step="correct the number or its unit") from None
 
 
@@ -231,26 +233,12 @@ def load_deck(name: str | Path) -> Deck:
     path = Path(name)
     if path.suffix != ".toml":
         path = folder("models") / "decks" / f"{name}.toml"
-        if not path.exists():
+        if not is_there(path):
             raise unknown_name("deck", str(name), deck_names())
-    if not path.exists():
+    if not is_there(path):
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
-    return read_deck(_text(path), path)
-
-
-def _text(path: Path) -> str:
-    try:
-        if not path.is_file():
-            raise DeckError(str(path), "is no file", next_step="give a text file in UTF-8")
-        if path.stat().st_size > _MOST_BYTES:
-            rule = f"has {path.stat().st_size} bytes; a deck has at most {_MOST_BYTES}"
-            raise DeckError(str(path), rule, next_step="give a text file in TOML")
-        # An editor may have put a byte order mark in front.
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, ValueError) as error:  # ValueError: no text in UTF-8, or no possible name of a file
-        rule = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-        raise DeckError(str(path), rule, next_step="give a text file in UTF-8") from None
+    return read_deck(text_of(path, DeckError), path)
 
 
 def read_deck(text: str, path: Path) -> Deck:

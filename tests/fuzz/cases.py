@@ -89,7 +89,9 @@ def signature(error: BaseException) -> str:
     last = (own or frames)[-1]
     text = " ".join(str(error).split())[:80]
     name = last.filename.rpartition("nlsdesign/")[2]
-    return f"{type(error).__name__} at {name}:{last.lineno} in {last.name}: {text if not own else ''}".rstrip(": ")
+    return f"{type(error).__name__} at {name}:{last.lineno} in {last.name}: {text if not own else ''}".rstrip(
+        ": "
+    )
 
 
 def mixed(seed: int, number: int) -> random.Random:

@@ -104,7 +104,10 @@ def _renumbered(chance: random.Random, text: str) -> str:
 
 def _number(chance: random.Random) -> str:
     """Return a number of any size, or a row of such numbers."""
-    numbers = [f"{chance.uniform(-1, 1) * 10.0 ** chance.randint(-12, 12):.4g}" for _ in range(chance.choice((1, 1, 3)))]
+    numbers = [
+        f"{chance.uniform(-1, 1) * 10.0 ** chance.randint(-12, 12):.4g}"
+        for _ in range(chance.choice((1, 1, 3)))
+    ]
     return numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
 
 
@@ -124,7 +127,7 @@ def _restructured(chance: random.Random, text: str) -> str:
     if kind == 4:
         depth = min(depth, 1500)
         law = chance.choice(("Series", "Parallel", "Through", "TwoSidedCam", "Free"))
-        nested = "".join(f"\n[n{'.m' * level}]\ncomponent = \"{law}\"\n" for level in range(depth))
+        nested = "".join(f'\n[n{".m" * level}]\ncomponent = "{law}"\n' for level in range(depth))
         return f"{text}{nested}"
     if kind == 5:
         header = chance.choice(headers)
@@ -134,7 +137,7 @@ def _restructured(chance: random.Random, text: str) -> str:
         return text.replace(one, other[:-1] + "." + one[1:], 1)
     if kind == 7:
         one = chance.choice(headers)
-        return text.replace(one, f'[{one[1:-1]}.{chance.choice(EVIL_TEXTS) or "x"}]', 1)
+        return text.replace(one, f"[{one[1:-1]}.{chance.choice(EVIL_TEXTS) or 'x'}]", 1)
     if kind == 8:
         return text.replace(chance.choice(headers), f'["{chance.choice(EVIL_TEXTS)}"]', 1)
     if kind == 9:
@@ -144,6 +147,8 @@ def _restructured(chance: random.Random, text: str) -> str:
                                                  f"{key} = {{x = {value}}}", f"{line}\n{line}")), 1)  # fmt: skip
     if kind == 10:
         parent = f'parent = {{name = "x", digest = "{"0" * 64}", parent = ' * min(depth, 400)
-        return text.replace("[deck]", f'[deck]\n{parent}{{name = "x", digest = "{"0" * 64}"}}{"}" * min(depth, 400)}', 1)
+        return text.replace(
+            "[deck]", f'[deck]\n{parent}{{name = "x", digest = "{"0" * 64}"}}{"}" * min(depth, 400)}', 1
+        )
     copies = "".join(re.sub(r"^\[", f"[copy{n}.", text, flags=re.MULTILINE) for n in range(min(depth, 20)))
     return f"{text}\n{copies}"

@@ -32,10 +32,14 @@ class Fmus:
 
     limit = 60.0
 
-    def __init__(self, *, models: tuple[str, ...] = ("controller", "plant"), versions: tuple[str, ...] = ("2.0", "3.0")) -> None:
+    def __init__(
+        self, *, models: tuple[str, ...] = ("controller", "plant"), versions: tuple[str, ...] = ("2.0", "3.0")
+    ) -> None:
         with tempfile.TemporaryDirectory() as name:
             self._sound = [
-                export_fmu(_model(model), Path(name) / f"{model}{version[0]}.fmu", version=version).read_bytes()
+                export_fmu(
+                    _model(model), Path(name) / f"{model}{version[0]}.fmu", version=version
+                ).read_bytes()
                 for model in models
                 for version in versions
             ]
@@ -51,13 +55,19 @@ class Fmus:
             return Case({FILE: damaged_bytes(random, sound)}, how="bytes of the archive")
         if kind == 1:
             at = len(sound) - 3000
-            return Case({FILE: sound[:at] + damaged_bytes(random, sound[at:])}, how="directory of the archive")
+            return Case(
+                {FILE: sound[:at] + damaged_bytes(random, sound[at:])}, how="directory of the archive"
+            )
         if kind == 2:
             return Case({FILE: _other_entries(random, sound)}, how="entries")
         if kind == 3:
-            return self._changed(sound, _is_description, lambda c: _other_xml(random, c), "tokens of the description")
+            return self._changed(
+                sound, _is_description, lambda c: _other_xml(random, c), "tokens of the description"
+            )
         if kind == 4:
-            return self._changed(sound, _is_description, lambda c: damaged_bytes(random, c), "bytes of the description")
+            return self._changed(
+                sound, _is_description, lambda c: damaged_bytes(random, c), "bytes of the description"
+            )
         return self._changed(sound, _is_binary, lambda c: damaged_bytes(random, c), "machine code")
 
     @staticmethod
@@ -165,9 +175,13 @@ def _other_xml(chance: random.Random, content: bytes) -> bytes:
         at = 2 * chance.randrange(len(pieces) // 2) + 1
         pieces[at] = chance.choice((*EVIL_NUMBERS, *EVIL_TEXTS, "1.0", "independent", "output", "String"))
         return '"'.join(pieces).encode("utf-8", "surrogatepass")
-    entity = '<!DOCTYPE x [<!ENTITY a "' + "b" * 1000 + '">' + "".join(
-        f'<!ENTITY a{k} "{("&a" + (str(k - 1) if k else "") + ";") * 10}">' for k in range(9)
-    ) + '<!ENTITY f SYSTEM "file:///etc/passwd">]>'
+    entity = (
+        '<!DOCTYPE x [<!ENTITY a "'
+        + "b" * 1000
+        + '">'
+        + "".join(f'<!ENTITY a{k} "{("&a" + (str(k - 1) if k else "") + ";") * 10}">' for k in range(9))
+        + '<!ENTITY f SYSTEM "file:///etc/passwd">]>'
+    )
     head, _, rest = text.partition("?>")
     used = chance.choice(("&a8;", "&f;", "&unknown;"))
     rest = rest.replace('description="', f'description="{used}', 1)

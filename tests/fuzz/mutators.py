@@ -51,7 +51,9 @@ def damaged_bytes(chance: random.Random, content: bytes) -> bytes:
             fill = chance.choice((b"\x00", b"\xff", b"\x80", b"\x7f"))
             content = content[:at] + fill * length + content[at + length :]
         elif kind == 6:
-            content = content[:at] + bytes(chance.randrange(256) for _ in range(length)) + content[at + length :]
+            content = (
+                content[:at] + bytes(chance.randrange(256) for _ in range(length)) + content[at + length :]
+            )
         else:
             other = chance.randrange(len(content))
             content = content[:at] + content[other : other + length] + content[at + length :]

@@ -115,7 +115,9 @@ class Records:
         self._model = flatten(declare(load_deck("test_rig")))
         time = np.arange(ROWS) * 0.004
         angle = 0.7 * np.sin(5.0 * time)
-        self._columns = dict(zip(_HEADS, (time, angle, 2.0 * np.cos(5.0 * time), 40.0 * angle**2), strict=True))
+        self._columns = dict(
+            zip(_HEADS, (time, angle, 2.0 * np.cos(5.0 * time), 40.0 * angle**2), strict=True)
+        )
         self._csv = "\n".join([",".join(_HEADS), *(",".join(f"{v:.6g}" for v in row)
                                for row in np.column_stack(list(self._columns.values())))]) + "\n"  # fmt: skip
         self._binary = {".parquet": _parquet(self._columns), ".mat": _mat(self._columns),
@@ -158,6 +160,16 @@ class Records:
             Case(mapped, how="mapping"),
             Case({"rig.toml": _RIG.encode(), "cam.csv": self._cam.encode()}, how="rig"),
         ]
+
+    def long_csv(self, rows: int = 3000) -> bytes:
+        """Return a record of some seconds, with noise, over which a diagnosis works for a while."""
+        noise = np.random.default_rng(1)
+        time = np.arange(rows) * 0.002
+        angle = 0.5 * np.sin(6.0 * time)
+        columns = (time, angle + 5e-4 * noise.standard_normal(rows), 3.0 * np.sin(6.0 * time + 0.3)
+                   + 0.04 * noise.standard_normal(rows), 60.0 * np.abs(angle) + 0.6 * noise.standard_normal(rows))  # fmt: skip
+        lines = (",".join(f"{v:.6g}" for v in row) for row in np.column_stack(columns))
+        return "\n".join([",".join(_HEADS), *lines, ""]).encode()
 
     def _text_case(
         self, chance: random.Random, name: str, text: str, other: Callable[[random.Random, str], bytes]
@@ -210,7 +222,9 @@ def _text(chance: random.Random, text: str) -> bytes:
     if kind == 3:
         depth = chance.choice((10, 1000, 20000))
         deep = f"{'[' * depth}{']' * depth}"
-        return f"{text}\nx = {deep}\n".encode() if "=" in text else re.sub(r"\d", deep, text, count=1).encode()
+        return (
+            f"{text}\nx = {deep}\n".encode() if "=" in text else re.sub(r"\d", deep, text, count=1).encode()
+        )
     return damaged_tokens(chance, text).encode("utf-8", "surrogatepass")
 
 
@@ -254,7 +268,9 @@ def odd_csv(chance: random.Random, text: str) -> bytes:
     if kind == 8:
         return f"{head}\n{'9' * 200_000},1,2,3\n".encode() + "\n".join(rows).encode()
     if kind == 9:
-        return text.replace(chance.choice(_HEADS), chance.choice((*_HEADS, "", '"', "x" * 500, "θ [°]", "t [ms]"))).encode()
+        return text.replace(
+            chance.choice(_HEADS), chance.choice((*_HEADS, "", '"', "x" * 500, "θ [°]", "t [ms]"))
+        ).encode()
     if kind == 10:
         return f'{head}\n"{chance.choice(rows)}\n'.encode() + "\n".join(rows).encode()
     if kind == 11:

@@ -29,7 +29,9 @@ def outcome_of(family: Family, case: Case) -> Outcome:
         return judged_by(lambda: family.judged(case, folder))
 
 
-def outcomes(family: Family, cases: Callable[[int], Case], numbers: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
+def outcomes(
+    family: Family, cases: Callable[[int], Case], numbers: Iterable[int]
+) -> Iterator[tuple[int, Outcome]]:
     """Yield number and outcome of each case; a worker that dies or takes too long is replaced."""
     left = list(numbers)
     while left:
@@ -40,7 +42,9 @@ def outcomes(family: Family, cases: Callable[[int], Case], numbers: Iterable[int
         left = left[answered:]
 
 
-def _one_worker(family: Family, cases: Callable[[int], Case], numbers: list[int]) -> Iterator[tuple[int, Outcome]]:
+def _one_worker(
+    family: Family, cases: Callable[[int], Case], numbers: list[int]
+) -> Iterator[tuple[int, Outcome]]:
     """Yield outcomes until one worker has done all, has died, or was ended because a case took too long."""
     sys.stdout.flush()
     scratch = tempfile.mkdtemp(prefix="fuzz-worker-")
@@ -59,7 +63,8 @@ def _one_worker(family: Family, cases: Callable[[int], Case], numbers: list[int]
                 if done == len(numbers):
                     break
     except TimeoutError:
-        yield numbers[done], Outcome("too long", f"over {family.limit:g} s")
+        kind = "still at work" if getattr(family, "patient", False) else "too long"
+        yield numbers[done], Outcome(kind, f"over {family.limit:g} s")
         return
     finally:
         with contextlib.suppress(ProcessLookupError):
@@ -88,9 +93,7 @@ def _lines(stream: object, limit: float) -> Iterator[bytes]:
             until = time.monotonic() + limit
 
 
-def _work(
-    family: Family, cases: Callable[[int], Case], numbers: list[int], pipe: int, scratch: str
-) -> None:
+def _work(family: Family, cases: Callable[[int], Case], numbers: list[int], pipe: int, scratch: str) -> None:
     try:
         os.setpgid(0, 0)
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))

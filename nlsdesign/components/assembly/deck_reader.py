@@ -299,7 +299,9 @@ def _parent(builder: Builder, path: str, raw: object) -> ParentDeck | None:
         return None
     before = len(builder.problems)
     if not isinstance(raw, dict):
-        builder.problem(path, f"is {brief(raw)}, not a deck", next_step='write {name = "...", digest = "..."}')
+        builder.problem(
+            path, f"is {brief(raw)}, not a deck", next_step='write {name = "...", digest = "..."}'
+        )
         return None
     for key in raw:
         if key not in _PARENT_FIELDS:
