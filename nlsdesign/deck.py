@@ -284,7 +284,8 @@ def read_deck(text: str, path: Path) -> Deck:
 
 def _levels(tables: Mapping[str, Any]) -> int:
     """Return how many tables and lists stand within each other."""
-    levels, inner = 0, [tables]
+    levels = 0
+    inner: list[Any] = [tables]
     while inner:
         levels += 1
         each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]

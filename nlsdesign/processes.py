@@ -68,18 +68,18 @@ def run_to_end(
     seconds
         Most time that it may take; ``subprocess.TimeoutExpired`` is raised beyond it.
     """
-    group = {"process_group": 0} if sys.platform != "win32" else {}
+    group = None if sys.platform == "win32" else 0
     with signals_held():
         # It inherits that signals are held; a group of its own, which is killed, makes up for that.
         process = subprocess.Popen(
             command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, text=True, errors="replace", **group,
+            stderr=subprocess.PIPE, text=True, errors="replace", process_group=group,
         )  # fmt: skip
     try:
         out, errors = process.communicate(timeout=seconds)
     except BaseException:
         with signals_held(), contextlib.suppress(OSError):
-            if group:
+            if group is not None:
                 os.killpg(process.pid, signal.SIGKILL)
             process.kill()
         with signals_held():

@@ -161,7 +161,7 @@ def _run() -> Outcome:
         main()
     except SystemExit as leaving:
         status = leaving.code or 0
-        if status in (0, 1):
+        if status in (0, 1, 141):
             return Outcome(ACCEPTED)
         return Outcome(REFUSED) if status == 2 else Outcome("traceback", f"exit status {status!r}")
     except BaseException as error:
