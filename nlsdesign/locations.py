@@ -9,7 +9,6 @@ checked too, because a folder named ``models`` next to an *installed* package be
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import importlib.util
 import sys
 import tomllib
@@ -99,7 +98,12 @@ def version(*, package: Path = _PACKAGE) -> str:
     str
         The version of the checkout that is running, or else of the installed distribution.
     """
-    return _checkout_version(package) or importlib.metadata.version("nlsdesign")
+    checkout = _checkout_version(package)
+    if checkout is not None:
+        return checkout
+    import importlib.metadata  # takes longer than the start of the command line, so only where it is needed
+
+    return importlib.metadata.version("nlsdesign")
 
 
 def _checkout_version(package: Path) -> str | None:
