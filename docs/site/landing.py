@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 import nlsdesign as nls
@@ -11,14 +9,15 @@ from nlsdesign.design import contour_of_cam
 from nlsdesign.figures import cam_motion_of, cam_positions
 from nlsdesign.figures.svg import inline_svg
 
+from . import markup
+
 DECK = "austin2015_figure_consistent"
 
 
 def picture() -> str:
-    """Return the cam of the reference actuator at rest and turned, as SVG in a figure."""
+    """Return the cam of the reference actuator at two angles, as SVG in a figure."""
     actuator = nls.declare(nls.load_deck(DECK))
     model = nls.flatten(actuator)
     motion = cam_motion_of(model, contour_of_cam(actuator.element("spring").cam), count=61)
-    svg = inline_svg(cam_positions(motion, angles=[0.0, float(np.max(motion.angles))]), "reference")
-    svg = re.sub(r"\n\s*\n", "\n", svg)
-    return f'<figure class="plot">{svg}<figcaption>The cam of <code>{DECK}</code>, at rest and at the end of its range</figcaption></figure>'
+    svg = inline_svg(cam_positions(motion, angles=[np.radians(20.0), np.radians(45.0)]), "reference")
+    return markup.plot(svg, f"The cam of <code>{DECK}</code>, turned by 20° and by 45°")

@@ -1,4 +1,4 @@
-"""The sources of the site in one folder: pages of ``docs`` with their links, and pages made from the package."""
+"""The sources of the site in one folder: pages of ``docs``, and pages made from the package."""
 
 from __future__ import annotations
 
@@ -121,7 +121,10 @@ class Page:
             return link.group()
         target = (self.path.parent / address).resolve()
         docs = self.root / "docs"
-        known = {self.root / "README.md": docs / "index.md", self.root / "CHANGELOG.md": docs / "changelog.md"}
+        known = {
+            self.root / "README.md": docs / "index.md",
+            self.root / "CHANGELOG.md": docs / "changelog.md",
+        }
         if target in known or target.is_relative_to(docs):
             shown = _named(os.path.relpath(known.get(target, target), self.place.parent))
             return f"[{link['text']}]({shown}{'#' * bool(fragment)}{fragment})"
