@@ -43,7 +43,8 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
         )
     order = [re.sub(r"\W+", "_", title.lower()).strip("_") for title, _ in sections(root)]
     front = (
-        "# Python\n\n`import nlsdesign as nls` gives these names, with types; made from their docstrings. What is not here is in its "
+        "# Python\n\n`import nlsdesign as nls` gives these names, with types; made from their "
+        "docstrings. What is not here is in its "
         "[room](rooms.md).\n\n"
     )
     made["reference/api/index.md"] = (

@@ -1,7 +1,7 @@
 """Run studies and keep some of their figures for the gallery: ``python -m docs.site.collect [STUDY …]``.
 
-Studies take minutes, so their figures are committed, and ``docs/gallery/made.toml`` says when and with what they were
-made. Kept are the first small figures of each report, with the colours as variables of the page.
+Studies take minutes, so their figures are committed, and ``docs/gallery/made.toml`` says when and with what
+they were made. Kept are the first small figures of each report, with the colours as variables of the page.
 """
 
 from __future__ import annotations
@@ -66,7 +66,10 @@ def main() -> int:
         made[name] = {
             "command": f"nlsdesign study run {name} --fast",
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "with": f"nlsdesign {locations.version()}, CasADi {version_of('casadi')}, Python {platform.python_version()}",
+            "with": (
+                f"nlsdesign {locations.version()}, CasADi {version_of('casadi')}, "
+                f"Python {platform.python_version()}"
+            ),
             "titles": [title for title, _, _ in kept],
             "captions": [caption for _, caption, _ in kept],
         }

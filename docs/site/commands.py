@@ -65,9 +65,9 @@ def _command(path: tuple[str, ...], command: click.Command) -> str:
     text = markup.anchor(_place(path)) + heading + markup.code(usage, "text") + _help(command.help or "")
     rows = [_row(each, context) for each in command.get_params(context)]
     rows = [row for row in rows if row]
-    text += markup.table(
-        ("argument", "default", "meaning"), rows, caption=f"Arguments and options of {' '.join(path)}"
-    )
+    if rows:
+        caption = f"Arguments and options of {' '.join(path)}"
+        text += markup.table(("argument", "default", "meaning"), rows, caption=caption)
     shown = _examples(command.epilog or "")
     return text + (("<p>Examples</p>\n\n" + markup.code(shown, "console")) if shown else "")
 
@@ -93,8 +93,10 @@ def _row(parameter: click.Parameter, context: click.Context) -> list[str]:
         return [f"<code>{escape(metavar)}</code>", "" if not parameter.required else "required", ""]
     assert isinstance(parameter, click.Option)
     names = ", ".join([*parameter.opts, *parameter.secondary_opts])
+    if isinstance(parameter.type, click.Choice):
+        metavar = "CHOICE"
     shown = names if parameter.is_flag else f"{names} {metavar}"
-    if parameter.hidden:
+    if parameter.hidden or parameter.name == "help":
         return []
     help_text = markup.inline(" ".join((parameter.help or "").split()))
     choices = ""

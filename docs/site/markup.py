@@ -45,6 +45,21 @@ def folded(summary: str, content: str) -> str:
     return f"<details><summary>{summary}</summary>\n\n{content}\n\n</details>\n\n"
 
 
+def plot(svg: str, caption: str) -> str:
+    """Return a figure with its caption.
+
+    Parameters
+    ----------
+    svg
+        As it stands in a page.
+    caption
+        HTML.
+    """
+    # A blank line would end a block of HTML in Markdown.
+    whole = re.sub(r"\n\s*\n", "\n", svg)
+    return f'<figure class="plot">{whole}<figcaption>{caption}</figcaption></figure>\n\n'
+
+
 def code(text: str, language: str) -> str:
     """Return a block of code.
 

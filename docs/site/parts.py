@@ -96,7 +96,7 @@ def drawing(name: str, parts: list[Part]) -> str:
         except NlsError:  # for instance dry friction, which needs an inertia that it can hold
             continue
         if figure is not None:
-            return f'<figure class="plot">{inline_svg(figure, name)}<figcaption>{escape(part.title())}</figcaption></figure>\n\n'
+            return markup.plot(inline_svg(figure, name), escape(part.title()))
     return ""
 
 
@@ -108,7 +108,7 @@ def deck_example(part: Part) -> str:
     part
         An example of it.
     """
-    text = deck_text(around(part)).replace(', source = "not stated"', "")
+    text = deck_text(around(part)).replace('"not stated"', '"assumed: example"')
     return re.sub(r"\A\[deck\]\n.*?\n\n", "", text, flags=re.S).strip()
 
 
@@ -123,9 +123,10 @@ def _list(known: dict[str, type[Part]]) -> str:
     ]
     entries = "\n".join(ROOMS)
     return (
-        "# Parts of decks\n\nMade from the components, as `nlsdesign parts` lists them. Every table of a deck names one of these "
-        'with `component = "…"`; `between` says which bodies an element ties, `of` which signal a sensor reads. '
-        "Any number may be written bare, in SI, or as a table with `value`, `unit`, `source` and `spread`.\n\n"
+        "# Parts of decks\n\nMade from the components, as `nlsdesign parts` lists them. Every table of a "
+        "deck "
+        'names one of these with `component = "…"`; `between` says which bodies an element ties, `of` which '
+        "signal a sensor reads. Every number has `value`, `unit` and `source`, and may have a `spread`.\n\n"
         + markup.table(("part", "phenomena", "law"), rows, caption=f"All {len(known)} parts")
         + f"```{{toctree}}\n:hidden:\n\n{entries}\n```\n"
     )

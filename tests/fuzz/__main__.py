@@ -20,7 +20,6 @@ from . import family_names, family_of
 from .cases import Outcome
 from .running import made_by, outcomes, shrunk
 
-
 _SHORT = 20.0
 """Cases that may take longer are not made smaller."""
 
