@@ -115,7 +115,9 @@ def agrees(wanted: str, line: str) -> bool:
 def _form(wanted: str) -> re.Pattern[str]:
     """Return the form of a line: any numbers in the place of its numbers."""
     pieces = re.split(f"({NUMBER.pattern}|…)", wanted)
-    made = [".*?" if p == "…" else f"({NUMBER.pattern})" if NUMBER.fullmatch(p) else re.escape(p) for p in pieces]
+    made = [
+        ".*?" if p == "…" else f"({NUMBER.pattern})" if NUMBER.fullmatch(p) else re.escape(p) for p in pieces
+    ]
     return re.compile("".join(made))
 
 

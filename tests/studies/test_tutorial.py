@@ -19,7 +19,13 @@ SMALLER = {
     "nlsdesign export c": ["--kind", "cascade"],
 }
 """Options that make a command quicker; those of the page are kept and stand before them."""
-LEFT_OUT = ("nlsdesign export fmu", "nlsdesign cosimulate", "nlsdesign diagnose", "out/c_again", "export check")
+LEFT_OUT = (
+    "nlsdesign export fmu",
+    "nlsdesign cosimulate",
+    "nlsdesign diagnose",
+    "out/c_again",
+    "export check",
+)
 """What only the slow test runs: it needs FMUs or a diagnosis."""
 
 
