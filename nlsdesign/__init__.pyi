@@ -66,7 +66,6 @@ from .export import Late as Late
 from .export import cosimulate as cosimulate
 from .export import export_c as export_c
 from .export import export_fmu as export_fmu
-from .extensions import extended_by as extended_by
 from .identification import Record as Record
 from .identification import RecordSet as RecordSet
 from .identification import agreement as agreement

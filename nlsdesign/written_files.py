@@ -91,7 +91,8 @@ def file_state(path: Path) -> FileState:
     path
         Of the file.
     """
-    if not os.path.lexists(path):
+    # What stands in the way as a folder is refused by whoever writes.
+    if not os.path.lexists(path) or path.is_dir():
         return "new"
     stated = _listed(path.parent).get(path.name)
     if stated is None:

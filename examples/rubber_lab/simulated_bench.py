@@ -10,11 +10,12 @@ import rubber_lab
 from rubber_lab.laws import WireBundle
 
 import nlsdesign as nls
+from nlsdesign.extensions import extended_by
 
 
 def main(folder: Path) -> None:
     """Write four records of four seconds."""
-    with nls.extended_by(rubber_lab):
+    with extended_by(rubber_lab):
         declared = nls.declare(nls.load_deck(str(Path(__file__).parent / "decks" / "jointed.toml")))
     law = WireBundle(stiffness=nls.quantity(0.15, "N*m/rad"), hardening_angle=nls.quantity(0.5, "rad"))
     built = declared.with_part("wires", nls.tie(law, "motor"))

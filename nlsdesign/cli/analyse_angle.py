@@ -20,6 +20,7 @@ from .output import (
     spring_option,
 )
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -67,7 +68,8 @@ def analyse_angle(
     from ..model.transform import with_outputs
     from ..report import write_analysis_report
 
-    model = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    model = flatten(declared)
     torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     if not last > first:
         raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
@@ -86,10 +88,12 @@ def analyse_angle(
         "observability": observability_over_angle({model.name: chart}, drops={model.name: drops}),
     }
     files = [out / "over_angle.csv", *write_figures(out, pictures)]
+    remarks = range_remarks(declared, first=first, last=last, measured=measured)
+    warn(remarks)
     page = out / "report.html"
     files.append(write_analysis_report(page, chart, drops, model=model.name, ranking=ranking, files=files))
     if as_json:
-        show_json(_as_json(chart, drops, ranking) | {"file": files[0], "files": files})
+        show_json(_as_json(chart, drops, ranking) | {"warnings": remarks, "file": files[0], "files": files})
         return
     _show(chart, drops, model.name)
     if ranking is not None:

@@ -17,6 +17,7 @@ from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
 from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -82,14 +83,17 @@ def export_code(
     from ..export import export_c, write_examples
     from ..model import flatten
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
     with_examples = chosen.pop("examples")
     name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     source = export_c(model, out, real=real, name=name)
     written = [source.header, source.source, source.selftest]
     if with_examples:
         written += write_examples(source)
-    show_written(as_json, (model.description, *sentences), written, name=name)
+    remarks = range_remarks(declared, measured=chosen["measured"])
+    warn(remarks)
+    show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
 
 
 def sampled_part(

@@ -15,6 +15,7 @@ from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..export import Authorship
@@ -144,7 +145,8 @@ def export_fmus(
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-    made = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen, law)
+    declared = declare(load_deck(deck_name))
+    made = _Models(flatten(declared), sample_time, chosen, law)
     # Before anything is written: not every system has an observer.
     if what:
         models = {each: made[each] for each in dict.fromkeys(what)}
@@ -162,6 +164,7 @@ def export_fmus(
     show_written(as_json, (), written, left_out=reasons)
     for name, reason in {} if as_json else reasons.items():
         click.echo(f"left out: {name}: {reason}")
+    warn(range_remarks(declared, measured=chosen["measured"]))
 
 
 def _systems(platforms: Sequence[str]) -> Sequence[str] | None:

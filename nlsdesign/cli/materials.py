@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    epilog=examples(
-        "nlsdesign materials", "nlsdesign materials natural_rubber_50_shore_a", "nlsdesign materials --json"
-    )
+    epilog=examples("nlsdesign materials", "nlsdesign materials natural_rubber", "nlsdesign materials --json")
 )
 @click.argument("name", metavar="[MATERIAL]", required=False)
 @json_option

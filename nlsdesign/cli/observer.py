@@ -12,6 +12,7 @@ from .observer_certificate import CERTIFICATE, range_options
 from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
 from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ def observer(
 
     kind, wanted = _what_is_asked(context, options)
     deck = load_deck(deck_name)
-    plant = flatten(declare(deck))
+    declared = declare(deck)
+    plant = flatten(declared)
     roles = {name: options[name] for name in ("spring", "measured")}
     sample_time, real = options["sample_time"], options["real"]
     chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
@@ -109,6 +111,8 @@ def observer(
     if errors is not None:
         files += write_errors(errors, out)
     statement = () if proved is None else proved.statement
+    remarks = range_remarks(declared, measured=options["measured"])
+    warn(remarks)
     words = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
     if errors is not None:
         files.append(write_observer_report(out / "report.html", model, errors, words=words, files=files))
@@ -116,7 +120,7 @@ def observer(
         content = {
             "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),
             "description": model.description, "statement": list(statement),
-            "certified": proved is not None, "files": files,
+            "certified": proved is not None, "warnings": remarks, "files": files,
         }  # fmt: skip
         show_json(content | ({} if errors is None else {"errors": content_of(errors)}))
         return

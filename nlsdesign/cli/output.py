@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
+
+from .tables import head_count, table_lines
+
+WIDE = 160
+"""Width of a table that is not shown on a terminal."""
 
 
 def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -22,17 +31,20 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
     rows
         Text of the cells.
     """
-    from rich.console import Console
-    from rich.table import Table
+    on_terminal = sys.stdout.isatty()
+    # What is piped is not for a narrow screen, unless COLUMNS says so.
+    width = shutil.get_terminal_size((80, 24)).columns if on_terminal else _columns() or WIDE
+    lines = table_lines(columns, rows, width=width)
+    bold = head_count(columns, rows, width=width) if on_terminal and not os.environ.get("NO_COLOR") else 0
+    if title:
+        click.echo("\n".join(textwrap.wrap(title, width)))
+    for number, line in enumerate(lines):
+        click.echo(click.style(line, bold=True) if number < bold else line)
 
-    table = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    # A piped table is not wrapped at 80 columns.
-    width = None if Console().is_terminal else 160
-    Console(highlight=False, markup=False, width=width).print(table)
+
+def _columns() -> int:
+    given = os.environ.get("COLUMNS", "")
+    return int(given) if given.isdigit() else 0
 
 
 def show_json(content: Mapping[str, Any]) -> None:

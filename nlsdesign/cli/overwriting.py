@@ -84,7 +84,8 @@ def _guarded(
         @functools.wraps(command)
         def guarded(*words: Any, **given: Any) -> Any:
             force, dry_run = given.pop("force"), given.pop("dry_run")
-            if click.get_current_context().invoked_subcommand is not None:
+            only_asked = click.get_current_context().invoked_subcommand is not None or given.get("listed")
+            if only_asked:
                 return command(*words, **given)
             folder, paths = files(given)
             if dry_run:

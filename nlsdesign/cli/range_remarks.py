@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..errors import visible
+
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
     from ..model import FlatModel
@@ -50,8 +52,9 @@ def range_remarks(
     for each in left:
         law = type(_part(declared, each.part)).__name__
         remarks.append(
-            f"{each} ({law}) -> take a law that is stated to hold so far, such as one fitted to a measured curve "
-            f"(nlsdesign materials), or keep the stretch smaller: more rest length, less pretension or angle"
+            f"{each} ({law}) -> take a law that is stated to hold so far, such as one fitted to a measured "
+            "curve (nlsdesign materials), or keep the stretch smaller: more rest length, less pretension or "
+            "angle"
         )
     return remarks
 
@@ -69,9 +72,9 @@ def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
     furthest = max(abs(angle) for angle in angles)
     cams = [cam for spring in model.springs for cam in spring.cams if cam.last_angle]
     return [
-        f"the contour of {cam.name} ends at {math.degrees(model.values[cam.last_angle or '']):.4g}°, the angles go "
-        f"to {math.degrees(furthest):.4g}°: beyond its end the lever arm stays what it is there -> stay within "
-        f"it (--to), or declare a longer contour"
+        f"the contour of {cam.name} ends at {math.degrees(model.values[cam.last_angle or '']):.4g}°, the "
+        f"angles go to {math.degrees(furthest):.4g}°: beyond its end the lever arm stays what it is there -> "
+        "stay within it (--to), or declare a longer contour"
         for cam in cams
         if furthest > model.values[cam.last_angle or ""] * (1.0 + 1e-9)
     ]
@@ -86,7 +89,7 @@ def warn(remarks: Iterable[str]) -> None:
         Sentences.
     """
     for remark in remarks:
-        click.echo(f"warning: {remark}", err=True)
+        click.echo(f"warning: {visible(remark)}", err=True)
 
 
 def _part(declared: Assembly, path: str) -> object:

@@ -188,7 +188,7 @@ def list_studies(as_json: bool) -> None:
         "nlsdesign study run my_study.py --json",
     )
 )
-@click.argument("name")
+@click.argument("name", metavar="STUDY")
 @click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import UnitError
 from ..quantity import Quantity, quantity, same_dimension, typeset_unit, with_unit
+from ..quantity import split_number as split_number
 
 if TYPE_CHECKING:
     _Kind = click.ParamType[float]
@@ -67,26 +67,6 @@ class Bytes(_Count):
                 f"'{value}'", f"is no size of memory; units are {', '.join(_BYTES)}", next_step="write '16kB'"
             )
         return int(number * _BYTES[unit])
-
-
-def split_number(text: str) -> tuple[float, str]:
-    """Return number and unit of ``"5 N·m"``, ``"5N*m"`` or ``"5N.m"``; a full stop in a unit is a product.
-
-    Parameters
-    ----------
-    text
-        Number and unit.
-
-    Raises
-    ------
-    UnitError
-        If it does not begin with a number.
-    """
-    match = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
-    if match is None:
-        raise UnitError(f"'{text}'", "does not start with a number")
-    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
-    return float(match.group(1)), unit
 
 
 def parse_number(text: str, unit: str) -> Quantity:

@@ -145,21 +145,18 @@ class _Term:
     size: int
     uses: frozenset[sympy.Symbol]
 
-    @property
-    def shown(self) -> Any:
-        """The value; where it is too long, a function of what it depends on, rows of numbers named once."""
-        if self.size <= LONGEST:
-            return _number(self.value)
-        names = {str(s.name).partition("[")[0] for s in self.uses}
-        return sympy.Function("f")(*[_symbol(name) for name in sorted(names)])
-
 
 def _symbol(name: str) -> sympy.Symbol:
     return sympy.Symbol(name, real=True)
 
 
 def read_equations(
-    function: ca.Function, inputs: list[list[str]], results: list[list[str]], *, discrete: bool
+    function: ca.Function,
+    inputs: list[list[str]],
+    results: list[list[str]],
+    *,
+    discrete: bool,
+    longest: float = LONGEST,
 ) -> Equations:
     """Return the equations of a function of named numbers.
 
@@ -173,23 +170,25 @@ def read_equations(
         Names of states, outputs and signals.
     discrete
         Whether the first result is the next state.
+    longest
+        Operations beyond which a definition is shown as a function of what it depends on.
 
     Raises
     ------
     ExportError
         If a law uses an operation that has no SymPy counterpart here.
     """
-    reader = _Reader(function, inputs)
+    reader = _Reader(function, inputs, longest)
     reader.run(results)
-    derivatives = {n: reader.terms[reader.results[0, i]].shown for i, n in enumerate(results[0])}
+    derivatives = {n: reader.shown(reader.terms[reader.results[0, i]]) for i, n in enumerate(results[0])}
     return Equations(derivatives, reader.definitions, discrete)
 
 
 class _Reader:
     """Runs through the instructions of an SX function and turns each into SymPy."""
 
-    def __init__(self, function: ca.Function, inputs: list[list[str]]) -> None:
-        self.function, self.inputs = function, inputs
+    def __init__(self, function: ca.Function, inputs: list[list[str]], longest: float) -> None:
+        self.function, self.inputs, self.longest = function, inputs, longest
         self.terms: list[_Term] = []
         self.results: dict[tuple[int, int], int] = {}
         self.definitions: dict[str, sympy.Expr] = {}
@@ -204,11 +203,18 @@ class _Reader:
             term = self._term(operation, [self.terms[i] for i in operands], extra)
             self.terms.append(self._defined(term, names.get(number, []), operation))
 
+    def shown(self, term: _Term) -> Any:
+        """Return a value; where it is too long, a function of what it depends on, rows named once."""
+        if term.size <= self.longest:
+            return _number(term.value)
+        names = {str(s.name).partition("[")[0] for s in term.uses}
+        return sympy.Function("f")(*[_symbol(name) for name in sorted(names)])
+
     def _defined(self, term: _Term, names: list[str], operation: int) -> _Term:
         """Note the names of a value; from then on it goes by the first of them, inputs by their own."""
         if names and operation not in (ca.OP_INPUT, ca.OP_CONST):
             own = _symbol(names[0])
-            self.definitions[names.pop(0)] = term.shown
+            self.definitions[names.pop(0)] = self.shown(term)
             term = _Term(own, 0, frozenset([own]))
         self.definitions |= {name: term.value for name in names if name != str(term.value)}
         return term
@@ -228,5 +234,5 @@ class _Reader:
         used = operands[:1] if operation in _UNARY or operation == ca.OP_NOT else operands
         size = 1 + sum(term.size for term in used)
         # What is too long to be shown is not even built: written out, shared parts multiply.
-        value = _value(operation, [term.value for term in used]) if size <= LONGEST else None
+        value = _value(operation, [term.value for term in used]) if size <= self.longest else None
         return _Term(value, size, frozenset().union(*[term.uses for term in used]))

@@ -57,9 +57,9 @@ def read_back(text: str) -> Any:
 def assert_same_equations(model: FlatModel, read: Any) -> None:
     """At random points everything that the text computes is what the model computes, to 1e-12."""
     generator = np.random.default_rng(1)
-    for _ in range(4):
-        x = [generator.normal(v.start, 0.3 * v.nominal) for v in model.states]
-        u = [generator.normal(v.start, 0.5 * v.nominal) for v in model.inputs]
+    for size in (0.0, 1.0, 1.0, 1.0):  # the start values themselves, where relations hold as equalities
+        x = [generator.normal(v.start, 0.3 * size * v.nominal) for v in model.states]
+        u = [generator.normal(v.start, 0.5 * size * v.nominal) for v in model.inputs]
         p = [v.start * generator.uniform(0.97, 1.03) for v in model.parameters]
         time = generator.uniform(0.0, 5.0)
         f, y, s, _ = (np.array(each).ravel().tolist() for each in model.equations(time, x, u, p, []))
@@ -132,7 +132,8 @@ def hand_built(expression: Any, x: Any, u: Any) -> FlatModel:
     "law",
     [
         lambda x, u: x - (u - (x + u)),
-        lambda x, u: x / (u / (x / u)),
+        lambda x, u: x / ((2 + u) / (x / (3 + u))) - (-(x + u)) * 2 - ca.sin(-(x + u)),
+        lambda x, u: ca.if_else(ca.logic_not(x <= u), 1, 2),
         lambda x, u: -(x * -u) - (-x) * (-3.5),
         lambda x, u: (x**2) ** u + 2 ** (-u * u) - (-x) ** 2,
         lambda x, u: ca.if_else(ca.logic_and(x < u, ca.logic_not(u <= 0)), x, u) + ca.if_else(x, 2, 3),
@@ -141,7 +142,7 @@ def hand_built(expression: Any, x: Any, u: Any) -> FlatModel:
         lambda x, u: (
             ca.log1p(x * x) - ca.expm1(u) + ca.log1p(1e-9 * x * x) / 1e-9 + ca.expm1(1e-9 * u) / 1e-9
         ),
-        lambda x, u: ca.fmin(ca.fabs(x), ca.sign(u)) * ca.floor(x * 4) - ca.ceil(u) / ca.atan2(x, u),
+        lambda x, u: ca.fmin(ca.fabs(x), ca.sign(u)) * ca.floor(x * 4) - ca.ceil(u) / (4 + ca.atan2(x, u)),
         lambda x, u: ca.if_else(x > 0, ca.if_else(u > 0, 1, x), u) + ca.if_else(x > 0, 5, (u - x) ** 2),
         lambda x, u: ca.fmax(-ca.inf, x) + ca.fmin(u, ca.inf),
         lambda x, u: (

@@ -14,7 +14,7 @@ import nlsdesign as nls
 from nlsdesign.components import component_classes, law_of, materials
 from nlsdesign.discrepancy.effects import catalogue
 from nlsdesign.errors import ArrangementError, DeckError, NlsError
-from nlsdesign.extensions import load_extension
+from nlsdesign.extensions import extended_by, load_extension
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -36,7 +36,7 @@ def test_a_law_an_effect_and_a_rubber_are_known_within_the_block_only(lab: Path)
     before = set(component_classes()), {row.__name__ for row in catalogue()}, set(materials())
     with pytest.raises(NlsError, match="'Gent' is not a component"):
         nls.declare(deck)
-    with nls.extended_by(load_extension("rubber_lab")):
+    with extended_by(load_extension("rubber_lab")):
         joint = nls.declare(deck)
         after = set(component_classes()), {row.__name__ for row in catalogue()}, set(materials())
         fitted = law_of(nls.material("lab_rubber"))
@@ -54,7 +54,7 @@ def test_a_law_an_effect_and_a_rubber_are_known_within_the_block_only(lab: Path)
 
 
 def test_the_deck_of_such_a_machine_reads_back(lab: Path, tmp_path: Path) -> None:
-    with nls.extended_by(load_extension("rubber_lab")):
+    with extended_by(load_extension("rubber_lab")):
         joint = nls.declare(nls.load_deck(str(lab / DECK)))
         nls.write_deck(joint, tmp_path / "again.toml")
         assert nls.declare(nls.load_deck(str(tmp_path / "again.toml"))) == joint
@@ -103,13 +103,13 @@ def _module(tmp_path: Path, text: str) -> ModuleType:
 def test_two_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     law = "from nlsdesign.components import Spring as Base\nclass Spring(Base):\n    pass\n"
     with (
-        nls.extended_by(_module(tmp_path, law)),
+        extended_by(_module(tmp_path, law)),
         pytest.raises(ArrangementError, match=r"twice\.Spring: has the name of a component of nlsdesign"),
     ):
         component_classes()
     row = "from nlsdesign.discrepancy.effects import Effect\nmine = Effect('backlash', 'Mine.', 1, ())\n"
     with (
-        nls.extended_by(_module(tmp_path, row)),
+        extended_by(_module(tmp_path, row)),
         pytest.raises(ArrangementError, match="has an effect 'backlash', and so has the catalogue"),
     ):
         catalogue()
@@ -122,7 +122,7 @@ def test_two_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
     (package / "materials.toml").write_text(text + 'source = "d"\nevidence = "data sheet"\n', "utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     with (
-        nls.extended_by(load_extension("doubled")),
+        extended_by(load_extension("doubled")),
         pytest.raises(DeckError, match="'EPDM' stands in another library already"),
     ):
         materials()
@@ -137,5 +137,5 @@ def test_modules_that_are_private_are_left_alone(tmp_path: Path, monkeypatch: py
         "from nlsdesign.components import Yeoh\nclass Law(Yeoh): pass\n", "utf-8"
     )
     monkeypatch.syspath_prepend(str(tmp_path))
-    with nls.extended_by(load_extension("shy")):
+    with extended_by(load_extension("shy")):
         assert "Law" in component_classes()

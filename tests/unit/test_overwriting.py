@@ -143,7 +143,8 @@ def test_a_command_repeats_itself_without_a_question_and_refuses_to_lose_an_edit
 def test_a_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
     calls = (CALL, ("design", "--deck", DECK), ("export", "c", "--deck", DECK, "--what", "both"),
              ("export", "fmu", "--deck", DECK), ("diagnose", "--deck", DECK, "--records", "r", "--export"),
-             ("study", "run", "hello"), ("observer", "--deck", DECK), ("fit", "--deck", DECK, "--records", "r"))  # fmt: skip
+             ("study", "run", "hello"), ("observer", "--deck", DECK),
+             ("fit", "--deck", DECK, "--records", "r"))  # fmt: skip
     listed = {}
     for words in calls:
         status, out, err = run(*words, "--dry-run")

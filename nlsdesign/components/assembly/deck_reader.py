@@ -376,6 +376,20 @@ def _is_pair(raw: object) -> bool:
     return isinstance(raw, list) and len(raw) == 2 and all(isinstance(end, str) for end in raw)
 
 
+def _without_one_behind(has_cam: bool, names: list[str]) -> DeckError:
+    if not has_cam:
+        step = 'add a table such as [spring.cam] with component = "TwoSidedCam"'
+        return DeckError("Through", "needs a table 'cam'", next_step=step)
+    if not names:
+        step = 'add a table such as [spring.rubber] with component = "Specimen"'
+        return DeckError("Through", "needs a table for the element behind the cam", next_step=step)
+    return DeckError(
+        "Through", f"has {len(names)} elements behind its cam, {', '.join(map(repr, names))}, and takes one",
+        next_step='put both into one table: component = "Parallel" where they share the stretch, "Series" '
+        "where they share the force",
+    )  # fmt: skip
+
+
 def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str, Part]) -> dict[str, Any]:
     """Return the fields of a part that are not numbers."""
     if issubclass(kind, Combination):
@@ -383,7 +397,7 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
     if issubclass(kind, Through):
         behind = [pair for pair in children.items() if pair[0] != "cam"]
         if "cam" not in children or len(behind) != 1:
-            raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
+            raise _without_one_behind("cam" in children, [name for name, _ in behind])
         return {"cam": children["cam"], "behind": behind[0]}
     if issubclass(kind, Free):
         return {"chain": tuple(children.items())}

@@ -54,14 +54,14 @@ def _ends(machine: Assembly) -> Iterator[str]:
         if len(part.between) == 1 and others:
             both = f'between = ["{part.between[0]}", "{others[0]}"]'
             yield (
-                f"{name}: stretches between '{part.between[0]}' and the resting frame; '{others[0]}' does not "
-                f"feel it -> write {both} for a spring in series"
+                f"{name}: stretches between '{part.between[0]}' and the resting frame; '{others[0]}' does "
+                f"not feel it -> write {both} for a spring in series"
             )
         elif len(part.between) == 2 and part.between[1] in driven and part.between[0] not in driven:
             swapped = f'between = ["{part.between[1]}", "{part.between[0]}"]'
             yield (
-                f"{name}: its angle is that of '{part.between[0]}' minus that of '{part.between[1]}', so a drive "
-                f"that turns forward gives a negative torque -> write {swapped} for a positive one"
+                f"{name}: its angle is that of '{part.between[0]}' minus that of '{part.between[1]}', so a "
+                f"drive that turns forward gives a negative torque -> write {swapped} for a positive one"
             )
 
 
@@ -83,9 +83,9 @@ def _inertias(machine: Assembly) -> Iterator[str]:
             if fast > _FASTEST:
                 reflected = Quantity(float(f"{part.inertia.number * n * n:.4g}"), part.inertia.unit)
                 yield (
-                    f"{name}.inertia: {part.inertia} is that at the gear's output; the rotor alone would then have "
-                    f"{_in_grams(part.inertia.number / n**2)} and speed up with {fast:.2g} rad/s², more than motors "
-                    f"do -> if {part.inertia} is that of the rotor, write {reflected}, times {n:g}^2"
+                    f"{name}.inertia: {part.inertia} is that at the gear's output; the rotor would then have "
+                    f"{_in_grams(part.inertia.number / n**2)} and speed up with {fast:.2g} rad/s², more than "
+                    f"motors do -> if {part.inertia} is that of the rotor, write {reflected}, times {n:g}^2"
                 )
         elif isinstance(part, ElectricMotor) and name in gears and abs(gears[name].ratio.number) > 1.0:
             n = abs(gears[name].ratio.number)
@@ -94,9 +94,9 @@ def _inertias(machine: Assembly) -> Iterator[str]:
             if slow < _SLOWEST:
                 own = Quantity(float(f"{part.inertia.number / n / n:.4g}"), part.inertia.unit)
                 yield (
-                    f"{name}.inertia: {part.inertia} is that of the rotor, in front of the gear, which the largest "
-                    f"current speeds up with {slow:.2g} rad/s² only -> if it is that at the gear's output, write "
-                    f"{own}, divided by {n:g}^2"
+                    f"{name}.inertia: {part.inertia} is that of the rotor, in front of the gear, which the "
+                    f"largest current speeds up with {slow:.2g} rad/s² only -> if it is that at the gear's "
+                    f"output, write {own}, divided by {n:g}^2"
                 )
 
 

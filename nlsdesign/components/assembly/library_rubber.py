@@ -73,8 +73,8 @@ def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
 
 
 def _tables(law: MaterialLaw) -> dict[str, Any]:
-    """Return the fields and tables of a piece of that rubber, as a deck would have them, without its sizes."""
-    piece = specimen(rest_length=0.01, area=1e-4, strength=law.strength, **dict(law.members))
+    """Return the fields and tables of a piece of that rubber, as a deck has them, without its sizes."""
+    piece = specimen(rest_length=0.01, area=1e-4, section=None, strength=law.strength, **dict(law.members))
     tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
     return {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
 
