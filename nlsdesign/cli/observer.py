@@ -87,7 +87,6 @@ def observer(
     from ..model import flatten
     from ..observer import certified_design
     from ..progress import Steps
-    from ..report import write_observer_report
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
@@ -110,14 +109,12 @@ def observer(
     files = [source.header, source.source, source.selftest]
     if proved is not None:
         files.insert(0, write_proved(proved, out, source))
-    if errors is not None:
-        files += write_errors(errors, out)
     statement = () if proved is None else proved.statement
     remarks = range_remarks(declared, measured=options["measured"])
     warn(remarks)
     words = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
     if errors is not None:
-        files.append(write_observer_report(out / "report.html", model, errors, words=words, files=files))
+        files += write_errors(errors, out, model=model, words=words, files=files)
     if as_json:
         content = {
             "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),
