@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from nlsdesign.cli import deck_new
 from nlsdesign.cli.main import program
 from nlsdesign.cli.readiness import readiness
 from nlsdesign.components import Specimen
+from nlsdesign.components.assembly.deck_reader import component_classes
 from nlsdesign.components.assembly.deck_remarks import deck_remarks
 from nlsdesign.components.assembly.deck_template import (
     MotorInertia,
@@ -20,7 +22,7 @@ from nlsdesign.components.assembly.deck_template import (
     template_names,
 )
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck
+from nlsdesign.deck import load_deck, read_deck
 from nlsdesign.quantity import quantity
 from tests.command_line import Run
 from tests.command_line import run as run
@@ -162,8 +164,8 @@ def test_the_terminal_is_asked_with_unit_and_usual_value(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(deck_new, "on_terminal", lambda: True)
-    # Template, rubber (once misspelt), ratio, constant (once in a wrong unit), six as usual, inertia.
-    answers = ["", "PMC", "Dragon_Skin_30", "25", "3 kg", "41", *[""] * 7, "rotor", "2"]
+    # Template, rubber (once misspelt), ratio, constant (once in a wrong unit), eight as usual, inertia.
+    answers = ["", "PMC", "Dragon_Skin_30", "25", "3 kg", "41", *[""] * 8, "rotor", "2"]
     result = CliRunner().invoke(program, ["deck", "new", "leg"], input="\n".join(answers) + "\n")
     assert result.exit_code == 0, result.output
     assert "did you mean 'PMC-770'" in result.output
@@ -190,3 +192,13 @@ def test_a_copy_keeps_the_comments_and_the_listing_names_files(run: Run, tmp_pat
     assert status == 0
     assert set(listed["templates"]) == set(TEMPLATES)
     assert Path(listed["decks"]["test_rig"]["file"]).is_file()
+
+
+def test_the_deck_of_the_page_on_the_format_is_one(root: Path) -> None:
+    page = (root / "docs" / "deck_format.md").read_text(encoding="utf8")
+    text = page.partition("```toml\n")[2].partition("```")[0]
+    machine = declare(read_deck(text, Path("leg.toml")))
+    assert machine["spring.rubber"].title().startswith("Specimen")
+    tables = page.split("## What stands where")[1]
+    kinds = {name for name in re.findall(r"`([A-Z]\w+)`", tables)}
+    assert kinds <= set(component_classes()), kinds - set(component_classes())
