@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -33,11 +31,16 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.errors import DeckError, nearest
+from nlsdesign.deck import load_deck
+from nlsdesign.errors import DeckError, brief, nearest
+from nlsdesign.identification.records.quality import check_columns
+from nlsdesign.identification.records.table_files import read_table
 from nlsdesign.quantity import Quantity, quantity, significant
 
 _CONTROL_VALUES = 80
 _CHANGEOVER = 2e-5  # rad; at 15 mm lever arm 0.3 µm of extension
+_CAM_COLUMNS = ("theta_rad", "delta_m", "lever_arm_m")
+_LARGEST = 1e100
 _SPREAD, _SPREAD_OF_VISCOSITY, _SPREAD_OF_BEARING = 0.06, 0.3, 0.6
 
 
@@ -60,13 +63,11 @@ def test_rig_deck(rig_toml: Path, cam_csv: Path) -> Assembly:
     Raises
     ------
     DeckError
-        If a field is missing.
+        If a field is missing, or is no number.
+    MeasurementError
+        If the table of the cam cannot be read.
     """
-    try:
-        rig = tomllib.loads(rig_toml.read_text(encoding="utf8"))
-    except tomllib.TOMLDecodeError as error:
-        raise DeckError(rig_toml.name, f"is not valid TOML: {error}") from None
-    numbers = _Numbers(rig, rig_toml.name)
+    numbers = _Numbers(load_deck(rig_toml).tables, rig_toml.name)
     return assembly(
         "test_rig",
         description="Practice rig: rubber behind a two-sided cam, servoed motor, load side held",
@@ -102,6 +103,8 @@ class _Numbers:
     def raw(self, table: str, field: str) -> Any:
         """Return what stands in a field."""
         fields = self._tables.get(table, {})
+        if not isinstance(fields, dict):
+            raise DeckError(f"{self._file}: {table}", "is not a table", next_step=f"write [{table}]")
         if field not in fields:
             raise DeckError(
                 f"{self._file}: {table}.{field}", "is missing", did_you_mean=nearest(field, fields),
@@ -111,14 +114,21 @@ class _Numbers:
 
     def __call__(self, table: str, field: str, unit: str, spread: float = 0.0) -> Quantity:
         """Return a number or a row of numbers with unit and spread."""
-        raw = self.raw(table, field)
-        value = tuple(float(v) for v in raw) if isinstance(raw, list) else float(raw)
-        return quantity(value, unit, source=f"{self._file}, {table}.{field}", spread=spread)
+        value = self.raw(table, field)
+        row = value if isinstance(value, list) else [value]
+        if not row or not all(isinstance(v, int | float) and abs(v) < _LARGEST for v in row):
+            raise DeckError(f"{self._file}: {table}.{field}", f"{brief(value)} is no number")
+        return quantity(
+            tuple(row) if isinstance(value, list) else value,
+            unit,
+            source=f"{self._file}, {table}.{field}",
+            spread=spread,
+        )
 
 
 def _rubber(numbers: _Numbers) -> Specimen:
     length = numbers("rubber", "L0_m", "m")
-    engaged = significant(d / length.number for d in numbers.raw("rubber", "delta_i_m"))
+    engaged = significant(d / length.number for d in numbers("rubber", "delta_i_m", "m").values)
     return specimen(
         area=numbers("rubber", "A0_m2", "m^2"),
         rest_length=length,
@@ -145,12 +155,9 @@ def _cam(cam_csv: Path) -> TwoSidedCam:
 
 
 def _cam_table(cam_csv: Path) -> NDArray[np.float64]:
-    with cam_csv.open(newline="", encoding="utf8") as stream:
-        rows = list(csv.reader(stream))
-    wanted = ["theta_rad", "delta_m", "lever_arm_m"]
-    if not rows or rows[0] != wanted:
-        raise DeckError(f"{cam_csv.name}:1:1", f"the columns must be {', '.join(wanted)}")
-    try:
-        return np.array(rows[1:], dtype=float)
-    except ValueError as error:
-        raise DeckError(cam_csv.name, f"holds something that is not a number: {error}") from None
+    table = read_table(cam_csv)
+    if table.heads != _CAM_COLUMNS:
+        raise DeckError(f"{cam_csv.name}:1:1", f"the columns must be {', '.join(_CAM_COLUMNS)}")
+    columns = table.columns(_CAM_COLUMNS)
+    check_columns(table.file, columns, first_row=table.first_row)
+    return np.column_stack([columns[name] for name in _CAM_COLUMNS])

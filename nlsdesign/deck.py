@@ -11,14 +11,22 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import DeckError, NlsError, UnitError, nearest, unknown_name
+from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name, visible
 from .locations import folder
 from .quantity import Quantity, parse_unit
+from .reading import is_there, text_of
 
 _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
 _HEADER = re.compile(rf"^\s*\[\[?\s*({_NAME})\s*\]")
 _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
+MOST_SPREAD = 5.0
+"""Largest relative spread of a number in a deck: a factor of six."""
+_MOST_LEVELS = 64
+"""Names within names; the deepest deck of the project has seven."""
+_TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
+_MOST_DIGITS = 1000
+_TOO_MANY_DIGITS = re.compile(rf"[0-9A-Fa-f_]{{{_MOST_DIGITS}}}")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
 
 
@@ -66,6 +74,10 @@ class ParentDeck:
     digest: str
     change: str = ""
     parent: ParentDeck | None = None
+
+    def __post_init__(self) -> None:
+        for field_name in ("name", "digest", "change"):
+            object.__setattr__(self, field_name, visible(getattr(self, field_name)))
 
     def line(self) -> tuple[ParentDeck, ...]:
         """Return this deck and those before it, the latest first."""
@@ -151,11 +163,13 @@ class Deck:
             If it is not such a table, a field is misspelt, or the value is not a number.
         UnitError
             If the unit is missing or unknown.
+        ValueRangeError
+            If the spread is one that only per cent can have.
         """
         where = self.place(full_name)
         if not isinstance(raw, dict):
             raise DeckError(
-                where, f"is the bare value {raw!r}; a number needs a unit and a source",
+                where, f"is the bare value {brief(raw)}; a number needs a unit and a source",
                 next_step='write {value = ..., unit = "...", source = "...", spread = ...}',
             )  # fmt: skip
         for key in raw:
@@ -176,17 +190,29 @@ class Deck:
         value, spread = raw["value"], raw.get("spread", 0.0)
         items = value if isinstance(value, list) else [value]
         if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in [*items, spread]):
-            raise DeckError(where, f"value {value!r} or spread {spread!r} is not a number")
+            raise DeckError(where, f"value {brief(value)} or spread {brief(spread)} is not a number")
+        if any(isinstance(v, Written) and len(v.text) > _MOST_DIGITS for v in [*items, spread]):
+            raise DeckError(where, f"has a number of more than {_MOST_DIGITS} digits")
         for key in ("unit", "source"):
             if not isinstance(raw[key], str) or not raw[key].strip():
-                raise DeckError(where, f"{key} {raw[key]!r} is not a text", next_step=f'write {key} = "..."')
+                raise DeckError(
+                    where, f"{key} {brief(raw[key])} is not a text", next_step=f'write {key} = "..."'
+                )
         try:
             factor = parse_unit(raw["unit"]).factor
             scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)
             in_si = scaled if isinstance(value, list) else scaled[0]
+            if spread > MOST_SPREAD:
+                raise ValueRangeError(
+                    f"spread = {spread:g}", f"means ± {100 * spread:g} %, which leaves nothing of the number",
+                    next_step=f"write spread = {spread / 100:g} if {spread:g} % was meant",
+                )  # fmt: skip
             return Quantity(in_si, raw["unit"], raw["source"], float(spread))
         except NlsError as error:
             raise error.at(where) from None
+        except OverflowError:
+            rule = f"{brief(value)} {raw['unit']}, spread {brief(spread)}, is too large to compute with"
+            raise ValueRangeError(where, rule, next_step="correct the number or its unit") from None
 
 
 def _tables(path: str, table: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -219,19 +245,13 @@ def load_deck(name: str | Path) -> Deck:
     """
     path = Path(name)
     if path.suffix != ".toml":
-        path = folder("models") / "decks" / f"{name}.toml"
-        if not path.exists():
+        if str(name) not in deck_names():
             raise unknown_name("deck", str(name), deck_names())
-    if not path.exists():
+        path = folder("models") / "decks" / f"{name}.toml"
+    if not is_there(path):
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
-    try:
-        # An editor may have put a byte order mark in front.
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        rule = f"cannot be read: {error}"
-        raise DeckError(str(path), rule, next_step="give a text file in UTF-8") from None
-    return read_deck(text, path)
+    return read_deck(text_of(path, DeckError), path)
 
 
 def read_deck(text: str, path: Path) -> Deck:
@@ -247,19 +267,48 @@ def read_deck(text: str, path: Path) -> Deck:
     Raises
     ------
     DeckError
-        If the text is no TOML, or ``deck`` is not a table.
+        If the text is no TOML, ``deck`` is not a table, tables stand in tables without end, or a number has
+        thousands of digits.
     """
+    deep = _TOO_DEEP.search(text)
+    if deep:
+        raise _too_deep(f"{path.name}:{text.count(chr(10), 0, deep.start()) + 1}")
     try:
         tables = tomllib.loads(text, parse_float=Written)
     except tomllib.TOMLDecodeError as error:
         raise _not_toml(text, path, str(error)) from None
+    except RecursionError:
+        raise _too_deep(path.name) from None
+    except ValueError:  # of Python, for whole numbers of more digits than it reads
+        long = _TOO_MANY_DIGITS.search(text)
+        line = text.count("\n", 0, long.start() if long else 0) + 1
+        raise DeckError(f"{path.name}:{line}", f"has a number of more than {_MOST_DIGITS} digits") from None
+    if _levels(tables) > _MOST_LEVELS:
+        raise _too_deep(path.name)
     places = _places(text)
     head = tables.pop("deck", {})
     if not isinstance(head, dict):
         line, column = places.get("deck", (1, 1))
         raise DeckError(f"{path.name}:{line}:{column}: deck", "is not a table", next_step="write [deck]")
-    name, description = str(head.get("name", path.stem)), str(head.get("description", ""))
+    given = (head.get("name", path.stem), head.get("description", ""))
+    name, description = (visible(each) if isinstance(each, str) else brief(each) for each in given)
     return Deck(name, description, path, tables, places, head)
+
+
+def _levels(tables: Mapping[str, Any]) -> int:
+    """Return how many tables and lists stand within each other."""
+    levels = 0
+    inner: list[Any] = [tables]
+    while inner:
+        levels += 1
+        each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]
+        inner = [v for v in each if isinstance(v, dict | list)]
+    return levels
+
+
+def _too_deep(where: str) -> DeckError:
+    rule = f"has tables or lists within each other, more than {_MOST_LEVELS} deep"
+    return DeckError(where, rule, next_step="combine parts side by side instead of within each other")
 
 
 def _not_toml(text: str, path: Path, message: str) -> DeckError:

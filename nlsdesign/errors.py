@@ -3,7 +3,46 @@
 from __future__ import annotations
 
 import difflib
+import re
+import unicodedata
 from collections.abc import Iterable
+
+_LONGEST_NAME = 120
+"""Longer names are compared with nothing: no name that exists is as long."""
+_LONGEST_RUN, _LONGEST_TEXT = 300, 2500
+"""Most characters of a run without blanks, and of a text; what is longer is cut in its middle."""
+_TURNING = "\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+"""Marks that turn the direction of writing, so that a text reads otherwise than it is."""
+
+
+def visible(text: str) -> str:
+    r"""Return a text whose control characters are written out, so that it does nothing to a terminal.
+
+    Line ends and tabs stay; escapes, carriage returns and marks that turn the direction of writing do not.
+
+    Parameters
+    ----------
+    text
+        From a file or a command line.
+
+    Examples
+    --------
+    >>> print(visible("red \x1b[31m"))
+    red \x1b[31m
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        _code(each)
+        if (unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t") or each in _TURNING
+        else each
+        for each in text
+    )
+
+
+def _code(character: str) -> str:
+    number = ord(character)
+    return f"\\x{number:02x}" if number < 0x100 else f"\\u{number:04x}"
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
@@ -17,6 +56,8 @@ def nearest(name: str, valid: Iterable[str]) -> str | None:
         The names that would have been accepted.
     """
     candidates = list(valid)
+    if len(name) > _LONGEST_NAME:
+        return None
     for candidate in candidates:
         if candidate.lower() == name.lower():
             return candidate
@@ -54,11 +95,11 @@ class NlsError(Exception):
         super().__init__(self._message())
 
     def _message(self) -> str:
-        text = f"{self.thing}: {self.rule}"
+        text = f"{fit_for_message(self.thing)}: {fit_for_message(self.rule)}"
         if self.did_you_mean:
-            text += f"; did you mean '{self.did_you_mean}'?"
+            text += f"; did you mean '{fit_for_message(self.did_you_mean)}'?"
         if self.next_step:
-            text += f" -> {self.next_step}"
+            text += f" -> {fit_for_message(self.next_step)}"
         return text
 
     def at(self, place: str) -> NlsError:
@@ -73,6 +114,42 @@ class NlsError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (type(self), self.thing, self.rule, self.did_you_mean, self.next_step)
+
+
+def fit_for_message(text: str) -> str:
+    r"""Return a text with control characters written out, and cut where it is very long.
+
+    Parameters
+    ----------
+    text
+        Holds names and numbers as somebody wrote them, who may not mean well.
+
+    Examples
+    --------
+    >>> print(fit_for_message("motor\x1b[2J"))
+    motor\x1b[2J
+    """
+    if len(text) > _LONGEST_TEXT:
+        text = _cut(text, _LONGEST_TEXT)
+    return re.sub(rf"\S{{{_LONGEST_RUN},}}", lambda run: _cut(run[0], _LONGEST_RUN), visible(text))
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[: 2 * length // 3]}...{text[-length // 4 :]}"
+
+
+def brief(value: object) -> str:
+    """Return a value as Python writes it, for a message; a long one is cut.
+
+    Parameters
+    ----------
+    value
+        As read from a file.
+    """
+    try:
+        return _cut(repr(value), _LONGEST_RUN)
+    except ValueError:  # a whole number of more digits than Python writes
+        return "a number of thousands of digits"
 
 
 def _rebuild(

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from .errors import UnitError, ValueRangeError, nearest
+from .errors import UnitError, ValueRangeError, nearest, visible
+from .unit_slips import misspelt_unit
 
 NOT_STATED = "not stated"
 _CHANGED = f"{NOT_STATED}; changed from"
 
 BASE = ("kg", "m", "s", "A", "K", "rad")
 
+_HIGHEST_POWER = 20
 _DEGREE = math.pi / 180.0
 # symbol -> (factor to SI, exponents of kg, m, s, A, K, rad)
 _ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
@@ -48,7 +51,6 @@ _PREFIXED = {"g", "m", "s", "A", "N", "Pa", "J", "W", "V", "Hz", "rad", "Ohm", "
 # Superscripts, and the Greek mu and the ohm sign that look like the micro sign and the Greek omega.
 _TO_ASCII = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻\u03bc\u2126", "0123456789-\u00b5\u03a9")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 _POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
 
 
@@ -83,6 +85,9 @@ def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
     if head in _PREFIXES and tail in _PREFIXED:
         factor, exponents = _ATOMS[tail]
         return _PREFIXES[head] * factor, exponents
+    slip = misspelt_unit(token, unit, unit.strip().translate(_TO_ASCII).replace(" ", ""))
+    if slip is not None:
+        raise slip
     names = list(_ATOMS) + [p + a for p in _PREFIXES for a in _PREFIXED]
     raise UnitError(
         f"unit '{unit}'",
@@ -126,11 +131,24 @@ def parse_unit(text: str) -> Unit:
                 f"'{piece}' cannot be read",
                 next_step="write for instance 'N·m/rad' or 'N*m/rad'",
             )
-        power = sign * int(match["power"] or 1)
+        power = sign * _power(match["power"] or "1", text)
         one_factor, one = _atom(match["atom"], text)
         factor *= one_factor**power
         exponents = [total + power * each for total, each in zip(exponents, one, strict=True)]
+    if not sys.float_info.min <= factor <= sys.float_info.max:
+        raise UnitError(f"unit '{text}'", "is too large or too small a multiple of SI units to compute with")
     return Unit(text, factor, tuple(exponents))
+
+
+def _power(text: str, unit: str) -> int:
+    # The length comes first: whole numbers of thousands of digits are not read at all.
+    if len(text) <= len(str(-_HIGHEST_POWER)) and abs(int(text)) <= _HIGHEST_POWER:
+        return int(text)
+    raise UnitError(
+        f"unit '{unit}'",
+        f"'{text}' is no power of a unit; powers lie between -{_HIGHEST_POWER} and {_HIGHEST_POWER}",
+        next_step="write for instance 'kg*m^2'",
+    )
 
 
 def typeset_unit(unit: str) -> str:
@@ -216,6 +234,7 @@ class Quantity:
     def __post_init__(self) -> None:
         object.__setattr__(self, "_parsed", parse_unit(self.unit))
         object.__setattr__(self, "value", _plain(self.value))
+        object.__setattr__(self, "source", visible(self.source))
         if not self.values:
             raise ValueRangeError(with_unit("()", self.unit), "a row of numbers needs at least one")
         if not all(math.isfinite(item) for item in self.values):
@@ -417,23 +436,6 @@ def with_error(value: float, error: float) -> str:
     pair = [f"{round(number / scale, digit):.{max(0, digit)}f}" for number in (value, error)]
     text = " ± ".join(pair).replace("-", "−")
     return f"({text})·10{str(exponent).translate(_SUPERSCRIPTS)}" if small else text
-
-
-def name_and_unit(head: str) -> tuple[str, str | None]:
-    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit.
-
-    Parameters
-    ----------
-    head
-        Without a unit it is the name as it stands, and the unit is ``None``.
-    """
-    match = _BRACKETED.match(head)
-    name, _, unit = (match["name"], "", match["unit"]) if match else head.rpartition("_")
-    try:
-        parse_unit(unit)
-    except UnitError:
-        return head, None  # brackets that hold no unit belong to the name
-    return name, unit
 
 
 def degrees(value: float) -> float:

@@ -11,7 +11,7 @@ import pytest
 from tests import source
 
 PRODUCT = ("nlsdesign", "models", "studies")
-TEXTS = (*PRODUCT, "tests", "docs", "benchmarks", "requirements", ".ci")
+TEXTS = (*PRODUCT, "tests", "docs", "examples", "benchmarks", "requirements", ".ci")
 DOCUMENTS = ("architecture.md", "conventions.md", "claims.md", "known_gaps.md")
 
 # Put together here so that this file does not contain what it looks for.
@@ -38,7 +38,7 @@ def public_files(root: Path) -> list[Path]:
 
 
 def documents(root: Path) -> list[Path]:
-    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    return [root / "README.md", root / "CONTRIBUTING.md", *sorted((root / "docs").rglob("*.md"))]
 
 
 def text_files(root: Path) -> Iterator[tuple[str, str]]:

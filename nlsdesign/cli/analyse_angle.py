@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UnitError, ValueRangeError
+from ..errors import ValueRangeError
 from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
@@ -20,6 +20,7 @@ from .output import (
     spring_option,
 )
 from .overwriting import out_option
+from .range_remarks import range_remarks, swept_angle, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ _HEADINGS = {
 )
 @measured_option
 @spring_option
-@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg"))
+@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg", "report.html"))
 @json_option
 def analyse_angle(
     deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None
@@ -63,17 +64,13 @@ def analyse_angle(
     from ..deck import load_deck
     from ..figures import observability_over_angle, stability_over_angle, write_figures
     from ..model import flatten
-    from ..model.roles import measured_motion, series_spring
+    from ..model.roles import series_spring
     from ..model.transform import with_outputs
+    from ..report import write_analysis_report
 
-    model = flatten(declare(load_deck(deck_name)))
-    torque, measured = series_spring(model, roles["spring"]).effort, measured_motion(model, roles["measured"])
-    unit = model.variable(measured).unit
-    if unit != "rad":
-        raise UnitError(
-            f"'{measured}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
-            next_step="name the angle of a body that turns, with --measured",
-        )  # fmt: skip
+    declared = declare(load_deck(deck_name))
+    model = flatten(declared)
+    torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     if not last > first:
         raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
     angles = np.linspace(first, last, count)
@@ -91,8 +88,12 @@ def analyse_angle(
         "observability": observability_over_angle({model.name: chart}, drops={model.name: drops}),
     }
     files = [out / "over_angle.csv", *write_figures(out, pictures)]
+    remarks = range_remarks(declared, first=first, last=last, measured=measured)
+    warn(remarks)
+    page = out / "report.html"
+    files.append(write_analysis_report(page, chart, drops, model=model.name, ranking=ranking, files=files))
     if as_json:
-        show_json(_as_json(chart, drops, ranking) | {"file": files[0], "files": files})
+        show_json(_as_json(chart, drops, ranking) | {"warnings": remarks, "file": files[0], "files": files})
         return
     _show(chart, drops, model.name)
     if ranking is not None:

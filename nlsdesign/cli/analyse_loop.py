@@ -12,6 +12,7 @@ import click
 from ..errors import ExportError
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -129,13 +130,22 @@ def loop(
     with Steps().step("evaluation of the loop"):
         result = _evaluated(fixed, moved, asked)
     files = _written(result, out)
+    remarks = _remarks(deck_name, asked.last)
+    warn(remarks)
     if as_json:
-        show_json(_content(result, files))
+        show_json(_content(result, files) | {"warnings": remarks})
     else:
         _shown(result)
         for path in files:
             click.echo(f"written: {path}")
     ctx.exit(1 if result.findings else 0)
+
+
+def _remarks(deck_name: str, last: float) -> list[str]:
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+
+    return range_remarks(declare(load_deck(deck_name)), last=last)
 
 
 def _law(options: dict[str, Any]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import click
 
 from .output import deck_option, examples, json_option, show_written
 from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -107,7 +108,8 @@ def export_controller(
     from ..export import export_c, export_fmu
     from ..model import flatten
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
     model = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
@@ -115,4 +117,6 @@ def export_controller(
     if fmu:
         written.append(export_fmu(model, out / "controller.fmu"))
     sentences = (str(model), f"largest torque that the drive can hold: {most:.4g} N·m")
-    show_written(as_json, sentences, written, largest_torque=most)
+    remarks = range_remarks(declared)
+    warn(remarks)
+    show_written(as_json, sentences, written, largest_torque=most, warnings=remarks)

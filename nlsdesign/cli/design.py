@@ -13,6 +13,7 @@ from ..errors import NlsError, ValueRangeError
 from .design_kinds import KINDS, show_kinds
 from .output import DECK_HELP, examples, json_option, show_json, show_table, spring_option
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import parse_number
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _FILES = (
+    "report.html",
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
 )
@@ -80,6 +82,7 @@ def design(context: click.Context, /, deck_name: str | None, out: Path, as_json:
     from ..deck import load_deck
     from ..design import design_cam
     from ..progress import Steps
+    from ..report import write_design_report
 
     actuator, job = declare(load_deck(deck_name)), _job(**given)
     steps = Steps()
@@ -99,8 +102,14 @@ def design(context: click.Context, /, deck_name: str | None, out: Path, as_json:
     if designed.met:
         with steps.step("drawings"):
             files += _drawn(designed, job, deck_name, out, remarks)
+    # The deck that is written, over the angles that were asked for.
+    ranges = range_remarks(designed.actuator, first=0.0, last=designed.target.last_angle)
+    warn(ranges)
+    files.append(
+        write_design_report(out / "report.html", designed, deck=deck_name, remarks=remarks, files=files)
+    )
     if as_json:
-        show_json({**_numbers(designed), "remarks": remarks, "files": files})
+        show_json({**_numbers(designed), "remarks": remarks, "warnings": ranges, "files": files})
     else:
         _show(designed, files)
         for remark in remarks:

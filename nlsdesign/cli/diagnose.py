@@ -16,6 +16,7 @@ import click
 from .exported_machine import MACHINE, export_machine, export_option
 from .output import deck_option, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
+from .range_remarks import warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -98,6 +99,8 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     title = f"{actuator.name}: what is missing"
     write_report(out / "report.html", *sections, title=title, facts=facts)
+    remarks = _ranges_left(verdict, measured)
+    content |= {"warnings": remarks}
     observer = None
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
@@ -111,6 +114,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
         with steps.step("export"):
             machine = export_machine(flatten(verdict.actuator), out, observer=observer, **_chosen(options))
         content, text = content | machine.content(), "\n".join([text, *machine.words()])
+    warn(remarks)
     if as_json:
         show_json(content)
         return
@@ -122,6 +126,19 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
 
 def _chosen(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: options[name] for name in ("sample_time", "spring", "measured")}
+
+
+def _ranges_left(verdict: Verdict, measured: RecordSet) -> list[str]:
+    """Return which laws of the better model the records take out of their stated range."""
+    from ..discrepancy import ranges_left
+    from ..errors import NlsError
+
+    try:
+        left = ranges_left(verdict.actuator, measured)
+    except NlsError:  # the verdict stands, and says itself what cannot be simulated
+        return []
+    step = "take a law that is stated to hold so far, or leave such motions out of the records"
+    return [f"record {name}: {warning} -> {step}" for name, warning in left]
 
 
 def _regenerated(

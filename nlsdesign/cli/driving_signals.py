@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import MeasurementError, NlsError, UnitError, ValueRangeError, nearest
-from ..quantity import name_and_unit, parse_unit, same_dimension, typeset_unit, with_unit
+from ..quantity import parse_unit, same_dimension, typeset_unit, with_unit
+from ..written_numbers import name_and_unit
 from .units import split_number
 
 if TYPE_CHECKING:

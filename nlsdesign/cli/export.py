@@ -1,4 +1,4 @@
-"""``nlsdesign export``: C code and FMUs."""
+"""``nlsdesign export``: C code, FMUs and Modelica text."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import click
 from .controller import controller_of, export_controller, law_options
 from .export_check import check_exports
 from .export_fmu import export_fmus
+from .export_modelica import export_modelica_text
 from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
 from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -25,11 +27,12 @@ OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 @click.group()
 def export() -> None:
-    """Write C code or FMUs."""
+    """Write C code, FMUs or Modelica text."""
 
 
 export.add_command(export_controller)
 export.add_command(export_fmus)
+export.add_command(export_modelica_text)
 export.add_command(check_exports)
 
 
@@ -81,7 +84,8 @@ def export_code(
     from ..model import flatten
     from ..progress import Steps
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
     with_examples = chosen.pop("examples")
     with Steps().step(what):
         name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
@@ -89,7 +93,9 @@ def export_code(
     written = [source.header, source.source, source.selftest]
     if with_examples:
         written += write_examples(source)
-    show_written(as_json, (model.description, *sentences), written, name=name)
+    remarks = range_remarks(declared, measured=chosen["measured"])
+    warn(remarks)
+    show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
 
 
 def sampled_part(

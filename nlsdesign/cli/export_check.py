@@ -29,7 +29,7 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
 @click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @json_option
 def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
-    """Say whether C files, FMUs and decks in a folder belong together, and to a deck.
+    """Say whether C files, Modelica texts, FMUs and decks in a folder belong together, and to a deck.
 
     Exit status 0 if all do and none was edited, 1 if not, 2 if a file cannot be read.
     """
@@ -41,7 +41,7 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
     reference = deck_digest(declare(load_deck(deck_name))) if deck_name else ""
     files, problems = exported_files(folder)
     if not files and not problems:
-        raise ExportError(str(folder), "holds no C file, FMU or deck of this package")
+        raise ExportError(str(folder), "holds no C file, Modelica text, FMU or deck of this package")
     apart = _apart(files, reference)
     status = UNREADABLE if problems else APART if any(apart) else TOGETHER
     sentences = [*map(str, problems), *_relations(files), _verdict(files, reference, status, any(apart))]

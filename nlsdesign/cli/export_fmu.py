@@ -15,6 +15,7 @@ from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
 from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
 from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..export import Authorship
@@ -149,7 +150,8 @@ def export_fmus(
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-    made, steps = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen, law), Steps()
+    declared = declare(load_deck(deck_name))
+    made, steps = _Models(flatten(declared), sample_time, chosen, law), Steps()
     # Before anything is written: not every system has an observer.
     with steps.step("models"):
         models, reasons = made.only(what) if what else made.possible()
@@ -165,6 +167,7 @@ def export_fmus(
     show_written(as_json, (), written, left_out=reasons)
     for name, reason in {} if as_json else reasons.items():
         click.echo(f"left out: {name}: {reason}")
+    warn(range_remarks(declared, measured=chosen["measured"]))
 
 
 def _systems(platforms: Sequence[str]) -> Sequence[str] | None:

@@ -28,7 +28,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
-    names = ["fit.json", "model.toml"]
+    names = ["fit.json", "model.toml", "report.html"]
     for part in MACHINE if given["exports"] else ():
         names += [f"{part}.fmu", *(f"c/{name}" for name in c_names(part) if part != "plant")]
     return names
@@ -60,6 +60,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     from ..identification import load_records
     from ..model import flatten
     from ..progress import Steps
+    from ..report import write_fit_report
 
     actuator = declare(load_deck(deck_name))
     mapping, hold_out = options["mapping"], options["hold_out"]
@@ -68,13 +69,17 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     with steps.step("fit"):
         result = refit(actuator, measured, window=options["window"], progress=steps.note)
     file, deck = write_refit(result, out)
+    facts = {"deck": f"`{deck_name}`", "records": f"`{records}`"}
+    page = write_fit_report(out / "report.html", result, facts=facts, files=(file, deck))
     machine = ExportedMachine({}, ())
     if options["exports"]:
         with steps.step("export"):
             chosen = {name: options[name] for name in ("sample_time", "spring", "measured")}
             machine = export_machine(flatten(result.actuator), out, **chosen)
     if as_json:
-        show_json({**result.to_dict(str(deck)), **(machine.content() if options["exports"] else {})})
+        show_json(
+            {**result.to_dict(str(deck)), "report": page, **(machine.content() if options["exports"] else {})}
+        )
         return
     numbers = [
         (
@@ -96,4 +101,5 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
         click.echo(sentence)
     for sentence in machine.words():
         click.echo(sentence)
+    click.echo(f"report: {page}")
     click.echo(f"written: {file} and {deck}; next: nlsdesign diagnose --deck {deck} --records {records}")

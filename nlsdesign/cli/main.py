@@ -1,4 +1,4 @@
-"""Entry point: exit status 0 for done, 1 for a finding, 2 for bad input, 130 for an interruption."""
+"""The program: status 0 for done, 1 for a finding, 2 for bad input, 70 for a fault, 130 if interrupted."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from .analyse import analyse
 from .analyse_angle import analyse_angle
 from .analyse_loop import loop
 from .calibrate import calibrate
+from .compare import compare
 from .completion import COMPLETE, complete_names, completion
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose
+from .docs import docs
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -40,8 +42,20 @@ from .studies import study
     + "\n\nExit status: 0 done, 1 a finding, 2 bad input, 130 interrupted.",
 )
 @click.version_option(version(), prog_name="nlsdesign")
-def program() -> None:
+@click.option(
+    "--with",
+    "packages",
+    multiple=True,
+    metavar="PACKAGE",
+    help="Package or .py file with parts, effects and rubbers of your own; before the command; repeatable.",
+)
+@click.pass_context
+def program(context: click.Context, packages: tuple[str, ...]) -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
+    if packages:
+        from ..extensions import extended_by, load_extension
+
+        context.with_resource(extended_by(*(load_extension(name) for name in packages)))
 
 
 export.add_command(export_ssp)
@@ -49,7 +63,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, study, completion),
+    *(cosimulation, simulate, fit, diagnose, compare, study, completion, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default
@@ -69,12 +83,13 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(2)
-    except click.exceptions.Abort:
-        click.echo("interrupted", err=True)
-        sys.exit(130)
-    except KeyboardInterrupt:
+    except (click.exceptions.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         sys.exit(130)
     except NlsError as error:
         click.echo(f"error: {error}", err=True)
         sys.exit(2)
+    except Exception as error:
+        from .unexpected import status_of
+
+        sys.exit(status_of(error))

@@ -1,6 +1,6 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
-from .blocks.prediction_of_blocks import BandError, band_errors, predict
+from .blocks.prediction_of_blocks import BandError, band_errors, predict, ranges_left
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
@@ -10,6 +10,7 @@ from .reporting.circumstances import DiagnosisRun, records_of_run
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
+from .reporting.verdict_frames import verdict_frames
 
 __all__ = [
     "ALL",
@@ -33,9 +34,11 @@ __all__ = [
     "diagnose",
     "next_experiment",
     "predict",
+    "ranges_left",
     "records_of_run",
     "refit",
     "unnamed_part",
+    "verdict_frames",
     "write_command",
     "write_refit",
     "write_verdict",

@@ -103,7 +103,8 @@ MISSPELT = [
 ]
 UNITS = [
     ('area = {value = 1.0, unit = "cm^2"', "§area = {value = 1.0", UnitError, "has no unit", None, "unit ="),
-    ('"Pa*s"', '"Pas"', UnitError, "not a known unit", "Pa", "SI units"),
+    ('"Pa*s"', '"Pass"', UnitError, "not a known unit", "Pa", "SI units"),
+    ('"Pa*s"', '"Pas"', UnitError, "stands for a product", None, "write 'Pa*s'"),
     (
         'rest_length = {value = 12.5, unit = "mm"',
         '§rest_length = {value = 12.5, unit = "m"',
@@ -394,7 +395,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "folder.toml").mkdir()
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     for name in ("folder.toml", "binary.toml"):
-        with pytest.raises(DeckError, match="cannot be read"):
+        with pytest.raises(DeckError, match="cannot be read|is no file"):
             load_deck(tmp_path / name)
     with pytest.raises(DeckError, match="no such file"):
         load_deck(tmp_path / "absent.toml")

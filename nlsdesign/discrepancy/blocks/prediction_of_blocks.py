@@ -113,6 +113,38 @@ def predict(actuator: Assembly, records: RecordSet, name: str) -> Trace:
     return Trace(chosen[0].trace.time, signals, units, name, warnings=tuple(warnings.values()))
 
 
+def ranges_left(actuator: Assembly, records: RecordSet) -> tuple[tuple[str, RangeWarning], ...]:
+    """Return the laws that the measured motions take out of their stated range, each with the worst record.
+
+    Parameters
+    ----------
+    actuator
+        Declared, or as a diagnosis has left it.
+    records
+        Measured.
+
+    Raises
+    ------
+    MeasurementError
+        If nothing measured drives the model.
+    """
+    model = flatten(actuator)
+    if not any(v.bounded for v in model.signals + model.states):
+        return ()
+    blocks = blocks_of(model, records.signals)
+    bench = Bench(records, blocks)
+    worst: dict[str, tuple[str, RangeWarning]] = {}
+    for record in records.records:
+        for warning in (each for block in blocks for each in _range_warnings(block, record, bench)):
+            if warning.name not in worst or _excess(warning) > _excess(worst[warning.name][1]):
+                worst[warning.name] = record.name, warning
+    return tuple(worst.values())
+
+
+def _excess(warning: RangeWarning) -> float:
+    return max(warning.minimum - warning.furthest, warning.furthest - warning.maximum)
+
+
 def _range_warnings(block: Block, record: Record, bench: Bench) -> tuple[RangeWarning, ...]:
     """Return where the measured motion takes a law of the block out of its stated range."""
     model, time = block.model, record.trace.time
