@@ -11,7 +11,7 @@ import click
 from ..errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..quantity import Quantity, same_dimension, typeset_unit
 from ..writing import write_text
-from .output import examples
+from .output import examples, json_option, show_json
 from .units import parse_number, split_number
 
 if TYPE_CHECKING:
@@ -42,9 +42,10 @@ force_option = click.option("--force", is_flag=True, help="Replace the file wher
               help="Whether --inertia is that of the rotor or that at the gear's output.")  # fmt: skip
 @click.option("--yes", is_flag=True, help="Ask nothing: take the numbers of the template.")
 @force_option
+@json_option
 def new(
     path: str, template: str | None, material: str | None, given: tuple[str, ...], yes: bool, force: bool,
-    **inertia: str | None,
+    as_json: bool, **inertia: str | None,
 ) -> None:  # fmt: skip
     """Write a deck from a template: commented, with every number, ready for the commands that it names.
 
@@ -56,7 +57,7 @@ def new(
 
     file = Path(path) if path.endswith(".toml") else Path(f"{path}.toml")
     refuse_to_replace(file, force)
-    asking = not yes and on_terminal()
+    asking = not (yes or as_json) and on_terminal()
     if template is None:
         if not asking:
             raise click.UsageError(f"--template is missing; templates are: {', '.join(template_names())}")
@@ -69,6 +70,10 @@ def new(
         material = material or _asked_material(chosen)
         numbers |= _asked(chosen, at, numbers)
     write_text(file, chosen.filled(plain_name(file.stem), numbers=numbers, material=material))
+    if as_json:
+        ready = list(chosen.ready_for)
+        show_json({"file": file, "numbers": len(chosen.deck.numbers()), "ready_for": ready})
+        return
     click.echo(
         f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {', '.join(chosen.ready_for)}"
     )

@@ -57,13 +57,17 @@ def list_decks(as_json: bool) -> None:
 @click.argument("deck_name", metavar="DECK")
 @click.argument("out", metavar="OUT.TOML", type=click.Path(path_type=Path, dir_okay=False))
 @force_option
-def copy_deck(deck_name: str, out: Path, force: bool) -> None:
+@json_option
+def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:
     """Copy a deck, such as one that comes with the project, into a file of one's own, with its comments."""
     read = load_deck(deck_name)
     if out.suffix != ".toml":
         raise click.BadParameter(f"'{out}' does not end with .toml", param_hint="OUT.TOML")
     refuse_to_replace(out, force)
     write_text(out, read.path.read_text(encoding="utf-8-sig"))
+    if as_json:
+        show_json({"file": out, "deck": read.name})
+        return
     click.echo(f"written: {out}; next: nlsdesign deck check {out}")
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from .output import deck_option, examples
+from .output import deck_option, examples, json_option, show_written
+from .overwriting import out_file_option
 
 
 @click.command(
@@ -17,9 +18,7 @@ from .output import deck_option, examples
     ),
 )
 @deck_option
-@click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="File to write, NAME.mo."
-)
+@out_file_option(None, "File to write, NAME.mo.")
 @click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
 @click.option(
     "--output",
@@ -28,7 +27,10 @@ from .output import deck_option, examples
     metavar="NAME",
     help="State or signal that becomes an output, in place of the readings of the sensors; repeatable.",
 )
-def export_modelica_text(deck_name: str, out: Path, smooth: bool, outputs: tuple[str, ...]) -> None:
+@json_option
+def export_modelica_text(
+    deck_name: str, out: Path, smooth: bool, outputs: tuple[str, ...], as_json: bool
+) -> None:
     """Write the plant of a deck as one flat Modelica class, with units, values and sources.
 
     Names are those of the deck between quotation marks, such as 'motor.angle'.
@@ -41,4 +43,4 @@ def export_modelica_text(deck_name: str, out: Path, smooth: bool, outputs: tuple
 
     assembly = declare(load_deck(deck_name))
     model = flatten(smoothed(assembly) if smooth else assembly, outputs=list(outputs) or None)
-    click.echo(f"written: {export_modelica(model, out)}")
+    show_written(as_json, (), [export_modelica(model, out)])

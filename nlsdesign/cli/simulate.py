@@ -25,12 +25,23 @@ if TYPE_CHECKING:
 _file = click.Path(path_type=Path, dir_okay=False)
 _MOST_ROWS = 2_000_000
 _SHOWN_EVENTS = 5
-_FORWARD = ("inputs", "input_file", "stop", "step", "initial", "values", "signals", "friction", "readings")
+_FORWARD = (
+    "inputs",
+    "input_file",
+    "stop",
+    "step",
+    "initial",
+    "values",
+    "signals",
+    "friction",
+    "readings",
+    "table_only",
+)
 
 
 def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the suffixes of what stands beside the table."""
-    return () if given["record"] else (".svg", ".html")
+    return () if given["record"] or given["table_only"] else (".svg", ".html")
 
 
 @click.command(
@@ -38,7 +49,7 @@ def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
         'nlsdesign simulate --deck austin2015_soft_spring --input "motor.current=2 A sine 2 Hz" --stop "1 s"',
         "nlsdesign simulate --deck austin2015_soft_spring --input motor.current=2@1 --stop '1 s' --json",
         "nlsdesign simulate --deck austin2015_soft_spring --initial 'motor.angle=20 deg' --stop '1 s' "
-        "--friction sharp --signals 'motor.*' --out out/released.csv",
+        "--friction sharp --signals 'motor.*' --table-only --out out/released.csv",
         "nlsdesign simulate --deck my.toml --record bench/run1.csv --out predicted.csv",
     )
 )
@@ -64,6 +75,7 @@ def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
               "which is quicker.")  # fmt: skip
 @click.option("--readings", type=click.IntRange(0), default=None, metavar="SEED",
               help="Write what the sensors of the deck would record, with counts and noise.")  # fmt: skip
+@click.option("--table-only", is_flag=True, help="Write the CSV without picture and page.")
 @click.option("--record", type=_file, default=None,
               help="CSV with measured signals, which drive the model instead.")  # fmt: skip
 @click.option("--mapping", type=_file, default=None,
@@ -133,7 +145,10 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     written = _only(run, _chosen(model, given["signals"]))
     if given["readings"] is not None:
         written = _recorded(measure(run, actuator, seed=given["readings"]), model, run)
-    files = _write(model, run, written, shown, (given["out"], deck_name, warnings))
+    written.write_csv(given["out"])
+    files = [given["out"]]
+    if not given["table_only"]:
+        files += _drawn(model, run, shown, (given["out"], deck_name, warnings))
     if given["as_json"]:
         show_json(_content(run, shown, warnings, files))
         return
@@ -141,7 +156,8 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     for event in run.events[:_SHOWN_EVENTS]:
         click.echo(f"event: {event}")
     if len(run.events) > _SHOWN_EVENTS:
-        click.echo(f"and {len(run.events) - _SHOWN_EVENTS} more events, all in {files[-1]}")
+        where = "" if given["table_only"] else f", all in {files[-1]}"
+        click.echo(f"and {len(run.events) - _SHOWN_EVENTS} more events{where}")
     for each in warnings:
         click.echo(f"warning: {each}")
     click.echo(f"written: {', '.join(map(str, files))}")
@@ -260,17 +276,16 @@ def _recorded(readings: Trace, model: FlatModel, run: Trace) -> Trace:
     return readings.with_signals({n: run[n] for n in names}, {n: run.units[n] for n in names})
 
 
-def _write(
-    model: FlatModel, run: Trace, written: Trace, shown: Sequence[str], about: tuple[Path, str, Sequence[str]]
+def _drawn(
+    model: FlatModel, run: Trace, shown: Sequence[str], about: tuple[Path, str, Sequence[str]]
 ) -> list[Path]:
-    """Write the table, the picture and the page."""
+    """Write the picture and the page beside the table."""
     from ..figures import run_over_time, write_figures
     from ..report import FigureSection, FileSection, TableSection, TextSection, write_report
 
     out, deck_name, warnings = about
-    written.write_csv(out)
     picture = run_over_time(run, shown)
-    files = [out, *write_figures(out.parent, {out.stem: picture})]
+    (file,) = write_figures(out.parent, {out.stem: picture})
     page = out.with_suffix(".html")
     rows = tuple((f"{event.time:.6g}", event.name, event.what) for event in run.events)
     sections = [
@@ -290,10 +305,10 @@ def _write(
             if rows
             else []
         ),
-        FileSection("Files", {out: "all rows", files[1]: "the picture"}, caption="Written beside this page."),
+        FileSection("Files", {out: "all rows", file: "the picture"}, caption="Written beside this page."),
     ]
     facts = {"deck": f"`{deck_name}`", "time": f"{run.time[-1]:g} s"}
-    return [*files, write_report(page, *sections, title=f"{model.name}: simulation", facts=facts)]
+    return [file, write_report(page, *sections, title=f"{model.name}: simulation", facts=facts)]
 
 
 def _sizes(values: Any) -> tuple[float, float, float, float]:

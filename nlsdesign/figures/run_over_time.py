@@ -57,7 +57,7 @@ def run_over_time(run: Trace, names: Sequence[str]) -> Figure:
     if not groups:
         raise ValueRangeError("a figure over time", "has no signal", next_step="name at least one")
     figure, axes = panels(len(groups), height=1.0 + 1.5 * len(groups), sharex=True)
-    sizes = []
+    sizes: list[str] = []
     for panel, (unit, members) in zip(axes, groups, strict=True):
         for name in members:
             tone, dash, _ = look(len(sizes))  # no two signals of the figure look alike

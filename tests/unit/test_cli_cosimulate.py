@@ -100,7 +100,9 @@ def test_a_mistake_is_named_and_nothing_is_written(
 def test_an_fmu_that_is_read_is_not_written_over(run: Run, fmus: dict[str, Path], tmp_path: Path) -> None:
     copy = tmp_path / "plant.fmu"
     copy.write_bytes(fmus["plant"].read_bytes())
-    status, _, err = run("cosimulate", "--fmu", f"plant={copy}", "--stop", "0.1 s", "--out", "plant.fmu")
+    call = ("cosimulate", "--fmu", f"plant={copy}", "--stop", "0.1 s", "--out", "plant.fmu")
+    assert run(*call)[0] == 2
+    status, _, err = run(*call, "--force")
     assert status == 2
     assert "is an FMU or a system that is read" in err
     assert copy.read_bytes() == fmus["plant"].read_bytes()

@@ -18,6 +18,7 @@ from tests.command_line import Run, run
 
 __all__ = ["run"]
 DECK = "austin2015_soft_spring"
+QUICK = ("simulate", "--table-only")
 STIFFNESS, TORQUE_CONSTANT, SLIDING = 1.7, 4 * 0.055, 0.02
 """In N·m/rad, N·m/A behind the gear, and N·m: numbers of the deck."""
 
@@ -75,11 +76,11 @@ def test_current_alone_drives_a_machine_to_where_its_spring_balances_it(run: Run
 def test_sharp_friction_sticks_where_smooth_friction_creeps(run: Run) -> None:
     """Released within the dead band of the friction: it stays, or creeps back."""
     angle = 0.5 * SLIDING / STIFFNESS
-    words = ("simulate", "--deck", DECK, "--initial", f"motor.angle={angle} rad", "--stop", "0.5 s", "--json")
+    words = (*QUICK, "--deck", DECK, "--initial", f"motor.angle={angle} rad", "--stop", "0.5 s", "--json")
     stuck, creeping = (json.loads(run(*words, "--friction", kind)[1]) for kind in ("sharp", "smooth"))
     assert stuck["signals"]["motor.angle"]["last"] == pytest.approx(angle, abs=1e-12)
     assert creeping["signals"]["motor.angle"]["last"] < 0.9 * angle
-    words = ("simulate", "--deck", DECK, "--input", "motor.current=2@1", "--stop", "1 s", "--json")
+    words = (*QUICK, "--deck", DECK, "--input", "motor.current=2@1", "--stop", "1 s", "--json")
     events = json.loads(run(*words, "--friction", "sharp")[1])["events"]
     # It slips when the current has overcome the friction, to the microsecond.
     slips = math.asin(SLIDING / TORQUE_CONSTANT / 2.0) / (2.0 * math.pi)
@@ -89,20 +90,20 @@ def test_sharp_friction_sticks_where_smooth_friction_creeps(run: Run) -> None:
 
 def test_the_speed_of_a_prescribed_motion_follows_from_it(run: Run, tmp_path: Path) -> None:
     words = ("--deck", "vhb4910_specimen", "--input", "grip.position=10 mm + 5 mm sine 1 Hz", "--stop", "1 s")
-    assert run("simulate", *words, "--out", "run.csv")[0] == 0
+    assert run(*QUICK, *words, "--out", "run.csv")[0] == 0
     table = columns(tmp_path / "run.csv")
     slope = np.gradient(table["grip.position [m]"], table["time [s]"])
     assert table["grip.speed [m/s]"][1:-1] == pytest.approx(slope[1:-1], abs=1e-6)
     words = ("--deck", "vhb4910_specimen", "--input", "grip.position=10 mm step 0.1 s", "--stop", "1 s")
-    status, _, err = run("simulate", *words)
+    status, _, err = run(*QUICK, *words)
     assert status == 2
     assert "cannot jump" in err
 
 
 def test_a_written_run_drives_the_machine_again_and_other_numbers_change_it(run: Run, tmp_path: Path) -> None:
     drive = ("--input", "motor.current=1 A + 2 A sine 3 Hz", "--stop", "1 s")
-    assert run("simulate", "--deck", DECK, *drive, "--out", "first.csv")[0] == 0
-    again = ("simulate", "--deck", DECK, "--input-file", "first.csv")
+    assert run(*QUICK, "--deck", DECK, *drive, "--out", "first.csv")[0] == 0
+    again = (*QUICK, "--deck", DECK, "--input-file", "first.csv")
     assert run(*again, "--out", "second.csv")[0] == 0
     one, other = columns(tmp_path / "first.csv"), columns(tmp_path / "second.csv")
     # The file is linear between its rows, 1 ms apart.
@@ -128,7 +129,7 @@ def test_readings_are_records_from_which_the_numbers_come_back(run: Run, tmp_pat
             "motor.inertia=0.0007 kg*m^2",
         )
         file = f"runs/{seed}.csv"
-        assert run("simulate", "--deck", DECK, *words, "--readings", str(seed), "--out", file)[0] == 0
+        assert run(*QUICK, "--deck", DECK, *words, "--readings", str(seed), "--out", file)[0] == 0
     table = columns(tmp_path / "runs" / "0.csv")
     assert set(table) == {"time [s]", "motor_encoder.reading [rad]", "motor.current [A]"}
     counts = table["motor_encoder.reading [rad]"] / 0.767e-6
@@ -155,14 +156,14 @@ def test_limits_that_are_reached_are_warned_of(run: Run) -> None:
         "--value",
         "motor.current_limit=4 A",
     )
-    status, out, _ = run("simulate", "--deck", DECK, *words)
+    status, out, _ = run(*QUICK, "--deck", DECK, *words)
     assert status == 0
     assert "warning: motor.current reaches 30 A, beyond 4 A from t = 0.1 s: motor.current_limit" in out
     assert "beyond -4 A" not in out
     words = ("--input", "motor.current=15 A", "--stop", "1 s", "--json")
-    _, out, _ = run("simulate", "--deck", "austin2015_figure_consistent", *words)
+    _, out, _ = run(*QUICK, "--deck", "austin2015_figure_consistent", *words)
     assert any("the contour of spring.cam ends" in each for each in json.loads(out)["warnings"])
-    quiet = json.loads(run("simulate", "--deck", DECK, "--stop", "0.1 s", "--json")[1])
+    quiet = json.loads(run(*QUICK, "--deck", DECK, "--stop", "0.1 s", "--json")[1])
     assert quiet["warnings"] == []
     assert quiet["signals"]["motor.angle"]["rms"] == 0.0
 
@@ -184,13 +185,13 @@ def test_limits_that_are_reached_are_warned_of(run: Run) -> None:
         (("--stop", "1 s", "--signals", "motr.*"), "--signals 'motr.*': no such name"),
         (("--stop", "1 s", "--input-file", "none.csv"), "cannot be read"),
         (("--stop", "1 s", "--mapping", "map.toml"), "--mapping is of a --record"),
-        (("--stop", "1 s", "--record", "r.csv"), "--stop stands beside --record"),
+        (("--stop", "1 s", "--record", "r.csv"), "stands beside --record"),
     ],
 )
 def test_what_cannot_be_simulated_is_named_before_anything_is_written(
     words: tuple[str, ...], rule: str, run: Run, tmp_path: Path
 ) -> None:
-    status, out, err = run("simulate", "--deck", DECK, *words)
+    status, out, err = run(*QUICK, "--deck", DECK, *words)
     assert (status, out) == (2, "")
     assert rule in err
     assert list(tmp_path.iterdir()) == []
@@ -208,7 +209,7 @@ def test_what_cannot_be_simulated_is_named_before_anything_is_written(
 )
 def test_a_file_of_inputs_that_cannot_drive_is_named(text: str, rule: str, run: Run, tmp_path: Path) -> None:
     (tmp_path / "drive.csv").write_text(text, encoding="utf-8")
-    status, _, err = run("simulate", "--deck", DECK, "--input-file", "drive.csv")
+    status, _, err = run(*QUICK, "--deck", DECK, "--input-file", "drive.csv")
     assert status == 2
     assert rule in err
     assert "drive.csv" in err
@@ -216,6 +217,6 @@ def test_a_file_of_inputs_that_cannot_drive_is_named(text: str, rule: str, run: 
 
 def test_a_file_of_inputs_has_units_of_its_own(run: Run, tmp_path: Path) -> None:
     (tmp_path / "drive.csv").write_text("t [ms];motor.current [mA]\n1000;0\n1500;2000\n", encoding="utf-8")
-    status, out, _ = run("simulate", "--deck", DECK, "--input-file", "drive.csv", "--json")
+    status, out, _ = run(*QUICK, "--deck", DECK, "--input-file", "drive.csv", "--json")
     assert status == 0
     assert json.loads(out)["signals"]["motor.current"]["last"] == pytest.approx(2.0)

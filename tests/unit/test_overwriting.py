@@ -23,7 +23,7 @@ from tests.command_line import Run, run
 
 __all__ = ["run"]
 DECK = "austin2015_soft_spring"
-CALL = ("simulate", "--deck", DECK, "--stop", "20 ms", "--out", "o/run.csv")
+CALL = ("simulate", "--deck", DECK, "--stop", "20 ms", "--signals", "motor.angle", "--out", "o/run.csv")
 
 
 def test_what_was_written_is_known_until_it_is_changed(tmp_path: Path) -> None:

@@ -70,11 +70,11 @@ def test_control_characters_do_not_reach_the_terminal() -> None:
 
 
 def on_a_terminal(root: Path, columns: int, **environment: str) -> str:
-    """Run ``nlsdesign materials`` on a terminal of that width and return what it shows."""
+    """Run ``nlsdesign deck list`` on a terminal of that width and return what it shows."""
     ours, its = pty.openpty()
     given = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": str(columns), **environment}
-    done = subprocess.run([sys.executable, "-m", "nlsdesign", "materials"], stdout=its, stderr=its, env=given,
-                          timeout=120, check=False)  # fmt: skip
+    call = [sys.executable, "-m", "nlsdesign", "deck", "list"]
+    done = subprocess.run(call, stdout=its, stderr=its, env=given, timeout=120, check=False)
     os.close(its)
     shown = b""
     while True:
@@ -95,14 +95,14 @@ def test_heads_are_bold_on_a_terminal_unless_it_is_asked_not_to_be(root: Path) -
     plain = on_a_terminal(root, 80, NO_COLOR="1")
     assert "\x1b" not in plain
     assert max(map(len, plain.splitlines())) <= 80
-    assert "\x1b[1mmaterial" in on_a_terminal(root, 80, NO_COLOR="")
+    assert "\x1b[1mname" in on_a_terminal(root, 80, NO_COLOR="")
 
 
 def test_what_is_piped_has_no_escapes_and_is_wide(root: Path) -> None:
     given = {n: v for n, v in os.environ.items() if n not in ("COLUMNS", "NO_COLOR")} | {
         "PYTHONPATH": str(root)
     }
-    call = [sys.executable, "-m", "nlsdesign", "materials"]
+    call = [sys.executable, "-m", "nlsdesign", "deck", "list"]
     done = subprocess.run(call, capture_output=True, text=True, env=given, timeout=120, check=True)
     assert "\x1b" not in done.stdout
     assert 80 < max(map(len, done.stdout.splitlines())) <= 160
