@@ -136,6 +136,7 @@ def test_an_interrupted_run_says_how_to_go_on(suite, monkeypatch, capsys, tmp_pa
 
 def test_a_benchmark_that_takes_too_long_is_stopped(monkeypatch, tmp_path):
     (tmp_path / "benchmarks").mkdir()
+    (tmp_path / "benchmarks" / "__init__.py").touch()
     (tmp_path / "benchmarks" / "stand_in.py").write_text("import time\nprint('begun')\ntime.sleep(60)\n")
     monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
     found = benchmarks.run(stand_in(), 2.0, "")
