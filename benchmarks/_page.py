@@ -39,9 +39,9 @@ def page(results: Mapping[str, Mapping[str, Any]]) -> str:
     """The whole page, from the results by name; a result has ``output``, ``reason`` and more."""
     lines = [
         "# Benchmarks", "",
-        "Written by `make bench`; do not edit. A ratio above one says how many times as long the peer takes, or",
-        "how much more it costs, unless the row says otherwise. On a busy machine times are longer, also those",
-        "of the processor, and ratios of short times blur; counted instructions and costs do not.", "",
+        "Written by `make bench`; do not edit. A ratio above one says how many times as long the peer takes,",
+        "or how much more it costs, unless the row says otherwise. On a busy machine times are longer, also",
+        "those of the processor, and ratios of short times blur; counted instructions and costs do not.", "",
         "| what | promised | measured | kept |", "| --- | --- | --- | --- |",
     ]  # fmt: skip
     for each in SUITE:
