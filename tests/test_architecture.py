@@ -13,9 +13,16 @@ import pytest
 from tests.import_graph import Import, cycles, imports, modules
 
 # Open to every room.
-BASE = {"bibliography", "errors", "quantity", "symbolic", "tables", "locations", "processes", "progress"} | {
-    "writing"
-}
+BASE = {
+    "bibliography",
+    "errors",
+    "quantity",
+    "symbolic",
+    "data_frames",
+    "locations",
+    "processes",
+    "progress",
+} | {"writing"}
 # What the floors above the waist stand on: they see the flat model and never the components it came from.
 WAIST = {"deck", "model"}
 SIMULATED = WAIST | {"simulation"}
