@@ -27,9 +27,8 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Return how many benchmarks failed, missed their goal, or broke a promise; 130 if interrupted."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help=", ".join(each.name for each in _suite.SUITE)
-    )
+    names = ", ".join(each.name for each in _suite.SUITE)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=names)
     parser.add_argument("--again", action="store_true", help="measure also what has a result")
     parser.add_argument("--limit", type=float, default=1800.0, help="seconds of the clock for each")
     parser.add_argument("--results", type=Path, default=ROOT / "out" / "benchmarks", help="folder")

@@ -39,9 +39,9 @@ def page(results: Mapping[str, Mapping[str, Any]]) -> str:
     """The whole page, from the results by name; a result has ``output``, ``reason`` and more."""
     lines = [
         "# Benchmarks", "",
-        "Written by `make bench`; do not edit. A ratio above one says how many times as long the peer takes, or how much",
-        "more it costs, unless the row says otherwise. Times are those of the processor, not of the clock, but on a busy",
-        "machine they are longer and ratios of short times blur; counted instructions and costs do not.", "",
+        "Written by `make bench`; do not edit. A ratio above one says how many times as long the peer takes,",
+        "or how much more it costs, unless the row says otherwise. On a busy machine times are longer, also",
+        "those of the processor, and ratios of short times blur; counted instructions and costs do not.", "",
         "| what | promised | measured | kept |", "| --- | --- | --- | --- |",
     ]  # fmt: skip
     for each in SUITE:
@@ -56,7 +56,10 @@ def page(results: Mapping[str, Mapping[str, Any]]) -> str:
 def _row(benchmark: Benchmark, promise: Promise, result: Mapping[str, Any] | None) -> str:
     numbers = promise.measured(result["output"]) if result else []
     kept = {True: "yes", False: "NO", None: ""}[promise.met(numbers)]
-    shown = _range(numbers) if numbers else (result["reason"] if result else "") or "not measured"
+    reason = result["reason"] if result else ""
+    shown = _range(numbers) if numbers else reason or "not measured"
+    if numbers and reason:
+        shown += f" ({reason})"
     return f"| {benchmark.title}: {promise.words} | {promise.promised()} | {shown} | {kept} |"
 
 
@@ -74,5 +77,5 @@ def _section(benchmark: Benchmark, result: Mapping[str, Any] | None) -> list[str
         lines += [f"Not measured: {result['reason']}.", ""]
     if result["output"]:
         lines += ["```text", *(line.rstrip() for line in result["output"].strip().splitlines()), "```", ""]
-    when = f"{result['date']}, {result['seconds']:.0f} s, load {result['load']:.1f} at the beginning"
+    when = f"{result['date']}, {result['seconds']:.0f} s, load {result['load']:.1f} at the end"
     return [*lines, f"{when}. {result['machine']}."]

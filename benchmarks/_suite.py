@@ -106,7 +106,8 @@ SUITE = (
         ),
     ),
     Benchmark(
-        "closed_loop", "Torque loop at 20 frequencies, and 1,000 draws", "`input_output_response` of python-control",
+        "closed_loop", "Torque loop at 20 frequencies, and 1,000 draws",
+        "`input_output_response` of python-control",
         (
             Promise("seconds for 20 frequencies", r"20 frequencies with counts: ([\d.]+)", most=2),
             Promise("time of the peer over ours", r"on the same loop: .*ratio (\d+)", least=50),

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data_frames import Axis, data_frame, data_set
 from ..errors import unknown_name
 from ..model import FlatModel, Variable
 from ..model.roles import measured_motion
 from ..quantity import typeset_unit
-from ..tables import Axis, data_frame, data_set
 from ..writing import write_table
 from .rest_points import RestPoint, RestPoints, rest_points
 

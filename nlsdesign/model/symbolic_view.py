@@ -16,7 +16,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from ..errors import ExportError
-from .instructions import read_instructions
+from .function_steps import read_instructions
 
 LONGEST = 60
 """A definition with more operations than this is shown as a function of what it depends on."""

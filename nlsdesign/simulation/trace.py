@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data_frames import Axis, data_frame, data_set
 from ..errors import MeasurementError, unknown_name
 from ..model import Variable
 from ..quantity import parse_unit, with_unit
-from ..tables import Axis, data_frame, data_set
 from ..writing import write_table
 from .events import Event
 

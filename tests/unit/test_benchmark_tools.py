@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from benchmarks import __main__ as benchmarks
-from benchmarks import observer_step
+from benchmarks import _page, observer_step
+from benchmarks._suite import SUITE, Benchmark, Promise
 from benchmarks._tools import run_tool
 from nlsdesign.export.compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, compile_library
 
@@ -60,6 +62,90 @@ def test_a_tool_that_dies_under_a_benchmark_is_a_sentence_and_no_traceback(tmp_p
     valgrind.write_text("#!/bin/sh\nkill -ILL $$\n")
     valgrind.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setattr(benchmarks, "NAMES", ("observer_step",))
-    assert benchmarks.main() == 1
+    given = ["observer_step", "--results", str(tmp_path / "out"), "--page", str(tmp_path / "page.md")]
+    assert benchmarks.main(given) == 1
     assert "valgrind died of SIGILL" in capsys.readouterr().out
+    assert "Not measured: valgrind died of SIGILL" in (tmp_path / "page.md").read_text(encoding="utf-8")
+
+
+TWICE = Promise("times as long", r"ratio ([\d.]+)", least=2.0)
+
+
+def stand_in(**changed):
+    """A benchmark of which only what it prints matters."""
+    return replace(Benchmark("stand_in", "A stand-in", "nobody", (TWICE,)), **changed)
+
+
+@pytest.fixture
+def suite(monkeypatch, tmp_path):
+    """Runs one stand-in that prints the text; returns exit status, number of runs so far, and the page."""
+    calls = []
+
+    def call(text, *options, end=0, **changed):
+        def started(benchmark, limit, key):
+            calls.append(benchmark.name)
+            return benchmarks.result(text, "it failed" if end else "", 1.0, key)
+
+        monkeypatch.setattr(benchmarks, "run", started)
+        monkeypatch.setattr(benchmarks._suite, "SUITE", (stand_in(**changed),))
+        monkeypatch.setattr(_page, "SUITE", (stand_in(**changed),))
+        status = benchmarks.main(["--results", str(tmp_path), "--page", str(tmp_path / "page.md"), *options])
+        return status, len(calls), (tmp_path / "page.md").read_text(encoding="utf-8")
+
+    monkeypatch.setattr(benchmarks, "fingerprint", lambda benchmark: benchmark.command)
+    return call
+
+
+def test_a_promise_is_read_from_what_was_printed_and_judged(suite):
+    status, _, page = suite("ratio 3.5\nratio 2.5\n")
+    assert status == 0
+    assert "| A stand-in: times as long | at least 2 | 2.5 to 3.5 | yes |" in page
+    status, _, page = suite("ratio 3.5\nratio 1.5\n", "--again")
+    assert status == 1
+    assert "| 1.5 to 3.5 | NO |" in page
+    assert "ratio 1.5\n```" in page
+
+
+def test_what_was_measured_is_not_measured_again_unless_asked_or_changed(suite):
+    assert suite("ratio 3")[:2] == (0, 1)
+    assert suite("ratio 4")[:2] == (0, 1)
+    assert suite("ratio 4", "--again")[:2] == (0, 2)
+    assert suite("ratio 4", arguments=("--longer",))[:2] == (0, 3)
+
+
+def test_a_missing_peer_is_passed_over_with_the_reason_and_a_failure_is_one(suite):
+    status, calls, page = suite("", modules=("no_such_library",), programs=("no-such-tool",))
+    assert (status, calls) == (0, 0)
+    assert "| not installed: no-such-tool, no_such_library |" in page
+    status, _, page = suite("", end=1)
+    assert status == 1
+    assert "Not measured: it failed." in page
+
+
+def test_an_interrupted_run_says_how_to_go_on(suite, monkeypatch, capsys, tmp_path):
+    suite("ratio 3")
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(benchmarks, "run", interrupted)
+    given = ["--again", "--results", str(tmp_path), "--page", str(tmp_path / "page.md")]
+    assert benchmarks.main(given) == benchmarks.INTERRUPTED
+    assert "the same command goes on" in capsys.readouterr().out
+
+
+def test_a_benchmark_that_takes_too_long_is_stopped(monkeypatch, tmp_path):
+    (tmp_path / "benchmarks").mkdir()
+    (tmp_path / "benchmarks" / "__init__.py").touch()
+    (tmp_path / "benchmarks" / "stand_in.py").write_text("import time\nprint('begun')\ntime.sleep(60)\n")
+    monkeypatch.setattr(benchmarks, "ROOT", tmp_path)
+    found = benchmarks.run(stand_in(), 2.0, "")
+    assert (found["output"], found["reason"]) == ("begun\n", "stopped after 2 s")
+
+
+def test_the_page_of_the_project_has_every_promise(root):
+    page = (root / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    for each in SUITE:
+        assert f"Command: `{each.command}`." in page
+        for promise in each.promises:
+            assert f"| {each.title}: {promise.words} | {promise.promised()} |" in page

@@ -15,6 +15,7 @@ import sympy
 
 from nlsdesign.analysis import Stability, over_angle
 from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.data_frames import data_frame, data_set
 from nlsdesign.deck import load_deck
 from nlsdesign.design import design_cam
 from nlsdesign.design.optimisation.front import FrontPoint, ParetoFront
@@ -25,7 +26,6 @@ from nlsdesign.model import FlatModel, casadi_dae, flatten
 from nlsdesign.model.linear import linearise
 from nlsdesign.observer import SpreadErrors
 from nlsdesign.simulation import Trace, simulate
-from nlsdesign.tables import data_frame, data_set
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, TARGET, actuator
 
 DECK = "austin2015_figure_consistent"
@@ -254,7 +254,7 @@ def test_control_has_the_linear_model_with_its_names() -> None:
 
 
 def test_a_frame_is_not_needed_to_import_the_room(tmp_path: Path) -> None:
-    import nlsdesign.tables as room
+    import nlsdesign.data_frames as room
 
     assert "pandas" not in vars(room)
     assert issubclass(MissingLibraryError, NlsError)

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data_frames import Axis, data_frame
 from ...errors import ValueRangeError
 from ...quantity import parse_unit, typeset_unit
-from ...tables import Axis, data_frame
 from ...writing import write_table
 from ..curves.target import Target
 from .finish import SolvedSearch, finished

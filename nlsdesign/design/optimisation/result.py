@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
+from ...data_frames import Axis, data_frame
 from ...quantity import Quantity, parse_unit, with_unit
-from ...tables import Axis, data_frame
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr
 
+from ...data_frames import Axis, data_frame
 from ...quantity import parse_unit, with_unit
-from ...tables import Axis, data_frame
 from ..curves.target import Target
 from .causes import Cause
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from ...tables import Axis, data_frame
+from ...data_frames import Axis, data_frame
 from .fitted_numbers import FittedNumber, fitted_numbers
 from .verdict import RecordGap, Verdict
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 
 from ...model import FlatModel
-from ...model.instructions import Instruction, read_instructions
+from ...model.function_steps import Instruction, read_instructions
 from .modelica_terms import ATOM, SERIES, SIGNED, WRITTEN_TWICE, Term, kept, term
 from .modelica_text import literal
 

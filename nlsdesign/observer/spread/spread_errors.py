@@ -11,13 +11,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ...data_frames import Axis, data_set
 from ...errors import ArrangementError, ConvergenceError, unknown_name
 from ...model import FlatModel
 from ...quantity import three_digits
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior, declared_prior
 from ...simulation.sampled_batch import PLANT, BatchTrace, run_batch
-from ...tables import Axis, data_set
 from ..adaptive.adaptive_observer import encoder_quantum
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from .observer_bench import ObserverBench
