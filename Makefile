@@ -17,7 +17,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help study test thorough kernels mutation lint bench masters targets environment lock clean distclean
+.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets environment lock clean distclean
 
 help:
 	@echo 'make study      run the study of the published actuator; the report goes to $(OUT)/report.html'
@@ -30,6 +30,7 @@ help:
 	@echo 'make bench      the benchmarks: ratios against named peers'
 	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
 	@echo 'make targets    generated C on Cortex-M4F and M7 in an emulator: docs/targets.md'
+	@echo 'make tutorial   run the tutorial and write its numbers, figures and notebook anew'
 	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'
 	@echo 'make clean      remove what study, test and build have written'
 	@echo 'make distclean  remove .venv too'
@@ -68,6 +69,9 @@ bench: environment
 
 masters: environment
 	$(BIN)/python -m benchmarks.foreign_masters --write docs/fmi_masters.md
+
+tutorial: environment
+	$(BIN)/python -m tests.tutorial --write
 
 targets: environment
 	$(BIN)/python -m benchmarks.targets

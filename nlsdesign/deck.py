@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
 
-from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name
+from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name, visible
 from .locations import folder
 from .quantity import Quantity, parse_unit
 from .reading import is_there, text_of
@@ -20,6 +20,8 @@ _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
 _HEADER = re.compile(rf"^\s*\[\[?\s*({_NAME})\s*\]")
 _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
+MOST_SPREAD = 5.0
+"""Largest relative spread of a number in a deck: a factor of six."""
 _MOST_LEVELS = 64
 """Names within names; the deepest deck of the project has seven."""
 _TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
@@ -72,6 +74,10 @@ class ParentDeck:
     digest: str
     change: str = ""
     parent: ParentDeck | None = None
+
+    def __post_init__(self) -> None:
+        for field_name in ("name", "digest", "change"):
+            object.__setattr__(self, field_name, visible(getattr(self, field_name)))
 
     def line(self) -> tuple[ParentDeck, ...]:
         """Return this deck and those before it, the latest first."""
@@ -157,6 +163,8 @@ class Deck:
             If it is not such a table, a field is misspelt, or the value is not a number.
         UnitError
             If the unit is missing or unknown.
+        ValueRangeError
+            If the spread is one that only per cent can have.
         """
         where = self.place(full_name)
         if not isinstance(raw, dict):
@@ -194,6 +202,11 @@ class Deck:
             factor = parse_unit(raw["unit"]).factor
             scaled = tuple(v.times(factor) if isinstance(v, Written) else v * factor for v in items)
             in_si = scaled if isinstance(value, list) else scaled[0]
+            if spread > MOST_SPREAD:
+                raise ValueRangeError(
+                    f"spread = {spread:g}", f"means ± {100 * spread:g} %, which leaves nothing of the number",
+                    next_step=f"write spread = {spread / 100:g} if {spread:g} % was meant",
+                )  # fmt: skip
             return Quantity(in_si, raw["unit"], raw["source"], float(spread))
         except NlsError as error:
             raise error.at(where) from None
@@ -232,9 +245,9 @@ def load_deck(name: str | Path) -> Deck:
     """
     path = Path(name)
     if path.suffix != ".toml":
-        path = folder("models") / "decks" / f"{name}.toml"
-        if not is_there(path):
+        if str(name) not in deck_names():
             raise unknown_name("deck", str(name), deck_names())
+        path = folder("models") / "decks" / f"{name}.toml"
     if not is_there(path):
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
@@ -278,7 +291,7 @@ def read_deck(text: str, path: Path) -> Deck:
         line, column = places.get("deck", (1, 1))
         raise DeckError(f"{path.name}:{line}:{column}: deck", "is not a table", next_step="write [deck]")
     given = (head.get("name", path.stem), head.get("description", ""))
-    name, description = (each if isinstance(each, str) else brief(each) for each in given)
+    name, description = (visible(each) if isinstance(each, str) else brief(each) for each in given)
     return Deck(name, description, path, tables, places, head)
 
 

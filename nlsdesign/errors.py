@@ -4,12 +4,45 @@ from __future__ import annotations
 
 import difflib
 import re
+import unicodedata
 from collections.abc import Iterable
 
 _LONGEST_NAME = 120
 """Longer names are compared with nothing: no name that exists is as long."""
 _LONGEST_RUN, _LONGEST_TEXT = 300, 2500
 """Most characters of a run without blanks, and of a text; what is longer is cut in its middle."""
+_TURNING = "\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+"""Marks that turn the direction of writing, so that a text reads otherwise than it is."""
+
+
+def visible(text: str) -> str:
+    r"""Return a text whose control characters are written out, so that it does nothing to a terminal.
+
+    Line ends and tabs stay; escapes, carriage returns and marks that turn the direction of writing do not.
+
+    Parameters
+    ----------
+    text
+        From a file or a command line.
+
+    Examples
+    --------
+    >>> print(visible("red \x1b[31m"))
+    red \x1b[31m
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        _code(each)
+        if (unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t") or each in _TURNING
+        else each
+        for each in text
+    )
+
+
+def _code(character: str) -> str:
+    number = ord(character)
+    return f"\\x{number:02x}" if number < 0x100 else f"\\u{number:04x}"
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
@@ -98,9 +131,7 @@ def fit_for_message(text: str) -> str:
     """
     if len(text) > _LONGEST_TEXT:
         text = _cut(text, _LONGEST_TEXT)
-    if not text.isprintable():
-        text = "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
-    return re.sub(rf"\S{{{_LONGEST_RUN},}}", lambda run: _cut(run[0], _LONGEST_RUN), text)
+    return re.sub(rf"\S{{{_LONGEST_RUN},}}", lambda run: _cut(run[0], _LONGEST_RUN), visible(text))
 
 
 def _cut(text: str, length: int) -> str:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import ExportError
+from .written_files import note_written, place_for
 
 _drafts: set[Path] = set()
 
@@ -18,6 +19,8 @@ _drafts: set[Path] = set()
 @contextmanager
 def draft(target: Path) -> Iterator[Path]:
     """Yield a temporary file in the same folder; it replaces the target if no error occurs.
+
+    While a command keeps what others have changed, it goes beside such a target instead.
 
     Parameters
     ----------
@@ -38,7 +41,9 @@ def draft(target: Path) -> Iterator[Path]:
         yield name
         # A temporary file can be read by its owner only.
         os.chmod(name, 0o644)
-        os.replace(name, target)
+        place = place_for(target, Path(name))
+        os.replace(name, place)
+        note_written(place)
     except OSError as error:
         raise _not_writable(target, error) from error
     finally:

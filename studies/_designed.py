@@ -1,4 +1,4 @@
-"""What the studies of designed cams share: the part with its drawings, and the sections of a report."""
+"""What the studies of designed cams share: the part with its drawings."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import nlsdesign as nls
-from nlsdesign.design import CamDesign, CamPart, Cause, MachinedCam, ToleranceResult
+from nlsdesign.design import CamDesign, CamPart, MachinedCam, ToleranceResult
 from nlsdesign.errors import ValueRangeError
-from nlsdesign.report import FigureSection, FileSection, Section, TableSection
+from nlsdesign.report import FileSection, Section
 
 INSPECTED = 8  # rows of the torque table on the drawing
 DRAWINGS = {
@@ -107,40 +107,6 @@ def inspection_rows(design: CamDesign) -> list[nls.figures.InspectionRow]:
     ]
 
 
-def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
-    """Show picture, torque, numbers and limits of a design.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    of
-        Which one, behind each heading, where a report shows several.
-    """
-    behind = f", {of}" if of else ""
-    curve = {"designed actuator": (design.check.angles, design.check.torques)}
-    return [
-        FigureSection(
-            f"The design to scale{behind}",
-            nls.figures.design_picture(design),
-            caption="Above at rest, below at the last angle; in mm. The rubber is drawn as if square.",
-            assumed="Rubber at rest, cable without thickness.",
-        ),
-        FigureSection(
-            f"Torque against the target{behind}",
-            nls.figures.torque_against_target(design.target, curve),
-            caption="Torque of the flattened, changed assembly; nominal numbers.",
-        ),
-        TableSection(f"Result of the design{behind}", ("quantity", "value"), tuple(design.rows())),
-        FigureSection(
-            f"Use of each limit{behind}",
-            nls.figures.limit_margins(design),
-            caption="Hatched: the design sits on the limit. Limits that nobody asked for follow from the "
-            "declared cable and rubber.",
-        ),
-    ]
-
-
 def drawing_section(cam: MadeCam) -> Section:
     """List the drawings, with the cable that they are for."""
     return FileSection(
@@ -149,49 +115,3 @@ def drawing_section(cam: MadeCam) -> Section:
         caption=f"For a cable of {2e3 * cam.part.number('cable_radius'):.2g} mm: edge under the cable, "
         "run-out, seat of the ferrule, bore.",
     )
-
-
-def tolerance_sections(result: ToleranceResult) -> list[Section]:
-    """Show what the spreads do, and what to trim, measure and tighten."""
-    head, *rows = result.table()
-    built, trim = result.quantiles[-1], result.trims[0] if result.trims else None
-    after = "" if trim is None else f"; {1e3 * trim.quantiles[-1].value:.0f} once {trim.name} is trimmed"
-    return [
-        FigureSection(
-            "Torque error of made springs",
-            nls.figures.tolerance_bars(result),
-            caption="95 % of the springs stay below.",
-            means=f"95 % of {len(result.errors)} made springs are within {1e3 * built.value:.0f} mN·m rms as "
-            f"built{after}. {advice(result)}",
-            assumed="; ".join(dict.fromkeys(_reason(c.cause) for c in result.causes if c.cause.assumed)),
-        ),
-        FigureSection(
-            "Torque of made springs",
-            nls.figures.torque_band(result),
-            caption="Nine of ten springs lie within the band.",
-        ),
-        TableSection("Tolerance", ("what", "value"), tuple(result.rows())),
-        TableSection(
-            "Causes",
-            (*head[:6], "share, trimmed", "halved, trimmed", "known, trimmed"),
-            tuple(rows),
-            caption="Share of the variance in %, and the 95 % quantile in mN·m rms: of the cause alone, if "
-            "it were half as large, and if it were known before the cam is made; then after the trim.",
-            folded=True,
-        ),
-    ]
-
-
-def _reason(cause: Cause) -> str:
-    return cause.source.removeprefix("assumed: ")
-
-
-def advice(result: ToleranceResult) -> str:
-    """Return what to do first, as a sentence."""
-    steps = (
-        ("trim", result.trim_first),
-        ("measure", result.measure_first),
-        ("tighten", result.tighten_first),
-    )
-    named = [f"{verb} {name}" for verb, name in steps if name]
-    return f"First: {'; '.join(named)}." if named else ""

@@ -183,7 +183,16 @@ def write_page(results: Results, out: Path) -> None:
     nls.write_report(
         out / "report.html",
         *verdict_sections(results.verdict),
-        TableSection("Second half", ("error", "viscous friction alone", "with the named effects"), rows),
-        comparison_table("Fitted on the first half, and published", numbers),
+        TableSection(
+            "Second half",
+            ("error", "viscous friction alone", "with the named effects"),
+            rows,
+            caption="Errors on the half that no fit has seen.",
+        ),
+        comparison_table(
+            "Fitted on the first half, and published",
+            numbers,
+            caption="The same numbers as their authors give them.",
+        ),
         title="EMPS: what is missing",
     )

@@ -11,14 +11,12 @@ from pathlib import Path
 
 import nlsdesign as nls
 from nlsdesign.design import DesignSettings, FerruleSeat, MachinedOneSidedCam, RestLengthRange
-from nlsdesign.report import Chapter
+from nlsdesign.report import Chapter, design_sections, tolerance_sections
 
 from ._designed import (
     MadeCam,
-    design_sections,
     drawing_section,
     make_cam,
-    tolerance_sections,
     with_machined_contour,
 )
 

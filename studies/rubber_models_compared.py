@@ -247,7 +247,12 @@ def write_page(results: Results, out: Path) -> None:
     )
     nls.write_report(
         out / "report.html",
-        TableSection("All models", columns, tuple(each.row for each in results.comparisons)),
+        TableSection(
+            "All models",
+            columns,
+            tuple(each.row for each in results.comparisons),
+            caption="Each model on each data set, with its errors.",
+        ),
         FigureSection("A held-out bench record", figure, caption="Simulated; no fit has used the record."),
         title="Rubber models compared",
     )

@@ -35,9 +35,16 @@ from nlsdesign.design import (
     scan_gear_ratio,
     walking_task,
 )
-from nlsdesign.report import Chapter, FigureSection, TableSection, TextSection
+from nlsdesign.report import (
+    Chapter,
+    FigureSection,
+    TableSection,
+    TextSection,
+    design_sections,
+    tolerance_sections,
+)
 
-from ._designed import design_sections, tolerance_sections, with_machined_contour
+from ._designed import with_machined_contour
 from ._published import declared_actuator
 
 BODY_MASS = nls.quantity(75.0, "kg")
@@ -188,6 +195,7 @@ def write(out: Path, joints: Iterable[Joint], power: TaskCurve, ankle: AnkleSpri
                 (r, c.rigid.heat, c.linear.heat if c.linear else "none", c.best.heat, c.two_branch or "none")
                 for r, c in joint.curves.items()
             ),
+            caption="Heat of the motor over one stride.",
             folded=True,
         )
         for joint in joints

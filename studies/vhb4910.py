@@ -107,7 +107,7 @@ def main(out: Path, fast: bool = False, data: Path | None = None) -> Results | N
     nls.write_report(
         out / "report.html",
         *verdict_sections(verdict),
-        TableSection("Numbers", ("quantity", "value"), rows),
+        TableSection("Numbers", ("quantity", "value"), rows, caption="Errors and what was fitted."),
         title="VHB 4910: what is missing",
     )
     return results

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.cli import main
+from nlsdesign.written_files import LIST_NAME
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -29,3 +30,8 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
         return status, out, err
 
     return call
+
+
+def files_in(folder: Path) -> list[str]:
+    """Return the names of the files in a folder, without the list of what was written, sorted."""
+    return sorted(each.name for each in folder.iterdir() if each.name != LIST_NAME)

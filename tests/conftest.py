@@ -14,8 +14,13 @@ os.environ["MPLBACKEND"] = "Agg"
 os.environ["SOURCE_DATE_EPOCH"] = "1760000000"
 
 # The same examples in every run; no time limit (it would test the machine); nothing written to disk.
-settings.register_profile("nlsdesign", derandomize=True, deadline=None, database=None)
-settings.load_profile("nlsdesign")
+settings.register_profile("thorough", derandomize=True, deadline=None, database=None, max_examples=300)
+settings.register_profile("quick", settings.get_profile("thorough"), max_examples=40)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The run without the slow tests also draws fewer examples."""
+    settings.load_profile("quick" if config.option.markexpr == "not slow" else "thorough")
 
 
 @pytest.fixture(scope="session")

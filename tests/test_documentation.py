@@ -11,7 +11,7 @@ import pytest
 from tests import source
 
 PRODUCT = ("nlsdesign", "models", "studies")
-TEXTS = (*PRODUCT, "tests", "docs", "benchmarks", "requirements", ".ci")
+TEXTS = (*PRODUCT, "tests", "docs", "examples", "benchmarks", "requirements", ".ci")
 DOCUMENTS = ("architecture.md", "conventions.md", "claims.md", "known_gaps.md")
 
 # Put together here so that this file does not contain what it looks for.

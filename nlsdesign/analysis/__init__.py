@@ -15,6 +15,7 @@ from .sensor_ranking import (
     rank_sensors,
 )
 from .stability import Stability, least_damped, sampled_poles
+from .stated_ranges import RangeAtRest, ranges_at_rest
 from .sweep import Chart, Columns, PointView, View, over_angle
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Observability",
     "PlantMode",
     "PointView",
+    "RangeAtRest",
     "RankDrop",
     "RankDrops",
     "RankingAssumptions",
@@ -40,6 +42,7 @@ __all__ = [
     "empirical_gramian",
     "least_damped",
     "over_angle",
+    "ranges_at_rest",
     "rank_drops",
     "rank_sensors",
     "rest_points",

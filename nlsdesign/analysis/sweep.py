@@ -15,6 +15,7 @@ from ..errors import unknown_name
 from ..model import FlatModel, Variable
 from ..model.roles import measured_motion
 from ..quantity import typeset_unit
+from ..tables import Axis, data_frame, data_set
 from ..writing import write_table
 from .rest_points import RestPoint, RestPoints, rest_points
 
@@ -122,11 +123,24 @@ class Chart:
         return column
 
     def to_frame(self) -> Any:
-        """Return a ``pandas.DataFrame`` indexed by the argument; needs pandas."""
-        import pandas as pd
-
+        """Return a ``pandas.DataFrame`` indexed by the argument; units are in its ``attrs``; needs pandas."""
         data = {v.name: self.values[:, i] for i, v in enumerate(self.columns)} | dict(self.words)
-        return pd.DataFrame(data, index=pd.Index(self.at, name=self.argument.name))
+        return data_frame(data, units=self._units(), index=self._axis())
+
+    def to_xarray(self) -> Any:
+        """Return an ``xarray.Dataset`` over the argument, each column with its unit; needs xarray."""
+        over = (self.argument.name,)
+        data: dict[str, tuple[tuple[str, ...], Any]] = {
+            v.name: (over, self.values[:, i]) for i, v in enumerate(self.columns)
+        }
+        data |= {name: (over, np.array(texts)) for name, texts in self.words.items()}
+        return data_set(data, axes=[self._axis()], units=self._units())
+
+    def _units(self) -> dict[str, str]:
+        return {v.name: v.unit for v in self.columns}
+
+    def _axis(self) -> Axis:
+        return Axis(self.argument.name, self.argument.unit, self.at)
 
     def write_csv(self, path: Path) -> None:
         """Write ``name [unit]`` columns, words last; nothing is left behind if writing fails.

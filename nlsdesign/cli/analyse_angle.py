@@ -12,13 +12,15 @@ from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
     deck_option,
+    examples,
     json_option,
     measured_option,
-    out_option,
     show_json,
     show_table,
     spring_option,
 )
+from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -34,7 +36,13 @@ _HEADINGS = {
 }
 
 
-@click.command("angle")
+@click.command(
+    "angle",
+    epilog=examples(
+        "nlsdesign analyse angle --deck austin2015_figure_consistent --to '45 deg' --count 10",
+        "nlsdesign analyse --deck austin2015_figure_consistent --from '-20 deg' --to '20 deg' --json",
+    ),
+)
 @deck_option
 @click.option("--from", "first", type=Number("deg"), default="0 deg", show_default=True, help="First angle.")
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
@@ -43,7 +51,7 @@ _HEADINGS = {
 )
 @measured_option
 @spring_option
-@out_option("out/analysis")
+@out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg", "report.html"))
 @json_option
 def analyse_angle(
     deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None
@@ -56,17 +64,13 @@ def analyse_angle(
     from ..deck import load_deck
     from ..figures import observability_over_angle, stability_over_angle, write_figures
     from ..model import flatten
-    from ..model.roles import measured_motion, series_spring
+    from ..model.roles import series_spring
     from ..model.transform import with_outputs
+    from ..report import write_analysis_report
 
-    model = flatten(declare(load_deck(deck_name)))
-    torque, measured = series_spring(model, roles["spring"]).effort, measured_motion(model, roles["measured"])
-    unit = model.variable(measured).unit
-    if unit != "rad":
-        raise UnitError(
-            f"'{measured}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
-            next_step="name the angle of a body that turns, with --measured",
-        )  # fmt: skip
+    declared = declare(load_deck(deck_name))
+    model = flatten(declared)
+    torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     if not last > first:
         raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
     angles = np.linspace(first, last, count)
@@ -84,8 +88,12 @@ def analyse_angle(
         "observability": observability_over_angle({model.name: chart}, drops={model.name: drops}),
     }
     files = [out / "over_angle.csv", *write_figures(out, pictures)]
+    remarks = range_remarks(declared, first=first, last=last, measured=measured)
+    warn(remarks)
+    page = out / "report.html"
+    files.append(write_analysis_report(page, chart, drops, model=model.name, ranking=ranking, files=files))
     if as_json:
-        show_json(_as_json(chart, drops, ranking) | {"file": files[0], "files": files})
+        show_json(_as_json(chart, drops, ranking) | {"warnings": remarks, "file": files[0], "files": files})
         return
     _show(chart, drops, model.name)
     if ranking is not None:
@@ -95,6 +103,33 @@ def analyse_angle(
     else:
         click.echo(f"sensors are not ranked: {unranked}")
     click.echo(f"written: {', '.join(map(str, files))}")
+
+
+def swept_angle(model: FlatModel, measured: str | None) -> str:
+    """Return the angle that an analysis goes over.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    measured
+        Name of the state; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnitError
+        If it is no angle.
+    """
+    from ..model.roles import measured_motion
+
+    name = measured_motion(model, measured)
+    unit = model.variable(name).unit
+    if unit != "rad":
+        raise UnitError(
+            f"'{name}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
+            next_step="name the angle of a body that turns, with --measured",
+        )  # fmt: skip
+    return name
 
 
 def _ranking(model: FlatModel, angles: Any, measured: str, torque: str) -> tuple[SensorRanking | None, str]:

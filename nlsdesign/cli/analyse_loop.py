@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ExportError
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import deck_option, examples, json_option, show_json, show_table
+from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
 """Number of the controller whose onset of limit cycling is looked for, by law."""
 _GAINS = ("proportional", "integral", "derivative")
+_FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "coupled_stability.svg")
 _FREQUENCIES = (0.1, 11.0, 20)
 
 
@@ -76,7 +79,13 @@ class _Evaluation:
         return result
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign analyse loop --deck austin2015_figure_consistent",
+        "nlsdesign analyse loop --deck austin2015_figure_consistent --law scheduled "
+        "--bandwidth '10 Hz' --amplitude '0.5 N*m' --json",
+    )
+)
 @deck_option
 @click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
               help="A PID, or speed by tangent stiffness.")  # fmt: skip
@@ -96,7 +105,7 @@ class _Evaluation:
               help="Of the load's angle where no torque is wanted.")  # fmt: skip
 @click.option("--delay", type=click.IntRange(0), default=1, show_default=True, help="In samples.")
 @click.option("--sample-time", type=Number("s"), default="1 ms", show_default=True, help="Of the controller.")
-@out_option("out/loop")
+@out_option("out/loop", writes=_FILES)
 @json_option
 @click.pass_context
 def loop(
@@ -118,13 +127,22 @@ def loop(
     asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
     result = _evaluated(fixed, moved, asked)
     files = _written(result, out)
+    remarks = _remarks(deck_name, asked.last)
+    warn(remarks)
     if as_json:
-        show_json(_content(result, files))
+        show_json(_content(result, files) | {"warnings": remarks})
     else:
         _shown(result)
         for path in files:
             click.echo(f"written: {path}")
     ctx.exit(1 if result.findings else 0)
+
+
+def _remarks(deck_name: str, last: float) -> list[str]:
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+
+    return range_remarks(declare(load_deck(deck_name)), last=last)
 
 
 def _law(options: dict[str, Any]) -> dict[str, Any]:

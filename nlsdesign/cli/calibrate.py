@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import MeasurementError
 from ..writing import write_text
-from .output import deck_option, json_option, out_option, show_json, show_table
+from .output import deck_option, examples, json_option, show_json, show_table
+from .overwriting import out_option
 
 if TYPE_CHECKING:
     from ..calibration import CalibrationPlan, CalibrationRecords, CalibrationTest
@@ -22,7 +23,19 @@ KINDS = ("hung_weight", "load_cell", "free_run")
 _file = click.Path(path_type=Path, dir_okay=False)
 
 
-@click.command()
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    if given["plan"]:
+        return ["plan.json"]
+    return ["joint_numbers.json", "calibration.json"]  # and the deck, whose name is read
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign observer calibrate --deck austin2015_figure_consistent --plan",
+        "nlsdesign observer calibrate --deck my.toml --kind hung_weight --records bench/weights",
+    )
+)
 @deck_option
 @click.option("--kind", "kinds", multiple=True, type=click.Choice(KINDS),
               help="What was done; repeatable, once for each --records.")  # fmt: skip
@@ -31,7 +44,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.option("--known", type=_file, default=None,
               help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip
 @click.option("--plan", is_flag=True, help="Rank calibrations by what they would buy; needs no records.")
-@out_option("out/calibration")
+@out_option("out/calibration", writes=_writes)
 @json_option
 def calibrate(
     deck_name: str,

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from .output import deck_option, out_option
+from .output import deck_option, examples, json_option, show_written
+from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -77,15 +79,27 @@ def controller_of(
     return torque_controller(plant, law=outer, velocity=inner, sample_time=sample_time)
 
 
-@click.command("controller")
+@click.command(
+    "controller",
+    epilog=examples(
+        "nlsdesign export controller --deck austin2015_figure_consistent",
+        "nlsdesign export controller --deck my.toml --law scheduled --bandwidth '8 Hz' --fmu",
+    ),
+)
 @deck_option
 @law_options
-@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
-@out_option("out/controller")
-@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
+@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True,
+              help="Of what is computed in steps.")  # fmt: skip
+@out_option(
+    "out/controller",
+    writes=lambda given: [*c_names("controller"), *(["controller.fmu"] if given["fmu"] else [])],
+)
+@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True,
+              help="Type of the numbers in C.")  # fmt: skip
 @click.option("--fmu", is_flag=True, help="Write an FMU for co-simulation (FMI 3.0) beside the C code.")
+@json_option
 def export_controller(
-    deck_name: str, sample_time: float, out: Path, real: str, fmu: bool, **chosen: Any
+    deck_name: str, sample_time: float, out: Path, real: str, fmu: bool, as_json: bool, **chosen: Any
 ) -> None:
     """Write the torque controller as C99 with a self-test."""
     from ..components.assembly.deck_writer import declare
@@ -94,13 +108,15 @@ def export_controller(
     from ..export import export_c, export_fmu
     from ..model import flatten
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
     model = controller_of(plant, sample_time, **chosen)
     most = largest_torque(plant)
     source = export_c(model, out, real=real, name="controller")
     written = [source.header, source.source, source.selftest]
     if fmu:
         written.append(export_fmu(model, out / "controller.fmu"))
-    click.echo(str(model))
-    click.echo(f"largest torque that the drive can hold: {most:.4g} N·m")
-    click.echo(f"written: {', '.join(str(path) for path in written)}")
+    sentences = (str(model), f"largest torque that the drive can hold: {most:.4g} N·m")
+    remarks = range_remarks(declared)
+    warn(remarks)
+    show_written(as_json, sentences, written, largest_torque=most, warnings=remarks)

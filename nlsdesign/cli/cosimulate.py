@@ -12,7 +12,8 @@ import click
 
 from ..errors import ValueRangeError
 from ..quantity import Quantity, quantity, typeset_unit
-from .output import json_option, show_json, show_table
+from .output import examples, json_option, show_json, show_table
+from .overwriting import out_file_option
 from .units import Number, parse_number
 
 if TYPE_CHECKING:
@@ -35,7 +36,15 @@ WIRE_HELP = (
 )
 
 
-@click.command("cosimulate")
+@click.command(
+    "cosimulate",
+    epilog=examples(
+        "nlsdesign cosimulate --fmu plant=out/fmu/plant.fmu --input plant.motor.current=0.5@1 "
+        "--stop '2 s' --out out/run.csv",
+        "nlsdesign cosimulate --system out/system.ssp --stop '2 s' --step '1 ms' --halvings 3 "
+        "--out out/run.csv --json",
+    ),
+)
 @click.option("--fmu", "fmus", multiple=True, metavar="INSTANCE=FILE", help="Repeatable.")
 @click.option("--system", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE.ssp",
               help="An SSP archive instead of --fmu; wires and parameters are added to its own.")  # fmt: skip
@@ -58,7 +67,7 @@ WIRE_HELP = (
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,
               help="Also halve the step so often and print how the signals converge.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="CSV to write.")
+@out_file_option(None, "CSV to write.")
 @json_option
 def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **given: Any) -> None:
     """Run FMUs together; numbers are in the units that the FMUs state for their variables.

@@ -12,23 +12,59 @@ from ..deck import deck_names, load_deck
 from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
+from ..writing import write_text
+from .deck_new import force_option, new, refuse_to_replace
 from .output import examples, json_option, show_json, show_table
+from .overwriting import out_file_option
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
+    from .readiness import Readiness
 
 _file = click.Path(path_type=Path, dir_okay=False, exists=True)
 
 
 @click.group()
 def deck() -> None:
-    """Check and show decks: every number with value, unit, source and spread."""
+    """Begin, copy, check and show decks: every number with value, unit, source and spread."""
 
 
-@deck.command("list")
-def list_decks() -> None:
-    """List the decks that come with the project."""
-    show_table("Decks", ("name", "description"), [(n, load_deck(n).description) for n in deck_names()])
+deck.add_command(new)
+
+
+@deck.command("list", epilog=examples("nlsdesign deck list", "nlsdesign deck list --json"))
+@json_option
+def list_decks(as_json: bool) -> None:
+    """List the decks that come with the project, and the templates of `deck new`."""
+    from ..components.assembly.deck_template import load_template, template_names
+
+    decks = {name: load_deck(name) for name in deck_names()}
+    templates = {name: load_template(name) for name in template_names()}
+    if as_json:
+        show_json({
+            "decks": {n: {"description": d.description, "file": d.path} for n, d in decks.items()},
+            "templates": {
+                n: {"description": t.deck.description, "ready_for": t.ready_for} for n, t in templates.items()
+            },
+        })  # fmt: skip
+        return
+    show_table("Decks", ("name", "description"), [(n, d.description) for n, d in decks.items()])
+    rows = [(n, t.deck.description) for n, t in templates.items()]
+    show_table("Templates, for nlsdesign deck new --template", ("name", "description"), rows)
+
+
+@deck.command("copy", epilog=examples("nlsdesign deck copy austin2015_figure_consistent leg.toml"))
+@click.argument("deck_name", metavar="DECK")
+@click.argument("out", metavar="OUT.TOML", type=click.Path(path_type=Path, dir_okay=False))
+@force_option
+def copy_deck(deck_name: str, out: Path, force: bool) -> None:
+    """Copy a deck, such as one that comes with the project, into a file of one's own, with its comments."""
+    read = load_deck(deck_name)
+    if out.suffix != ".toml":
+        raise click.BadParameter(f"'{out}' does not end with .toml", param_hint="OUT.TOML")
+    refuse_to_replace(out, force)
+    write_text(out, read.path.read_text(encoding="utf-8-sig"))
+    click.echo(f"written: {out}; next: nlsdesign deck check {out}")
 
 
 @deck.command(
@@ -39,8 +75,14 @@ def list_decks() -> None:
 @click.argument("deck_name", metavar="DECK")
 @json_option
 def check(deck_name: str, as_json: bool) -> None:
-    """Name every problem with line and column, and the share of numbers that are only assumed."""
-    from ..components.assembly.deck_writer import deck_problems, declare
+    """Name every problem with line and column, likely slips, and the commands that the deck is ready for.
+
+    Exit status 2 if the deck has a problem; a command that it is not ready for, or a warning, is none.
+    """
+    from ..components.assembly.deck_remarks import deck_remarks
+    from ..components.assembly.deck_writer import deck_digest, deck_problems, declare
+    from .range_remarks import range_remarks
+    from .readiness import readiness
 
     read = load_deck(deck_name)
     problems = deck_problems(read) or _model_problems(declare(read))
@@ -48,12 +90,38 @@ def check(deck_name: str, as_json: bool) -> None:
         for problem in problems:
             click.echo(f"error: {problem}", err=True)
         sys.exit(2)
-    shares = sources(declare(read).quantities())
+    machine = declare(read)
+    shares, commands = sources(machine.quantities()), readiness(machine)
+    remarks = [*deck_remarks(machine), *range_remarks(machine)]
     if as_json:
-        show_json({"deck": read.name, "numbers": len(declare(read).quantities()), **shares})
+        show_json({
+            "deck": read.name, "digest": deck_digest(machine), "numbers": len(machine.quantities()), **shares,
+            "warnings": remarks,
+            "commands": {
+                each.command: {"ready": each.ready, "reason": str(each.reason) if each.reason else None}
+                for each in commands
+            },
+        })  # fmt: skip
         return
-    click.echo(f"{read.path.name}: no problem in {len(declare(read).quantities())} numbers, "
+    click.echo(f"{read.path.name}: no problem in {len(machine.quantities())} numbers, "
                f"{100 * shares['assumed']:.0f} % of them only assumed")  # fmt: skip
+    for remark in remarks:
+        click.echo(f"warning: {remark}")
+    _show_readiness(commands)
+
+
+def _show_readiness(commands: list[Readiness]) -> None:
+    ready = [
+        each.command + (f" (with {each.needs})" if each.needs else "") for each in commands if each.ready
+    ]
+    click.echo(f"ready for: {', '.join(ready) or 'no command'}")
+    reasons: dict[str, list[str]] = {}
+    for each in commands:
+        if not each.ready:
+            reasons.setdefault(str(each.reason), []).append(each.command)
+    if reasons:
+        rows = [(", ".join(names), reason) for reason, names in reasons.items()]
+        show_table("Not ready for", ("command", "why, and what to do"), rows)
 
 
 def _model_problems(assembly: Assembly) -> list[NlsError]:
@@ -67,11 +135,17 @@ def _model_problems(assembly: Assembly) -> list[NlsError]:
     return []
 
 
-@deck.command()
+@deck.command(epilog=examples("nlsdesign deck show my.toml", "nlsdesign deck show my.toml --toml"))
 @click.argument("deck_name", metavar="DECK")
+@click.option("--toml", "as_toml", is_flag=True, help="Print the file as it stands, with its comments.")
 @json_option
-def show(deck_name: str, as_json: bool) -> None:
+def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
     """Draw the parts and list the numbers."""
+    if as_toml:
+        if as_json:
+            raise click.UsageError("--toml and --json exclude each other; give one")
+        click.echo(load_deck(deck_name).path.read_text(encoding="utf-8-sig"), nl=False)
+        return
     from ..components.assembly.deck_writer import declare
 
     assembly = declare(load_deck(deck_name))
@@ -91,17 +165,22 @@ def show(deck_name: str, as_json: bool) -> None:
     show_table("Numbers", ("name", "value", "spread", "source"), rows)
 
 
-@deck.command("from-rig")
+@deck.command("from-rig", epilog=examples("nlsdesign deck from-rig rig.toml cam.csv --out my_rig.toml"))
 @click.argument("rig_toml", metavar="RIG.TOML", type=_file)
 @click.argument("cam_csv", metavar="CAM.CSV", type=_file)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="Deck to write.")
-def from_rig(rig_toml: Path, cam_csv: Path, out: Path) -> None:
+@out_file_option(None, "Deck to write.")
+@json_option
+def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
     """Write the deck of a practice rig from what its makers declare: numbers, and a table of the cam."""
     from ..components.assembly.deck_writer import write_deck
 
     assembly = bundled("models", "test_rig").test_rig_deck(rig_toml, cam_csv)
     write_deck(assembly, out)
-    click.echo(f"written: {out}, {len(assembly.quantities())} numbers; next: nlsdesign diagnose --deck {out}")
+    numbers = len(assembly.quantities())
+    if as_json:
+        show_json({"file": out, "numbers": numbers})
+        return
+    click.echo(f"written: {out}, {numbers} numbers; next: nlsdesign diagnose --deck {out}")
 
 
 def _short(given: Quantity) -> str:

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import NlsError, ValueRangeError
-from .output import deck_option, json_option, out_option, show_json, show_table, spring_option
+from .design_kinds import KINDS, show_kinds
+from .output import DECK_HELP, examples, json_option, show_json, show_table, spring_option
+from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 from .units import parse_number
 
 if TYPE_CHECKING:
@@ -19,13 +22,25 @@ if TYPE_CHECKING:
 
 _LINE = "repeatable; a line as in a design file, for instance"
 _FILES = (
+    "report.html",
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
 )
 
 
-@click.command()
-@deck_option
+@click.command(
+    epilog=examples(
+        "nlsdesign design --deck austin2015_figure_consistent --maximum '5 N*m' --angle '53 deg' "
+        "--shape 1 --free spring.cam.contour --free spring.pretension --free spring.rubber.area "
+        "--free spring.rubber.rest_length --limit 'MaximumCamRadius = {radius = \"20 mm\"}'",
+        "nlsdesign design --list limits",
+        "nlsdesign design --deck my.toml --task job.toml --out out/my_cam",
+        "nlsdesign design --deck my.toml --target-file curve.csv --goal 'TorqueError = {}' --dry-run",
+    )
+)
+@click.option("--deck", "deck_name", metavar="DECK", help=DECK_HELP + "  [required]")
+@click.option("--list", "listed", type=click.Choice(KINDS), default=None,
+              help="Only list what a design can be asked for: names, fields, units, defaults.")  # fmt: skip
 @click.option(
     "--task", "task_file", type=click.Path(path_type=Path, dir_okay=False), default=None,
     help="Design file (TOML) with target, free names, limits, goals, stock.",
@@ -37,7 +52,8 @@ _FILES = (
 )  # fmt: skip
 @click.option("--maximum", default=None, help='Exponential target: torque at the end, e.g. "5 N·m".')
 @click.option("--angle", default=None, help='Exponential target: angle at the end, e.g. "53 deg".')
-@click.option("--shape", type=float, default=1.0, help="Exponential target: exponent c in 1/rad.")
+@click.option("--shape", type=float, default=1.0, show_default=True,
+              help="Exponential target: exponent c in 1/rad.")  # fmt: skip
 @click.option(
     "--free", multiple=True, help="Quantity that may change, e.g. spring.cam.contour, which is the default."
 )
@@ -49,17 +65,24 @@ _FILES = (
 @click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
 @click.option("--draws", type=int, default=None, help="Draws of the tolerance, else 1000; 0: none.")
 @spring_option
-@out_option("out/design")
+@out_option("out/design", writes=(*_FILES, "task_curve.svg", "task_motor.svg"))
 @json_option
-def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
+@click.pass_context
+def design(context: click.Context, /, deck_name: str | None, out: Path, as_json: bool, **given: Any) -> None:
     """Design cam and rubber for a torque curve; exit status 1 if the design misses its target.
 
     Limits of the declared cable and rubber hold unless one of the same kind is given.
     """
+    if given.pop("listed") is not None:
+        show_kinds(context.params["listed"], as_json)
+        return
+    if deck_name is None:
+        raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..design import design_cam
     from ..progress import Steps
+    from ..report import write_design_report
 
     actuator, job = declare(load_deck(deck_name)), _job(**given)
     steps = Steps()
@@ -79,8 +102,14 @@ def design(deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     if designed.met:
         with steps.step("drawings"):
             files += _drawn(designed, job, deck_name, out, remarks)
+    # The deck that is written, over the angles that were asked for.
+    ranges = range_remarks(designed.actuator, first=0.0, last=designed.target.last_angle)
+    warn(ranges)
+    files.append(
+        write_design_report(out / "report.html", designed, deck=deck_name, remarks=remarks, files=files)
+    )
     if as_json:
-        show_json({**_numbers(designed), "remarks": remarks, "files": files})
+        show_json({**_numbers(designed), "remarks": remarks, "warnings": ranges, "files": files})
     else:
         _show(designed, files)
         for remark in remarks:
@@ -178,11 +207,12 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     from ..components.assembly.deck_writer import write_deck
     from ..figures import design_picture, limit_margins, tolerance_bars, torque_against_target, write_figures
     from ..writing import make_folder, write_text
+    from ..written_files import discard
 
     make_folder(out)
     for name in _FILES:
         # What an earlier run has left here belongs to another design.
-        (out / name).unlink(missing_ok=True)
+        discard(out / name)
     model, numbers = out / "model.toml", out / "design.json"
     write_deck(designed.actuator, model)
     # How many iterations it took depends on the processor, the design does not.

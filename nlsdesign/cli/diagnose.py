@@ -1,4 +1,4 @@
-"""``nlsdesign diagnose`` and ``nlsdesign simulate``: bench records against a deck."""
+"""``nlsdesign diagnose``: bench records against a deck."""
 
 from __future__ import annotations
 
@@ -13,17 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..quantity import typeset_unit
-from .exported_machine import export_machine, export_option
-from .output import (
-    deck_option,
-    json_option,
-    measured_option,
-    out_option,
-    show_json,
-    show_table,
-    spring_option,
-)
+from .exported_machine import MACHINE, export_machine, export_option
+from .output import deck_option, examples, json_option, measured_option, show_json, spring_option
+from .overwriting import c_names, out_option
+from .range_remarks import warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -32,7 +25,6 @@ if TYPE_CHECKING:
     from ..model import FlatModel
     from ..regeneration import Regeneration
     from ..report.sections import Section
-    from ..simulation import Trace
 
 _file = click.Path(path_type=Path, dir_okay=False)
 _mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
@@ -41,7 +33,21 @@ _OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
 """Not every diagnosis writes these; one of an earlier run in the same folder would contradict the verdict."""
 
 
-@click.command()
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    names = ["verdict.json", "model.toml", "report.html", *_OF_THIS_RUN_ALONE]
+    parts = [*(["observer"] if given["again"] else []), *(MACHINE if given["exports"] else [])]
+    for part in dict.fromkeys(parts):
+        names += [f"{part}.fmu", *(f"c/{name}" for name in c_names(part) if part != "plant")]
+    return names
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign diagnose --deck my.toml --records bench --out out/diagnosis",
+        "nlsdesign diagnose --deck my.toml --records bench --hold-out 'last*' --regenerate --json",
+    )
+)
 @deck_option
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of CSV files.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
@@ -56,7 +62,7 @@ _OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
 @click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True, help="Of the observer.")
 @spring_option
 @measured_option
-@out_option("out/diagnosis")
+@out_option("out/diagnosis", writes=_writes)
 @json_option
 def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
@@ -70,6 +76,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..progress import Steps
     from ..report import verdict_sections, write_report
     from ..writing import make_folder
+    from ..written_files import discard
 
     command = shlex.join(["nlsdesign", *sys.argv[1:]])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
@@ -83,7 +90,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     verdict = replace(verdict, run=run)
     make_folder(out)
     for left_over in _OF_THIS_RUN_ALONE:
-        (out / left_over).unlink(missing_ok=True)
+        discard(out / left_over)
     write_verdict(verdict, out)
     if verdict.experiment is not None:
         write_command(verdict.experiment, out / "next_record.csv")
@@ -92,6 +99,8 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     facts = {"deck": f"`{deck_name}`", "records": f"`{records}`", "date": date}
     title = f"{actuator.name}: what is missing"
     write_report(out / "report.html", *sections, title=title, facts=facts)
+    remarks = _ranges_left(verdict, measured)
+    content |= {"warnings": remarks}
     observer = None
     if options["again"]:
         # The diagnosis stands in its files already, whatever happens to the observer.
@@ -105,6 +114,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
         with steps.step("export"):
             machine = export_machine(flatten(verdict.actuator), out, observer=observer, **_chosen(options))
         content, text = content | machine.content(), "\n".join([text, *machine.words()])
+    warn(remarks)
     if as_json:
         show_json(content)
         return
@@ -116,6 +126,19 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
 
 def _chosen(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: options[name] for name in ("sample_time", "spring", "measured")}
+
+
+def _ranges_left(verdict: Verdict, measured: RecordSet) -> list[str]:
+    """Return which laws of the better model the records take out of their stated range."""
+    from ..discrepancy import ranges_left
+    from ..errors import NlsError
+
+    try:
+        left = ranges_left(verdict.actuator, measured)
+    except NlsError:  # the verdict stands, and says itself what cannot be simulated
+        return []
+    step = "take a law that is stated to hold so far, or leave such motions out of the records"
+    return [f"record {name}: {warning} -> {step}" for name, warning in left]
 
 
 def _regenerated(
@@ -143,50 +166,3 @@ def _written(result: Regeneration, out: Path) -> tuple[dict[str, Any], str, list
     if files:
         lines.append(f"written: {', '.join(content['files'])}")
     return content, "\n".join(lines), regeneration_sections(result, files)
-
-
-@click.command()
-@deck_option
-@click.option("--record", type=_file, required=True, help="CSV file with measured signals.")
-@_mapping
-@click.option("--out", type=_file, required=True, help="CSV file to write.")
-@json_option
-def simulate(deck_name: str, record: Path, mapping: Path | None, out: Path, as_json: bool) -> None:
-    """Drive the model with a measured record and write its predictions of the measured signals."""
-    from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
-    from ..discrepancy import predict
-    from ..identification import load_record
-    from ..model import flatten
-
-    actuator = declare(load_deck(deck_name))
-    records = load_record(record, flatten(actuator), mapping=mapping)
-    (measured,) = records.records
-    predicted = predict(actuator, records, measured.name)
-    predicted.write_csv(out)
-    rows = agreement_rows(measured.trace, predicted)
-    if as_json:
-        rms = {name: float(value) for name, value, _ in rows}
-        show_json({"file": out, "rms": rms, "warnings": [str(each) for each in predicted.warnings]})
-        return
-    show_table(f"{record.name} against {actuator.name}", ("signal", "rms error", "unit"), rows)
-    for each in predicted.warnings:
-        click.echo(f"warning: {each}")
-    click.echo(f"written: {out}")
-
-
-def agreement_rows(measured: Trace, predicted: Trace) -> list[tuple[Any, ...]]:
-    """Return name, rms error and unit of each predicted signal; a signal that is not measured should be zero.
-
-    Parameters
-    ----------
-    measured, predicted
-        At the same times.
-    """
-    import numpy as np
-
-    rows = []
-    for name, values in predicted.signals.items():
-        error = values - measured[name] if name in measured else values
-        rows.append((name, f"{float(np.sqrt(np.mean(error**2))):.4g}", typeset_unit(predicted.units[name])))
-    return rows

@@ -1,4 +1,4 @@
-"""``nlsdesign export``: C code and FMUs."""
+"""``nlsdesign export``: C code, FMUs and Modelica text."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import click
 from .controller import controller_of, export_controller, law_options
 from .export_check import check_exports
 from .export_fmu import export_fmus
+from .export_modelica import export_modelica_text
 from .flash import controller_size, flash_options, sized_observer
 from .observer import real_option, sample_time_option
 from .observer_kinds import kind_option
-from .output import deck_option, measured_option, out_option, spring_option
+from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
+from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -24,15 +27,32 @@ OBSERVER, CONTROLLER, BOTH = "observer", "controller", "both"
 
 @click.group()
 def export() -> None:
-    """Write C code or FMUs."""
+    """Write C code, FMUs or Modelica text."""
 
 
 export.add_command(export_controller)
 export.add_command(export_fmus)
+export.add_command(export_modelica_text)
 export.add_command(check_exports)
 
 
-@export.command("c")
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    name = "torque_loop" if given["what"] == BOTH else given["what"]
+    further = (".hpp", "_example_posix.c", "_example_cortex_m.c", ".mk") if given["examples"] else ()
+    build = ["CMakeLists.txt"] if further else []
+    return [*c_names(name), *(f"{name}{ending}" for ending in further), *build]
+
+
+@export.command(
+    "c",
+    epilog=examples(
+        "nlsdesign export c --deck austin2015_figure_consistent",
+        "nlsdesign export c --deck austin2015_figure_consistent --what both --real float --flash 64kB "
+        "--examples",
+        "nlsdesign export c --deck my.toml --what controller --law pid --dry-run",
+    ),
+)
 @deck_option
 @click.option(
     "--what",
@@ -46,12 +66,13 @@ export.add_command(check_exports)
 @sample_time_option
 @spring_option
 @measured_option
-@out_option("out/c")
+@out_option("out/c", writes=_writes)
 @real_option
 @flash_options
 @click.option("--examples", is_flag=True, help="Write main programs, a C++ class and build files beside it.")
+@json_option
 def export_code(
-    deck_name: str, what: str, sample_time: float, out: Path, real: str, examples: bool, **chosen: Any
+    deck_name: str, what: str, sample_time: float, out: Path, real: str, as_json: bool, **chosen: Any
 ) -> None:
     """Write the torque observer, the torque controller, or both as one step, as C99 with a self-test.
 
@@ -62,15 +83,17 @@ def export_code(
     from ..export import export_c, write_examples
     from ..model import flatten
 
-    plant = flatten(declare(load_deck(deck_name)))
+    declared = declare(load_deck(deck_name))
+    plant = flatten(declared)
+    with_examples = chosen.pop("examples")
     name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     source = export_c(model, out, real=real, name=name)
     written = [source.header, source.source, source.selftest]
-    if examples:
+    if with_examples:
         written += write_examples(source)
-    for sentence in (model.description, *sentences):
-        click.echo(sentence)
-    click.echo(f"written: {', '.join(str(path) for path in written)}")
+    remarks = range_remarks(declared, measured=chosen["measured"])
+    warn(remarks)
+    show_written(as_json, (model.description, *sentences), written, name=name, warnings=remarks)
 
 
 def sampled_part(

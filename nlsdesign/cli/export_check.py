@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .output import DECK_HELP, json_option, show_json, show_table
+from .output import DECK_HELP, examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
     from .exported_files import ExportedFile
@@ -18,12 +18,18 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
 """Exit status."""
 
 
-@click.command("check")
+@click.command(
+    "check",
+    epilog=examples(
+        "nlsdesign export check out/fmu",
+        "nlsdesign export check out/c --deck austin2015_figure_consistent --json",
+    ),
+)
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @json_option
 def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
-    """Say whether C files, FMUs and decks in a folder belong together, and to a deck.
+    """Say whether C files, Modelica texts, FMUs and decks in a folder belong together, and to a deck.
 
     Exit status 0 if all do and none was edited, 1 if not, 2 if a file cannot be read.
     """
@@ -35,7 +41,7 @@ def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
     reference = deck_digest(declare(load_deck(deck_name))) if deck_name else ""
     files, problems = exported_files(folder)
     if not files and not problems:
-        raise ExportError(str(folder), "holds no C file, FMU or deck of this package")
+        raise ExportError(str(folder), "holds no C file, Modelica text, FMU or deck of this package")
     apart = _apart(files, reference)
     status = UNREADABLE if problems else APART if any(apart) else TOGETHER
     sentences = [*map(str, problems), *_relations(files), _verdict(files, reference, status, any(apart))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,9 @@ from ..errors import NlsError
 from .controller import controller_of, law_options
 from .observer import sample_time_option
 from .observer_kinds import kind_option, observer_of
-from .output import deck_option, measured_option, out_option, spring_option
+from .output import deck_option, examples, json_option, measured_option, show_written, spring_option
+from .overwriting import out_option
+from .range_remarks import range_remarks, warn
 
 if TYPE_CHECKING:
     from ..export import Authorship
@@ -79,7 +81,20 @@ def _date(_context: click.Context, _parameter: click.Parameter, text: str | None
     return date
 
 
-@click.command("fmu")
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    stems = [FILES[each] for each in given["what"] or FILES]
+    further = ("_ref.csv", "_ref.opt", "_in.csv") if given["reference"] else ()
+    return [f"{stem}{ending}" for stem in stems for ending in (".fmu", *further)]
+
+
+@click.command(
+    "fmu",
+    epilog=examples(
+        "nlsdesign export fmu --deck austin2015_figure_consistent --what plant",
+        "nlsdesign export fmu --deck austin2015_figure_consistent --platform all --version 2.0 --licence MIT",
+    ),
+)
 @deck_option
 @click.option(
     "--what",
@@ -93,7 +108,7 @@ def _date(_context: click.Context, _parameter: click.Parameter, text: str | None
 @sample_time_option
 @spring_option
 @measured_option
-@out_option("out/fmu")
+@out_option("out/fmu", writes=_writes)
 @click.option(
     "--version", type=click.Choice(["2.0", "3.0"]), default="3.0", show_default=True, help="FMI version."
 )
@@ -112,12 +127,14 @@ def _date(_context: click.Context, _parameter: click.Parameter, text: str | None
     callback=_date,
     help="Of the export, as 2026-03-04T12:00:00Z; by default SOURCE_DATE_EPOCH or now.",
 )
+@json_option
 def export_fmus(
     deck_name: str,
     sample_time: float,
     out: Path,
     what: tuple[str, ...],
     platforms: tuple[str, ...],
+    as_json: bool,
     **others: Any,
 ) -> None:
     """Write plant, torque observer, torque controller, and observer with controller in one, as FMUs."""
@@ -128,7 +145,8 @@ def export_fmus(
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
-    made = _Models(flatten(declare(load_deck(deck_name))), sample_time, chosen, law)
+    declared = declare(load_deck(deck_name))
+    made = _Models(flatten(declared), sample_time, chosen, law)
     # Before anything is written: not every system has an observer.
     if what:
         models = {each: made[each] for each in dict.fromkeys(what)}
@@ -143,9 +161,10 @@ def export_fmus(
         written += [
             file for name in models for file in write_reference(models[name], out / f"{FILES[name]}.fmu")
         ]
-    click.echo(f"written: {', '.join(str(path) for path in written)}")
-    for name, reason in reasons.items():
+    show_written(as_json, (), written, left_out=reasons)
+    for name, reason in {} if as_json else reasons.items():
         click.echo(f"left out: {name}: {reason}")
+    warn(range_remarks(declared, measured=chosen["measured"]))
 
 
 def _systems(platforms: Sequence[str]) -> Sequence[str] | None:

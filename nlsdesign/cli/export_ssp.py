@@ -7,9 +7,17 @@ from pathlib import Path
 import click
 
 from .cosimulate import WIRE_HELP, pairs, read_wire
+from .output import examples, json_option, show_written
+from .overwriting import out_file_option
 
 
-@click.command("ssp")
+@click.command(
+    "ssp",
+    epilog=examples(
+        "nlsdesign export ssp --fmu plant=out/fmu/plant.fmu --fmu observer=out/fmu/observer.fmu "
+        "--wire observer.motor_encoder.reading=plant.motor_encoder.reading --out out/system.ssp"
+    ),
+)
 @click.option("--fmu", "fmus", multiple=True, required=True, metavar="INSTANCE=FILE", help="Repeatable.")
 @click.option("--wire", "wires", multiple=True, metavar="TO=FROM[*GAIN][@DELAY]", help=WIRE_HELP)
 @click.option("--set", "parameters", multiple=True, metavar="PARAMETER=NUMBER", help="Repeatable.")
@@ -19,8 +27,9 @@ from .cosimulate import WIRE_HELP, pairs, read_wire
 )
 @click.option("--version", type=click.Choice(["1.0", "2.0"]), default="1.0", show_default=True,
               help="Of the standard.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="File to write.")
-def export_ssp(version: str, out: Path, **given: tuple[str, ...]) -> None:
+@out_file_option(None, "File to write.")
+@json_option
+def export_ssp(version: str, out: Path, as_json: bool, **given: tuple[str, ...]) -> None:
     """Write FMUs and their wires as one SSP archive, which other tools and 'cosimulate --system' run."""
     from ..export import write_ssp
 
@@ -35,4 +44,4 @@ def export_ssp(version: str, out: Path, **given: tuple[str, ...]) -> None:
     )
     for note in written.notes:
         click.echo(f"an annotation, which other tools may ignore: {note}", err=True)
-    click.echo(f"written: {written.path}")
+    show_written(as_json, (), [written.path], annotations=list(written.notes))

@@ -44,7 +44,7 @@ class ExportedFile:
     path
         The file.
     kind
-        ``"C"``, ``"FMU"`` or ``"deck"``.
+        ``"C"``, ``"Modelica"``, ``"FMU"`` or ``"deck"``.
     deck, digest
         Of the deck that it is from, or is; the digest with 64 or, where the file has no more, 12 digits. Both
         empty where it names none.
@@ -119,7 +119,7 @@ def exported_file(path: Path) -> ExportedFile | None:
     Parameters
     ----------
     path
-        C source or header, FMU, or deck.
+        C source or header, Modelica text, FMU, or deck.
 
     Raises
     ------
@@ -148,6 +148,15 @@ def _text(path: Path, size: int) -> str:
 
 
 def _c_file(path: Path, size: int) -> ExportedFile | None:
+    return _commented(path, size, "C")
+
+
+def _modelica(path: Path, size: int) -> ExportedFile | None:
+    return _commented(path, size, "Modelica")
+
+
+def _commented(path: Path, size: int, kind: str) -> ExportedFile | None:
+    """Return what the comments of a text say; C and Modelica have the same comments."""
     text = _text(path, size)
     stamp, line, whole = stamp_of(text), _DECK_LINE.search(text), _macro(text, "DECK_DIGEST")
     if stamp is None and not _GENERATED.search(text):
@@ -161,7 +170,7 @@ def _c_file(path: Path, size: int) -> ExportedFile | None:
     if len(decks) > 1:
         edited = edited or f"it names {len(decks)} decks: {', '.join(sorted(decks))}"
     digest = whole or (line[2] if line else "") or (stamp.deck if stamp else "")
-    return ExportedFile(path, "C", line[1] if line else "", digest, _macro(text, "PARENT_DIGEST"), edited)
+    return ExportedFile(path, kind, line[1] if line else "", digest, _macro(text, "PARENT_DIGEST"), edited)
 
 
 def _macro(text: str, ending: str) -> str:
@@ -257,4 +266,4 @@ def _deck(path: Path, size: int) -> ExportedFile | None:
     return ExportedFile(path, "deck", assembly.name, digest, parent, edited)
 
 
-_READERS = {".c": _c_file, ".h": _c_file, ".fmu": _fmu, ".toml": _deck}
+_READERS = {".c": _c_file, ".h": _c_file, ".mo": _modelica, ".fmu": _fmu, ".toml": _deck}

@@ -16,6 +16,9 @@ from .observer_kinds import observer_of
 if TYPE_CHECKING:
     from ..model import FlatModel
 
+MACHINE = ("plant", "observer", "controller", "torque_loop")
+"""What is written of a machine."""
+
 export_option = click.option(
     "--export",
     "exports",

@@ -2,29 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..quantity import typeset_unit
-from .exported_machine import ExportedMachine, export_machine, export_option
+from .exported_machine import MACHINE, ExportedMachine, export_machine, export_option
 from .observer import sample_time_option
 from .output import (
     deck_option,
+    examples,
     json_option,
     measured_option,
-    out_option,
     show_json,
     show_table,
     spring_option,
 )
+from .overwriting import c_names, out_option
 from .units import Number
 
 _file = click.Path(path_type=Path, dir_okay=False)
 
 
-@click.command()
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    names = ["fit.json", "model.toml", "report.html"]
+    for part in MACHINE if given["exports"] else ():
+        names += [f"{part}.fmu", *(f"c/{name}" for name in c_names(part) if part != "plant")]
+    return names
+
+
+@click.command(
+    epilog=examples(
+        "nlsdesign fit --deck my.toml --records bench --out out/fit",
+        "nlsdesign fit --deck my.toml --records bench --hold-out 'last*' --window '1 s' --json",
+    )
+)
 @deck_option
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
@@ -35,7 +50,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @sample_time_option
 @spring_option
 @measured_option
-@out_option("out/fit")
+@out_option("out/fit", writes=_writes)
 @json_option
 def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:
     """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
@@ -45,6 +60,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     from ..identification import load_records
     from ..model import flatten
     from ..progress import Steps
+    from ..report import write_fit_report
 
     actuator = declare(load_deck(deck_name))
     mapping, hold_out = options["mapping"], options["hold_out"]
@@ -53,13 +69,17 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     with steps.step("fit"):
         result = refit(actuator, measured, window=options["window"], progress=steps.note)
     file, deck = write_refit(result, out)
+    facts = {"deck": f"`{deck_name}`", "records": f"`{records}`"}
+    page = write_fit_report(out / "report.html", result, facts=facts, files=(file, deck))
     machine = ExportedMachine({}, ())
     if options["exports"]:
         with steps.step("export"):
             chosen = {name: options[name] for name in ("sample_time", "spring", "measured")}
             machine = export_machine(flatten(result.actuator), out, **chosen)
     if as_json:
-        show_json({**result.to_dict(str(deck)), **(machine.content() if options["exports"] else {})})
+        show_json(
+            {**result.to_dict(str(deck)), "report": page, **(machine.content() if options["exports"] else {})}
+        )
         return
     numbers = [
         (
@@ -81,4 +101,5 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
         click.echo(sentence)
     for sentence in machine.words():
         click.echo(sentence)
+    click.echo(f"report: {page}")
     click.echo(f"written: {file} and {deck}; next: nlsdesign diagnose --deck {deck} --records {records}")

@@ -12,10 +12,12 @@ from .analyse import analyse
 from .analyse_angle import analyse_angle
 from .analyse_loop import loop
 from .calibrate import calibrate
+from .compare import compare
+from .completion import COMPLETE, complete_names, completion
 from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
-from .diagnose import diagnose, simulate
+from .diagnose import diagnose
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -23,14 +25,36 @@ from .materials import materials
 from .observer import observer
 from .observer_certificate import verify_certificate
 from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
+from .output import examples
 from .parts import parts
+from .simulate import simulate
 from .studies import study
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=examples(
+        "nlsdesign deck list",
+        "nlsdesign study run hello",
+        "nlsdesign simulate --deck austin2015_soft_spring --input 'motor.current=2 A sine 2 Hz' --stop '1 s'",
+    )
+    + "\n\nExit status: 0 done, 1 a finding, 2 bad input, 130 interrupted.",
+)
 @click.version_option(version(), prog_name="nlsdesign")
-def program() -> None:
+@click.option(
+    "--with",
+    "packages",
+    multiple=True,
+    metavar="PACKAGE",
+    help="Package or .py file with parts, effects and rubbers of your own; before the command; repeatable.",
+)
+@click.pass_context
+def program(context: click.Context, packages: tuple[str, ...]) -> None:
     """Design workbench for series elastic actuators whose spring is a cam that stretches rubber."""
+    if packages:
+        from ..extensions import extended_by, load_extension
+
+        context.with_resource(extended_by(*(load_extension(name) for name in packages)))
 
 
 export.add_command(export_ssp)
@@ -38,18 +62,19 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, study),
+    *(cosimulation, simulate, fit, diagnose, compare, study, completion),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default
     analyse.add_command(analysis)
+complete_names(program)
 
 
 def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
     try:
         # Without its standalone mode click returns the exit status of a command instead of ending the run.
-        status = program(standalone_mode=False)
+        status = program(standalone_mode=False, complete_var=COMPLETE)
         if isinstance(status, int) and status:
             sys.exit(status)
     except click.exceptions.Exit as exit_:

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .output import json_option, show_json, show_table
+from .output import examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
     from ..components import Material
 
 
-@click.command()
+@click.command(
+    epilog=examples("nlsdesign materials", "nlsdesign materials natural_rubber", "nlsdesign materials --json")
+)
 @click.argument("name", metavar="[MATERIAL]", required=False)
 @json_option
 def materials(name: str | None, as_json: bool) -> None:

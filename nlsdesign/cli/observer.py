@@ -2,33 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .observer_certificate import range_options
+from .observer_certificate import CERTIFICATE, range_options
 from .observer_kinds import CASCADE, CERTIFIED, designed_observer, kind_option
-from .output import DECK_HELP, json_option, measured_option, out_option, show_json, spring_option
+from .output import DECK_HELP, examples, json_option, measured_option, show_json, spring_option
+from .overwriting import c_names, out_option
+from .range_remarks import range_remarks, warn
 from .units import Number
 
 if TYPE_CHECKING:
     from .observer_certificate import ToProve
 
-sample_time_option = click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
+sample_time_option = click.option(
+    "--sample-time", type=Number("ms"), default="1 ms", show_default=True,
+    help="Of what is computed in steps.",
+)  # fmt: skip
 real_option = click.option(
-    "--real", type=click.Choice(["double", "float"]), default="double", show_default=True
+    "--real",
+    type=click.Choice(["double", "float"]),
+    default="double",
+    show_default=True,
+    help="Type of the numbers in C.",
 )
 
 
-@click.group(invoke_without_command=True)
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files that the options ask for."""
+    proved = [CERTIFICATE] if given["certified"] or given["kind"] == CERTIFIED else []
+    compared = ["errors.csv", "errors.json", "errors.svg", "report.html"] if given["with_errors"] else []
+    return [*proved, *c_names("observer"), *compared]
+
+
+@click.group(
+    invoke_without_command=True,
+    epilog=examples(
+        "nlsdesign observer --deck austin2015_figure_consistent",
+        "nlsdesign observer --deck austin2015_figure_consistent --kind cascade --real float --json",
+        "nlsdesign observer --deck austin2015_figure_consistent --errors --draws 32",
+    ),
+)
 @click.pass_context
 @click.option("--deck", "deck_name", metavar="DECK", help=DECK_HELP)
 @sample_time_option
 @spring_option
 @measured_option
 @kind_option
-@out_option("out/observer")
+@out_option("out/observer", writes=_writes)
 @real_option
 @click.option("--errors", "with_errors", is_flag=True, help="Also compare torque errors on a simulated "
               "bench: with exact numbers, over the spread, by cause.")  # fmt: skip
@@ -62,12 +86,14 @@ def observer(
     from ..export import export_c
     from ..model import flatten
     from ..observer import certified_design
+    from ..report import write_observer_report
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
     kind, wanted = _what_is_asked(context, options)
     deck = load_deck(deck_name)
-    plant = flatten(declare(deck))
+    declared = declare(deck)
+    plant = flatten(declared)
     roles = {name: options[name] for name in ("spring", "measured")}
     sample_time, real = options["sample_time"], options["real"]
     chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
@@ -85,15 +111,20 @@ def observer(
     if errors is not None:
         files += write_errors(errors, out)
     statement = () if proved is None else proved.statement
+    remarks = range_remarks(declared, measured=options["measured"])
+    warn(remarks)
+    words = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
+    if errors is not None:
+        files.append(write_observer_report(out / "report.html", model, errors, words=words, files=files))
     if as_json:
         content = {
             "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),
             "description": model.description, "statement": list(statement),
-            "certified": proved is not None, "files": files,
+            "certified": proved is not None, "warnings": remarks, "files": files,
         }  # fmt: skip
         show_json(content | ({} if errors is None else {"errors": content_of(errors)}))
         return
-    for sentence in (str(chosen.design), *filter(None, [chosen.reason]), *statement):
+    for sentence in words:
         click.echo(sentence)
     if proved is None:
         click.echo("not certified; --kind certified or --certificate proves what can be proved")

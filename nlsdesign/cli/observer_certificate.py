@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ArrangementError
-from .output import json_option, show_json
+from .output import examples, json_option, show_json
 from .units import Number
 
 if TYPE_CHECKING:
@@ -186,7 +186,13 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
     )  # fmt: skip
 
 
-@click.command("verify")
+@click.command(
+    "verify",
+    epilog=examples(
+        "nlsdesign observer verify out/observer/certificate.json",
+        "nlsdesign observer verify out/observer/certificate.json --deck my.toml --c out/observer --json",
+    ),
+)
 @click.argument("certificate", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--deck", "deck_name", metavar="DECK", help="Deck that should be the certified one.")
 @click.option(

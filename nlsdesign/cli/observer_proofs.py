@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .observer_certificate import CERTIFICATE, given_ranges, range_options, with_statement, write_proved
-from .output import DECK_HELP, measured_option, out_option, spring_option
+from .output import DECK_HELP, examples, json_option, measured_option, show_written, spring_option
+from .overwriting import c_names, out_option
 from .units import Number
 
 if TYPE_CHECKING:
@@ -37,19 +38,32 @@ def _roles(plant: FlatModel, options: dict[str, Any]) -> dict[str, str]:
     }
 
 
-@click.command("certify-continuous")
+@click.command(
+    "certify-continuous",
+    epilog=examples(
+        "nlsdesign observer certify-continuous --deck austin2015_figure_consistent",
+        "nlsdesign observer certify-continuous --deck austin2015_figure_consistent --published "
+        "--angles '-40 deg' '40 deg'",
+    ),
+)
 @deck_option
 @spring_option
 @measured_option
-@out_option("out/observer")
+@out_option("out/observer", writes=(CERTIFICATE,))
 @click.option("--published", is_flag=True, help="States of Austin et al. 2015 instead of the minimal ones.")
 @click.option("--decay", type=float, metavar="PER_SECOND", help="As fast as can be proved by default.")
 @click.option("--condition", type=float, default=100.0, show_default=True, help="Largest condition of P.")
 @click.option(
     "--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="The whole contour by default."
 )
+@json_option
 def certify_continuous_gain(
-    deck_name: str, out: Path, published: bool, angles: tuple[float, float] | None, **options: Any
+    deck_name: str,
+    out: Path,
+    published: bool,
+    angles: tuple[float, float] | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """Design one gain in continuous time with the proof that every error vanishes."""
     from ..observer import Minimal, PaperForm, certify_continuous, write_certificate
@@ -57,29 +71,41 @@ def certify_continuous_gain(
     _, text, plant = _plant(deck_name)
     proved = certify_continuous(
         plant, **_roles(plant, options), form=PaperForm() if published else Minimal(),
-        decay=options["decay"], condition=options["condition"], angles=angles,
+        decay=options["decay"], condition=options["condition"], angles=options["angles"],
     )  # fmt: skip
     proved = replace(proved, deck=text)
     path = write_certificate(proved, out / CERTIFICATE)
-    for sentence in proved.statement:
-        click.echo(sentence)
-    for name, row in zip(proved.system.states, proved.gain, strict=True):
-        click.echo(f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}")
-    click.echo(f"written: {path}")
+    gains = dict(zip(proved.system.states, proved.gain, strict=True))
+    rows = [f"gain of {name}: {', '.join(f'{v:.7g}' for v in row)}" for name, row in gains.items()]
+    show_written(as_json, (*proved.statement, *rows), [path], gains=gains)
 
 
-@click.command("certify-adaptive")
+@click.command(
+    "certify-adaptive",
+    epilog=examples(
+        "nlsdesign observer certify-adaptive --deck austin2015_figure_consistent --out out/certified"
+    ),
+)
 @deck_option
-@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True)
+@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True,
+              help="Of what is computed in steps.")  # fmt: skip
 @spring_option
 @measured_option
-@out_option("out/observer")
-@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True)
+@out_option("out/observer", writes=(CERTIFICATE, *c_names("observer")))
+@click.option("--real", type=click.Choice(["double", "float"]), default="double", show_default=True,
+              help="Type of the numbers in C.")  # fmt: skip
 @click.option("--limit", type=float, metavar="DEVIATIONS", help="Of the slow states; that of the adaptive "
               "observer by default.")  # fmt: skip
 @range_options
+@json_option
 def certify_adaptive_estimate(
-    deck_name: str, sample_time: float, out: Path, real: str, limit: float | None, **options: Any
+    deck_name: str,
+    sample_time: float,
+    out: Path,
+    real: str,
+    limit: float | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
     """Write the adaptive observer as C, with a bound on how far its estimate can leave the deck's torque."""
     from ..export import export_c
@@ -87,6 +113,7 @@ def certify_adaptive_estimate(
     from ..observer.certificates.held_estimate import held_assumptions
 
     _, text, plant = _plant(deck_name)
+    limit = options["limit"]
     trust = Trust() if limit is None else Trust(limit=limit)
     roles = _roles(plant, options)
     design = design_adaptive_observer(
@@ -97,6 +124,4 @@ def certify_adaptive_estimate(
     proved = certify_held_estimate(plant, design, assumptions=assumed, settings=asdict(trust), deck=text)
     source = export_c(with_statement(design.model, proved), out, real=real, name="observer")
     path = write_proved(proved, out, source)
-    for sentence in proved.statement:
-        click.echo(sentence)
-    click.echo(f"written: {path}, {source.header}, {source.source}, {source.selftest}")
+    show_written(as_json, proved.statement, [path, source.header, source.source, source.selftest])

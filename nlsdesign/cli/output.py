@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+import shutil
+import sys
+import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
-F = TypeVar("F", bound=Callable[..., Any])
+from .tables import head_count, table_lines
+
+WIDE = 160
+"""Width of a table that is not shown on a terminal."""
 
 
 def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -25,17 +31,20 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
     rows
         Text of the cells.
     """
-    from rich.console import Console
-    from rich.table import Table
+    on_terminal = sys.stdout.isatty()
+    # What is piped is not for a narrow screen, unless COLUMNS says so.
+    width = shutil.get_terminal_size((80, 24)).columns if on_terminal else _columns() or WIDE
+    lines = table_lines(columns, rows, width=width)
+    bold = head_count(columns, rows, width=width) if on_terminal and not os.environ.get("NO_COLOR") else 0
+    if title:
+        click.echo("\n".join(textwrap.wrap(title, width)))
+    for number, line in enumerate(lines):
+        click.echo(click.style(line, bold=True) if number < bold else line)
 
-    table = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    # A piped table is not wrapped at 80 columns.
-    width = None if Console().is_terminal else 160
-    Console(highlight=False, markup=False, width=width).print(table)
+
+def _columns() -> int:
+    given = os.environ.get("COLUMNS", "")
+    return int(given) if given.isdigit() else 0
 
 
 def show_json(content: Mapping[str, Any]) -> None:
@@ -57,6 +66,28 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
+def show_written(as_json: bool, sentences: Sequence[str], files: Sequence[Path], **more: Any) -> None:
+    """Print what was written, after sentences on it; or all of it as JSON.
+
+    Parameters
+    ----------
+    as_json
+        Whether JSON is printed.
+    sentences
+        What there is to know of the files.
+    files
+        That were written.
+    **more
+        Further content of the JSON.
+    """
+    if as_json:
+        show_json({"sentences": list(sentences), **more, "files": list(files)})
+        return
+    for sentence in sentences:
+        click.echo(sentence)
+    click.echo(f"written: {', '.join(map(str, files))}")
+
+
 def examples(*lines: str) -> str:
     """Return the epilog of a help text that shows commands, each on its line.
 
@@ -66,35 +97,23 @@ def examples(*lines: str) -> str:
         Whole commands, as they are typed.
     """
     # Click fills paragraphs anew unless they begin with this mark.
-    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
+    return "\b\nExamples:\n" + "\n".join(_continued(line) for line in lines)
 
 
-def out_option(default: str = "out") -> Callable[[F], F]:
-    """Return the option ``--out``.
-
-    Parameters
-    ----------
-    default
-        Folder if none is given.
-    """
-    kind = click.Path(path_type=Path, file_okay=False)
-    text = "Folder for all files that are written."
-    return click.option(
-        "--out", type=kind, default=default, show_default=True, help=text, callback=_can_be_made
-    )
+_LINE = 78
+"""Columns of a command in a help text."""
 
 
-def _can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
-    """Refuse, before any work, a folder that could not be written into; it is made with its first file."""
-    try:
-        place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
-    except OSError as error:
-        raise click.BadParameter(f"{folder} cannot be made: {error.strerror}") from None
-    if not place.is_dir():
-        raise click.BadParameter(f"{folder} cannot be made: {place} is a file")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise click.BadParameter(f"{folder} cannot be made: {place} is not writable")
-    return folder
+def _continued(line: str) -> str:
+    """Return a command on lines that fit, each but the last with a mark that the shell reads on."""
+    first, *others = line.split(" --")
+    rows = [first]
+    for added in (f" --{part}" for part in others):
+        if len(rows[-1]) + len(added) > _LINE - 4:
+            rows.append(f"     {added}")
+        else:
+            rows[-1] += added
+    return "  " + " \\\n".join(rows)
 
 
 spring_option = click.option(

@@ -11,14 +11,18 @@ import click
 from ..bibliography import cited
 from ..errors import unknown_name
 from ..quantity import typeset_unit
-from .output import json_option, show_json, show_table
+from .output import examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
     from ..components import Part
     from ..components.core.part import ParameterInfo
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "nlsdesign parts", "nlsdesign parts TwoSidedCam", "nlsdesign parts CoulombFriction --json"
+    )
+)
 @click.argument("name", metavar="[PART]", required=False)
 @json_option
 def parts(name: str | None, as_json: bool) -> None:

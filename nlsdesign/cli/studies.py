@@ -21,7 +21,9 @@ from ..locations import bundled, folder
 from ..quantity import with_unit
 from ..reading import is_there, text_of
 from ..writing import make_folder
-from .output import json_option, show_json, show_table
+from ..written_files import listed_files
+from .output import examples, json_option, show_json, show_table
+from .overwriting import dry_run_option, force_option, kept, list_files
 
 _SIGNATURE = "def main(out, fast=False): ..."
 
@@ -224,15 +226,25 @@ def study() -> None:
     """List and run design studies."""
 
 
-@study.command("list")
-def list_studies() -> None:
+@study.command("list", epilog=examples("nlsdesign study list", "nlsdesign study list --json"))
+@json_option
+def list_studies(as_json: bool) -> None:
     """List the studies that come with the project."""
     rows = [(name, (load_study(name).__doc__ or "").strip().splitlines()[0]) for name in study_names()]
+    if as_json:
+        show_json(dict(rows))
+        return
     show_table("Studies", ("name", "what it shows"), rows)
 
 
-@study.command()
-@click.argument("name")
+@study.command(
+    epilog=examples(
+        "nlsdesign study run hello",
+        "nlsdesign study run austin2015 --fast --out out/first_look",
+        "nlsdesign study run my_study.py --json",
+    )
+)
+@click.argument("name", metavar="STUDY")
 @click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),
@@ -240,14 +252,19 @@ def list_studies() -> None:
     help="Folder for the results; out/NAME by default.",
 )
 @click.option("--fast", is_flag=True, help="Coarser and shorter, for a first look.")
+@force_option
+@dry_run_option
 @json_option
-def run(name: str, out: Path | None, fast: bool, as_json: bool) -> None:
+def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry_run: bool) -> None:
     """Run a study; exit status 1 if a number differs from its claim."""
     target = out if out is not None else Path("out") / Path(name).stem
-    make_folder(target)
     report, own = target / "report.html", Path(name).suffix == ".py"
+    if dry_run:
+        list_files(listed_files(target), target, as_json=as_json)
     before = _time_of(report)
-    results = run_study(name, target, fast=fast)
+    with kept(target, listed_files(target), force=force):
+        make_folder(target)
+        results = run_study(name, target, fast=fast)
     # A study of one's own may be named as one that comes with the project, and claims nothing.
     expected = {} if own else claims(name)
     wrong = not_as_claimed(results, expected)

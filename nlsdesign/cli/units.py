@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import UnitError
 from ..quantity import Quantity, quantity, same_dimension, typeset_unit, with_unit
+from ..quantity import split_number as split_number
 
 if TYPE_CHECKING:
     _Kind = click.ParamType[float]
@@ -69,26 +69,6 @@ class Bytes(_Count):
         return int(number * _BYTES[unit])
 
 
-def split_number(text: str) -> tuple[float, str]:
-    """Return number and unit of ``"5 N·m"``, ``"5N*m"`` or ``"5N.m"``; a full stop in a unit is a product.
-
-    Parameters
-    ----------
-    text
-        Number and unit.
-
-    Raises
-    ------
-    UnitError
-        If it does not begin with a number.
-    """
-    match = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
-    if match is None:
-        raise UnitError(f"'{text}'", "does not start with a number")
-    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
-    return float(match.group(1)), unit
-
-
 def parse_number(text: str, unit: str) -> Quantity:
     """Read ``"5 N·m"``, ``"5 N*m"`` or ``"5N.m"``.
 
@@ -110,6 +90,10 @@ def parse_number(text: str, unit: str) -> Quantity:
         raise UnitError(error.thing, error.rule, next_step=f"write '{with_unit('1', unit)}'") from None
     if not given and unit != "1":
         raise UnitError(f"'{text}'", "has no unit", next_step=f"write '{with_unit(text.strip(), unit)}'")
+    if not same_dimension(given or "1", unit) and unit == "1":
+        raise UnitError(
+            f"'{text}'", "stands for a pure number, without a unit", next_step=f"write '{number:g}'"
+        )
     if not same_dimension(given or "1", unit):
         raise UnitError(
             f"'{text}'",

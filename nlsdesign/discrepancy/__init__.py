@@ -1,6 +1,6 @@
 """What a declared model lacks: locate, name, add, judge on held-out records, abstain."""
 
-from .blocks.prediction_of_blocks import predict
+from .blocks.prediction_of_blocks import BandError, band_errors, predict, ranges_left
 from .diagnose import diagnose, write_refit, write_verdict
 from .effects import ALL, Candidate, Effect, Unknown
 from .effects.unnamed_tables import unnamed_part
@@ -10,9 +10,11 @@ from .reporting.circumstances import DiagnosisRun, records_of_run
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
+from .reporting.verdict_frames import verdict_frames
 
 __all__ = [
     "ALL",
+    "BandError",
     "BlockError",
     "Candidate",
     "Course",
@@ -28,12 +30,15 @@ __all__ = [
     "Separation",
     "Unknown",
     "Verdict",
+    "band_errors",
     "diagnose",
     "next_experiment",
     "predict",
+    "ranges_left",
     "records_of_run",
     "refit",
     "unnamed_part",
+    "verdict_frames",
     "write_command",
     "write_refit",
     "write_verdict",

@@ -27,7 +27,8 @@ from ..model import flatten
 from ..model.derived_deck import derived
 from ..writing import make_folder, write_text
 from .blocks.tearing import blocks_of
-from .effects import ALL, Candidate, EffectFunction
+from .effects import Candidate, EffectFunction
+from .effects import catalogue as known_effects
 from .fitting.unpredictable import Key
 from .planning.experiment import Experiment, next_experiment
 from .reporting.advice import advice, more_excitation, where_they_differ
@@ -72,7 +73,7 @@ def diagnose(
     actuator: Assembly,
     records: RecordSet,
     *,
-    catalogue: Sequence[EffectFunction] = ALL,
+    catalogue: Sequence[EffectFunction] | None = None,
     criteria: Criteria = _CRITERIA,
     progress: Callable[[str], None] = _silent,
 ) -> Verdict:
@@ -85,7 +86,8 @@ def diagnose(
     records
         Bench records with their roles.
     catalogue
-        Effects to try; functions from an assembly to candidates.
+        Effects to try; functions from an assembly to candidates. By default all, with those of packages that
+        the present block is extended by.
     criteria
         Numbers of the decision rule.
     progress
@@ -108,7 +110,8 @@ def diagnose(
     bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
     case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
     base = case.comparison.base(actuator)
-    outcome, decision = _decided(case, base, catalogue, progress)
+    effects = known_effects() if catalogue is None else catalogue
+    outcome, decision = _decided(case, base, effects, progress)
     progress("reading the held-out records")
     return _verdict(case, base, outcome, decision, records)
 

@@ -12,6 +12,7 @@ from .cosimulation.wires import Late, SamplesOf, Wire
 from .fmi.authorship import Authorship
 from .fmi.fmu import export_fmu
 from .fmi.reference_results import write_reference
+from .modelica.modelica_model import export_modelica
 from .ssp.read_ssp import read_ssp
 from .ssp.write_ssp import WrittenSystem, write_ssp
 from .target.processors import CORTEX_M4F, CORTEX_M7, Processor
@@ -43,6 +44,7 @@ __all__ = [
     "cosimulate",
     "export_c",
     "export_fmu",
+    "export_modelica",
     "host_platform",
     "measure_on_target",
     "natively",

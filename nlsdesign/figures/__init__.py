@@ -27,6 +27,7 @@ from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
 from .ranked import ranked_intervals
+from .run_over_time import run_over_time
 from .spread_of_errors import errors_over_spread
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
@@ -78,6 +79,7 @@ __all__ = [
     "over_time",
     "pareto_front",
     "ranked_intervals",
+    "run_over_time",
     "significant",
     "stability_over_angle",
     "styled",

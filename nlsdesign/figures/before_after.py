@@ -16,14 +16,14 @@ from ..quantity import typeset_unit
 from .lines import thinned
 from .number_text import root_mean_square, significant
 from .style import (
-    BLUE,
+    AFTER,
+    BEFORE,
     DASHES,
-    GREEN,
     GRID,
+    HOLDS,
     INK,
     MUTED,
     SURFACE,
-    VERMILLION,
     described,
     legend,
     panels,
@@ -33,8 +33,6 @@ from .style import (
 Floats = NDArray[np.float64]
 Curve = tuple[Floats, Floats]
 
-BEFORE, AFTER = VERMILLION, BLUE
-"""Colours of the declared and of the completed model, the same in every figure."""
 UNCHANGED = "refitted model"
 """What stands in place of ``before`` where nothing was added, so that there is no ``after``."""
 
@@ -302,7 +300,7 @@ def candidate_shares(candidates: Sequence[CandidateShare]) -> Figure:
             row,
             share,
             0.62,
-            color=GREEN.light if each.chosen else MUTED.light,
+            color=HOLDS.light if each.chosen else MUTED.light,
             alpha=1 if each.chosen else 0.55,
         )
         label = f"{100 * each.share:.0f} %{', added' if each.chosen else ''}".replace("-", "−")

@@ -96,7 +96,7 @@ def curves_beside_points(shown: Sequence[PointPanel], *, across: str, words: str
         axis.set_title(panel.title)
         axis.set_ylabel(panel.up)
         axis.margins(x=0.03)
-        axis.set_xscale("log")
+        log_axis(axis, abscissa=True)
     for axis in axes[-columns:]:
         axis.set_xlabel(across)
     for axis in axes[:columns]:

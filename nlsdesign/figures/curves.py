@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ..errors import ValueRangeError
 from .lines import Floats, thinned
-from .style import described, legend, look, panels, styled
+from .style import described, legend, log_axis, look, panels, styled
 
 Curve = tuple[Floats, Floats]
 
@@ -43,7 +43,7 @@ def curves(
         marker = point if len(x) < 40 else ""
         axes.plot(*thinned(x, y), color=tone, linestyle=dash, marker=marker, label=label, linewidth=1.4)
     if logarithmic:
-        axes.set_xscale("log")
+        log_axis(axes, abscissa=True)
     axes.set_xlabel(across)
     axes.set_ylabel(up)
     axes.margins(x=0.02)

@@ -11,10 +11,12 @@ from ..design import CamDesign, Contour, LimitState
 from ..design.statics.contour import turn
 from ..quantity import parse_unit, with_unit
 from .style import (
+    AFTER,
     BLUE,
     GREEN,
     GRID,
     INK,
+    LIMIT,
     MUTED,
     ORANGE,
     SURFACE,
@@ -77,7 +79,7 @@ def limit_margins(design: CamDesign) -> Figure:
     figure, (axes,) = panels(height=0.9 + 0.34 * max(1, len(states)))
     places = -np.arange(len(states), dtype=float)
     used = np.array([_used(state) for state in states])
-    tones = [VERMILLION.light if state.active else BLUE.light for state in states]
+    tones = [LIMIT.light if state.active else AFTER.light for state in states]
     bars = axes.barh(places, np.clip(used, 0.0, 1.2), 0.6, color=tones, edgecolor=SURFACE.light)
     for bar, state in zip(bars, states, strict=True):
         bar.set_hatch("///" if state.active else "")

@@ -13,7 +13,7 @@ from ..control.evaluation.margins import LoopMargins
 from ..control.evaluation.responses import SineResponse
 from ..control.evaluation.saturation import SaturationLine
 from .number_text import significant
-from .style import DASHES, GREEN, INK, MUTED, VERMILLION, described, legend, look, panels, styled
+from .style import DASHES, HOLDS, INK, LIMIT, MUTED, described, legend, log_axis, look, panels, styled
 
 
 @styled
@@ -53,7 +53,7 @@ def torque_responses(responses: Sequence[SineResponse], line: SaturationLine | N
         axes[2].set_ylabel("torque in N·m")
         axes[2].set_ylim(bottom=0.0)
         legend(axes[2])
-    axes[-1].set_xscale("log")
+    log_axis(axes[-1], abscissa=True)
     axes[-1].set_xlabel("frequency in Hz")
     legend(axes[0])
     return described(figure, f"Response of the torque loop. {' '.join(words)}")
@@ -89,7 +89,7 @@ def impedance_over_frequency(result: OutputImpedance) -> Figure:
     lower.set_yscale("symlog", linthresh=1e-3)
     lower.set_title("Real part of the impedance (passive above the dashed line)")
     lower.set_ylabel("Re Z in N·m·s/rad")
-    lower.set_xscale("log")
+    log_axis(lower, abscissa=True)
     lower.set_xlabel("frequency in Hz")
     legend(upper, columns=6)
     return described(figure, f"Output impedance, loop {result.linear.mode}. {' '.join(words)}")
@@ -120,7 +120,7 @@ def margins_over_angle(result: Sequence[LoopMargins]) -> Figure:
     for panel, title in zip(
         axes, ("gain margin in dB", "phase margin in degrees", "delay margin in ms"), strict=True
     ):
-        panel.set_title(title)
+        panel.set_ylabel(title)
         panel.set_xlabel("angle in degrees")
         panel.set_ylim(bottom=0.0)
     axes[2].set_yscale("symlog", linthresh=1.0)
@@ -142,13 +142,13 @@ def coupled_stability_map(result: CoupledStability) -> Figure:
     stable = result.stable
     masses, springs = np.meshgrid(result.inertias, result.stiffnesses, indexing="ij")
     for mask, tone, marker, label in (
-        (stable, GREEN.light, "o", "stable"),
-        (~stable & np.isfinite(result.radius), VERMILLION.light, "x", "unstable"),
+        (stable, HOLDS.light, "o", "stable"),
+        (~stable & np.isfinite(result.radius), LIMIT.light, "x", "unstable"),
         (~np.isfinite(result.radius), MUTED.light, "_", "angle cannot be held"),
     ):
         if np.any(mask):
             axes.plot(masses[mask], springs[mask], color=tone, marker=marker, linestyle="none", label=label)
-    axes.set_xscale("log")
+    log_axis(axes, abscissa=True)
     positive = result.stiffnesses[result.stiffnesses > 0.0]
     axes.set_yscale("symlog", linthresh=float(positive[0]) if len(positive) else 1.0)
     axes.margins(0.05)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ..design import ToleranceResult
 from ..errors import ValueRangeError
 from .number_text import significant
-from .style import BLUE, GRID, INK, MUTED, SURFACE, VERMILLION, described, legend, panels, styled
+from .style import AFTER, BEFORE, GRID, INK, MUTED, SURFACE, described, legend, panels, styled
 
 _MOST_CAUSES = 12
 
@@ -40,8 +40,8 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     names = [name for name, _ in whole] + [f"{each.cause.name} alone, ± {each.cause.size}" for each in causes]
     figure, (axes,) = panels(height=1.1 + 0.27 * len(names))
     places = -np.arange(len(names), dtype=float)
-    tones = [MUTED.light, *([VERMILLION.light] * len(result.trims)), *([BLUE.light] * len(causes))]
-    hatches = ["", *(["///"] * len(result.trims)), *([""] * len(causes))]
+    tones = [BEFORE.light, *([AFTER.light] * len(result.trims)), *([MUTED.light] * len(causes))]
+    hatches = ["///", *([""] * (len(result.trims) + len(causes)))]
     values = [1e3 * each.value for _, each in whole] + [1e3 * each.alone for each in causes]
     bars = axes.barh(places, values, 0.66, color=tones, edgecolor=SURFACE.light)
     for bar, hatch in zip(bars, hatches, strict=True):
@@ -84,8 +84,8 @@ def torque_band(result: ToleranceResult) -> Figure:
     """
     figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.6, 1])
     degrees, wanted = np.degrees(result.angles), result.target.torque(result.angles)
-    bands = [("as built", result.band, MUTED.light, "")]
-    bands += [(f"{each.name} trimmed", each.band, VERMILLION.light, "//") for each in result.trims[:1]]
+    bands = [("as built", result.band, BEFORE.light, "//")]
+    bands += [(f"{each.name} trimmed", each.band, AFTER.light, "") for each in result.trims[:1]]
     for label, band, tone, hatch in bands:
         for axes, scale, off in ((upper, 1.0, 0.0 * wanted), (lower, 1e3, wanted)):
             low, middle, high = (scale * (row - off) for row in band)

@@ -15,7 +15,7 @@ from ..quantity import typeset_unit
 from ..simulation import Trace
 from .lines import thinned
 from .number_text import root_mean_square, significant
-from .style import DASHES, INK, MUTED, ORANGE, SERIES, described, legend, log_axis, look, panels, styled
+from .style import AFTER, DASHES, INK, LIMIT, MUTED, PURPLE, described, legend, log_axis, look, panels, styled
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def over_time(time: Floats, curves: Mapping[str, Floats], *, quantity: str, unit
     for number, (label, values) in enumerate(curves.items()):
         tone, dash, _ = look(number)
         axes.plot(*thinned(time, values), color=tone, linestyle=dash, label=label, linewidth=1.4)
-    _finish(axes, f"{quantity} in {unit}", quantity)
+    _finish(axes, f"{quantity} in {unit}", quantity[:1].upper() + quantity[1:])
     axes.set_xlabel("time in s")
     sizes = "; ".join(
         f"{n} from {significant(float(v.min()))} to {significant(float(v.max()))}" for n, v in curves.items()
@@ -147,7 +147,11 @@ def closed_loop_of(
 
 @styled
 def closed_loop(
-    run: ClosedLoopRun, *, differences: Mapping[str, Floats] | None = None, bound: float | None = None
+    run: ClosedLoopRun,
+    *,
+    differences: Mapping[str, Floats] | None = None,
+    bound: float | None = None,
+    unit: str = "N*m",
 ) -> Figure:
     """Draw desired, true and estimated torque, the current, and the differences to another simulation.
 
@@ -156,9 +160,11 @@ def closed_loop(
     run
         The closed loop.
     differences
-        By label: difference of a signal between two simulations, shape (n,), relative or in SI.
+        By label: difference of a signal between two simulations, shape (n,).
     bound
         Stated bound of the differences.
+    unit
+        Of differences and bound; ``"1"`` where they are relative.
     """
     _same_length(run.time, {"desired": run.desired, "true": run.true, "estimated": run.estimated,
                             "current": run.current, **(differences or {})})  # fmt: skip
@@ -166,20 +172,20 @@ def closed_loop(
     figure, axes = panels(count, height=1.5 + 1.45 * count, sharex=True, height_ratios=[1.8, 1, 1][:count])
     shown = (
         ("desired", run.desired, {"color": INK.light, "linestyle": (0, (4, 2)), "linewidth": 1.2}),
-        ("true", run.true, {"color": SERIES[0].light}),
-        ("estimated", run.estimated, {"color": SERIES[1].light, "linestyle": DASHES[2]}),
+        ("true", run.true, {"color": AFTER.light}),
+        ("estimated", run.estimated, {"color": PURPLE.light, "linestyle": DASHES[2]}),
     )
     for label, values, drawn in shown:
         axes[0].plot(*thinned(run.time, values), label=label, **drawn)
-    axes[1].plot(*thinned(run.time, run.current), color=SERIES[2].light, linewidth=1.1)
+    axes[1].plot(*thinned(run.time, run.current), color=INK.light, linewidth=1.0)
     if np.max(np.abs(run.current)) > 0.5 * run.current_limit:
         for sign in (1.0, -1.0):
-            axes[1].axhline(sign * run.current_limit, color=ORANGE.light, linestyle=DASHES[1], linewidth=1.0,
+            axes[1].axhline(sign * run.current_limit, color=LIMIT.light, linestyle=DASHES[1], linewidth=1.0,
                             label="limit" if sign > 0 else None)  # fmt: skip
     _finish(axes[0], "torque in N·m", "Torque of the spring")
     _finish(axes[1], "current in A", "Motor current")
     if differences:
-        _differences(axes[2], run.time, differences, bound)
+        _differences(axes[2], run.time, differences, (bound, typeset_unit(unit) or "1"))
     axes[-1].set_xlabel("time in s")
     errors = [
         significant(1e3 * root_mean_square(values - run.true)) for values in (run.desired, run.estimated)
@@ -192,7 +198,10 @@ def closed_loop(
     )
 
 
-def _differences(axes: Axes, time: Floats, differences: Mapping[str, Floats], bound: float | None) -> None:
+def _differences(
+    axes: Axes, time: Floats, differences: Mapping[str, Floats], scale: tuple[float | None, str]
+) -> None:
+    bound, unit = scale
     for number, (label, values) in enumerate(differences.items()):
         tone, dash, _ = look(number)
         size = np.abs(values)
@@ -208,7 +217,7 @@ def _differences(axes: Axes, time: Floats, differences: Mapping[str, Floats], bo
     if bound is not None:
         label = f"bound {significant(bound, 2)}"
         axes.axhline(bound, color=INK.light, linewidth=1.0, linestyle=(0, (4, 2)), label=label)
-    _finish(axes, "|difference|", "Co-simulation against one monolithic simulation")
+    _finish(axes, f"|difference| in {unit}", "Co-simulation against one monolithic simulation")
 
 
 def _finish(axes: Axes, ordinate: str, title: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import ValueRangeError
-from .style import INK, SERIES, described, panels, styled
+from .style import AFTER, INK, described, panels, styled
 
 Interval = Sequence[float]
 _MISSED = "missed"
@@ -44,10 +44,10 @@ def ranked_intervals(
     columns = min(2, len(groups))
     lines = -(-len(groups) // columns)
     figure, axes = panels(lines, columns, height=lines * (0.75 + 0.22 * most))
-    for number, ((label, rows), each) in enumerate(zip(groups.items(), axes, strict=False)):
+    for _number, ((label, rows), each) in enumerate(zip(groups.items(), axes, strict=False)):
         places = -np.arange(len(rows) + len(missed), dtype=float)
         low, middle, high = np.array([list(interval) for interval in rows.values()]).reshape(-1, 3).T
-        tone = SERIES[number % len(SERIES)].light
+        tone = AFTER.light
         each.hlines(places[: len(rows)], low, high, color=tone, linewidth=3.0)
         each.plot(middle, places[: len(rows)], linestyle="", marker="o", color=INK.light)
         for place in places[len(rows) :]:

@@ -5,6 +5,9 @@ contrast of 3:1 with white. Each has a second value for dark pages. A figure is 
 in the light colours; inline in a report each of them becomes a CSS variable (see
 :mod:`nlsdesign.figures.svg`), so one rendering serves light, dark and print. Colour never carries meaning
 alone: lines differ in dashes, points in shape.
+
+A colour means the same on every page: ``AFTER``, ``BEFORE``, ``HOLDS``, ``LIMIT``. Only pictures of the
+mechanism give the colours to parts, and say so beside them.
 """
 
 from __future__ import annotations
@@ -57,6 +60,15 @@ PURPLE = Tone("purple", "#b5588c", "#e79cc6")
 ORANGE = Tone("orange", "#b07700", "#f5bd3d")
 
 TONES = (INK, MUTED, GRID, SURFACE, BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+AFTER = BLUE
+"""What a figure is about: the model, the design, the observer; of two states the later one."""
+BEFORE = VERMILLION
+"""What that is compared with: the state before, the published or the simpler form."""
+HOLDS = GREEN
+"""What holds or was chosen: a stable loop, an effect that was added; the third of several lines."""
+LIMIT = ORANGE
+"""A limit, and what sits on it or beyond."""
+
 SERIES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 DASHES: tuple[Any, ...] = (
     "-",
@@ -211,16 +223,18 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
         axes.set_title(title, pad=9.0 + 13.5 * rows)
 
 
-def log_axis(axes: Axes) -> None:
-    """Make the ordinate logarithmic with plain numbers: ``200``, ``5000``, ``10⁻⁶``.
+def log_axis(axes: Axes, *, abscissa: bool = False) -> None:
+    """Make an axis logarithmic with plain numbers: ``200``, ``5000``, ``10⁻⁶``.
 
     Parameters
     ----------
     axes
         Panel.
+    abscissa
+        Whether it is the abscissa; else the ordinate.
     """
-    axes.set_yscale("log")
-    axis = axes.yaxis
+    axis: Axis = axes.xaxis if abscissa else axes.yaxis
+    (axes.set_xscale if abscissa else axes.set_yscale)("log")
     axis.set_major_locator(LogLocator(10.0))
     axis.set_minor_locator(LogLocator(10.0, subs=(2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: _plain(value)))

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from ..design import MotorCycle, TaskCurve
 from .number_text import significant
-from .style import BLUE, DASHES, INK, MUTED, SERIES, described, legend, panels, styled
+from .style import AFTER, BEFORE, DASHES, INK, MUTED, described, legend, panels, styled
 
 Floats = NDArray[np.float64]
 
 _LABELS = ("rigid", "best linear spring", "this curve")
+_DASHES = (DASHES[2], DASHES[1], DASHES[0])
 
 
 @styled
@@ -35,7 +36,7 @@ def motor_over_task(curve: TaskCurve) -> Figure:
     figure, axes = panels(3, height=6.6, sharex=True)
     for panel, (title, label, values) in zip(axes, rows, strict=True):
         panel.axhline(0.0, color=MUTED.light, linewidth=0.8)
-        for tone, dash, name, motor in zip((INK, *SERIES), DASHES, _LABELS, cycles, strict=False):
+        for tone, dash, name, motor in zip((INK, BEFORE, AFTER), _DASHES, _LABELS, cycles, strict=False):
             if motor is None:  # no linear spring keeps the limits
                 continue
             time, shown = motor.cycle.time, values(motor)
@@ -69,13 +70,13 @@ def curve_of_task(curve: TaskCurve) -> Figure:
     axes.axhline(0.0, color=MUTED.light, linewidth=0.8)
     axes.axvline(0.0, color=MUTED.light, linewidth=0.8)
     for sign, at, branch, label in ((1.0, angle, curve.target, "this curve"), (-1.0, back, opposite, None)):
-        axes.plot(np.degrees(sign * at), sign * branch.torque(at), color=BLUE.light, label=label)
+        axes.plot(np.degrees(sign * at), sign * branch.torque(at), color=AFTER.light, label=label)
     beside = "no linear spring keeps the limits"
     if curve.linear is not None and curve.linear_stiffness is not None:
         line = np.array([np.min(curve.linear.cycle.torque), np.max(curve.linear.cycle.torque)])
         beside = f"best linear spring, {significant(curve.linear_stiffness)} N·m/rad"
         at = np.degrees(line / curve.linear_stiffness)
-        axes.plot(at, line, color=INK.light, linestyle=DASHES[1], linewidth=1.2, label=beside)
+        axes.plot(at, line, color=BEFORE.light, linestyle=DASHES[1], linewidth=1.2, label=beside)
     axes.set_ylabel("torque in N·m")
     axes.set_xlabel("deflection in degrees")
     axes.set_title("Spring for the task")

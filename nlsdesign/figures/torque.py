@@ -14,7 +14,7 @@ from ..errors import ValueRangeError
 from ..identification.statistics.metrics import Agreement
 from .lines import thinned
 from .number_text import root_mean_square, significant
-from .style import BLUE, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled
+from .style import AFTER, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled
 
 Floats = NDArray[np.float64]
 Curve = tuple[Floats, Floats]
@@ -130,7 +130,7 @@ def torque_loops(loops: Mapping[str, tuple[Curve, Curve]]) -> Figure:
     energies = []
     for panel, (title, (measured, model)) in zip(axes, loops.items(), strict=True):
         panel.plot(*_degrees(measured), color=INK.light, linewidth=1.1, label="measured")
-        panel.plot(*_degrees(model), color=BLUE.light, linestyle=DASHES[1], label="model")
+        panel.plot(*_degrees(model), color=AFTER.light, linestyle=DASHES[1], label="model")
         areas = [significant(1e3 * abs(loop_area(*loop)), 3) for loop in (measured, model)]
         energies.append(f"{title}: {areas[0]} mJ measured, {areas[1]} mJ in the model")
         panel.set_title(f"{title}, lost per cycle: {areas[0]} mJ measured, {areas[1]} mJ model", fontsize=8.5)

@@ -1,5 +1,6 @@
 """The waist: from an assembly to a frozen, flat, named model, and views of it."""
 
+from .casadi_view import casadi_dae
 from .flat import FlatModel, Symbols, Table, Variable
 from .flatten import flatten
 from .origin import Origin
@@ -15,5 +16,6 @@ __all__ = [
     "Symbols",
     "Table",
     "Variable",
+    "casadi_dae",
     "flatten",
 ]

@@ -353,10 +353,17 @@ class FlatModel:
         columns = [table.look_up(at[table.argument]) for table in self.tables]
         return np.concatenate(columns) if columns else np.zeros(0)
 
-    def symbolic_equations(self) -> Equations:
+    def symbolic_equations(self, *, longest: float = 60) -> Equations:
         """Return the equations as SymPy expressions, which print, and give LaTeX by ``latex()``.
 
-        ``equations`` is the casadi.Function that everything is computed with; this is the view for people.
+        ``equations`` is the casadi.Function that everything is computed with; this is the view for people,
+        and for SymPy where ``longest`` is raised.
+
+        Parameters
+        ----------
+        longest
+            Operations beyond which a definition is shown as a function of what it depends on; ``math.inf``
+            gives every definition in full, which takes SymPy minutes where a law is long.
 
         Returns
         -------
@@ -383,7 +390,9 @@ class FlatModel:
         groups = (self.states, self.inputs, self.parameters, columns)
         inputs = [["time"], *([v.name for v in group] for group in groups)]
         results = [[v.name for v in group] for group in (self.states, self.outputs, self.signals)]
-        return read_equations(self.equations, inputs, results, discrete=self.sample_time is not None)
+        return read_equations(
+            self.equations, inputs, results, discrete=self.sample_time is not None, longest=longest
+        )
 
     def _repr_html_(self) -> str:
         """Return the model as a block with its signals, and its equations, for notebooks."""

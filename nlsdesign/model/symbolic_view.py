@@ -16,6 +16,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from ..errors import ExportError
+from .instructions import read_instructions
 
 LONGEST = 60
 """A definition with more operations than this is shown as a function of what it depends on."""
@@ -144,21 +145,18 @@ class _Term:
     size: int
     uses: frozenset[sympy.Symbol]
 
-    @property
-    def shown(self) -> Any:
-        """The value; where it is too long, a function of what it depends on, rows of numbers named once."""
-        if self.size <= LONGEST:
-            return _number(self.value)
-        names = {str(s.name).partition("[")[0] for s in self.uses}
-        return sympy.Function("f")(*[_symbol(name) for name in sorted(names)])
-
 
 def _symbol(name: str) -> sympy.Symbol:
     return sympy.Symbol(name, real=True)
 
 
 def read_equations(
-    function: ca.Function, inputs: list[list[str]], results: list[list[str]], *, discrete: bool
+    function: ca.Function,
+    inputs: list[list[str]],
+    results: list[list[str]],
+    *,
+    discrete: bool,
+    longest: float = LONGEST,
 ) -> Equations:
     """Return the equations of a function of named numbers.
 
@@ -172,29 +170,31 @@ def read_equations(
         Names of states, outputs and signals.
     discrete
         Whether the first result is the next state.
+    longest
+        Operations beyond which a definition is shown as a function of what it depends on.
 
     Raises
     ------
     ExportError
         If a law uses an operation that has no SymPy counterpart here.
     """
-    reader = _Reader(function, inputs)
+    reader = _Reader(function, inputs, longest)
     reader.run(results)
-    derivatives = {n: reader.terms[reader.results[0, i]].shown for i, n in enumerate(results[0])}
+    derivatives = {n: reader.shown(reader.terms[reader.results[0, i]]) for i, n in enumerate(results[0])}
     return Equations(derivatives, reader.definitions, discrete)
 
 
 class _Reader:
     """Runs through the instructions of an SX function and turns each into SymPy."""
 
-    def __init__(self, function: ca.Function, inputs: list[list[str]]) -> None:
-        self.function, self.inputs = function, inputs
+    def __init__(self, function: ca.Function, inputs: list[list[str]], longest: float) -> None:
+        self.function, self.inputs, self.longest = function, inputs, longest
         self.terms: list[_Term] = []
         self.results: dict[tuple[int, int], int] = {}
         self.definitions: dict[str, sympy.Expr] = {}
 
     def run(self, results: list[list[str]]) -> None:
-        steps = self._steps()
+        steps, self.results = read_instructions(self.function)
         names: dict[int, list[str]] = {}
         for (port, index), step in self.results.items():
             if port in (1, 2) and results[port][index] not in names.setdefault(step, []):
@@ -203,30 +203,21 @@ class _Reader:
             term = self._term(operation, [self.terms[i] for i in operands], extra)
             self.terms.append(self._defined(term, names.get(number, []), operation))
 
+    def shown(self, term: _Term) -> Any:
+        """Return a value; where it is too long, a function of what it depends on, rows named once."""
+        if term.size <= self.longest:
+            return _number(term.value)
+        names = {str(s.name).partition("[")[0] for s in term.uses}
+        return sympy.Function("f")(*[_symbol(name) for name in sorted(names)])
+
     def _defined(self, term: _Term, names: list[str], operation: int) -> _Term:
         """Note the names of a value; from then on it goes by the first of them, inputs by their own."""
         if names and operation not in (ca.OP_INPUT, ca.OP_CONST):
             own = _symbol(names[0])
-            self.definitions[names.pop(0)] = term.shown
+            self.definitions[names.pop(0)] = self.shown(term)
             term = _Term(own, 0, frozenset([own]))
         self.definitions |= {name: term.value for name in names if name != str(term.value)}
         return term
-
-    def _steps(self) -> list[tuple[int, list[int], Any]]:
-        """Return the instructions with each operand as the number of the instruction that made it."""
-        steps: list[tuple[int, list[int], Any]] = []
-        held: dict[int, int] = {}
-        f = self.function
-        for k in range(f.n_instructions()):
-            operation, out, into = f.instruction_id(k), f.instruction_output(k), f.instruction_input(k)
-            if operation == ca.OP_OUTPUT:
-                self.results[out[0], out[1]] = held[into[0]]
-                continue
-            extra = f.instruction_constant(k) if operation == ca.OP_CONST else into
-            operands = [] if operation in (ca.OP_CONST, ca.OP_INPUT) else [held[i] for i in into]
-            steps.append((operation, operands, extra))
-            held[out[0]] = len(steps) - 1
-        return steps
 
     def _term(self, operation: int, operands: list[_Term], extra: Any) -> _Term:
         if operation == ca.OP_CONST:
@@ -243,5 +234,5 @@ class _Reader:
         used = operands[:1] if operation in _UNARY or operation == ca.OP_NOT else operands
         size = 1 + sum(term.size for term in used)
         # What is too long to be shown is not even built: written out, shared parts multiply.
-        value = _value(operation, [term.value for term in used]) if size <= LONGEST else None
+        value = _value(operation, [term.value for term in used]) if size <= self.longest else None
         return _Term(value, size, frozenset().union(*[term.uses for term in used]))

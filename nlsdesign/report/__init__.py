@@ -2,6 +2,9 @@
 
 from .calculation import OUTCOMES, CalculationSection, CalculationStep
 from .cam_section import CamSection
+from .command_pages import write_analysis_report, write_fit_report, write_observer_report
+from .comparison import ComparedResult, differing_numbers, key_figures, torque_at_rest, write_comparison
+from .design_sections import design_sections, tolerance_sections, write_design_report
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
 from .page import report_text, write_report
@@ -25,6 +28,7 @@ __all__ = [
     "CalculationStep",
     "CamSection",
     "Chapter",
+    "ComparedResult",
     "EquationsSection",
     "FigureSection",
     "FileSection",
@@ -36,10 +40,20 @@ __all__ = [
     "TextSection",
     "VerdictSection",
     "comparison_table",
+    "design_sections",
+    "differing_numbers",
+    "key_figures",
     "numbers_table",
     "range_table",
     "regeneration_sections",
     "report_text",
+    "tolerance_sections",
+    "torque_at_rest",
     "verdict_sections",
+    "write_analysis_report",
+    "write_comparison",
+    "write_design_report",
+    "write_fit_report",
+    "write_observer_report",
     "write_report",
 ]

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from ..figures import CamMotion, cam_picture, inline_svg
 from ..figures.cam_frames import MARKER
+from .data_link import data_link
 from .html import Html
 from .sections import PagePosition, Section
 
@@ -46,6 +47,7 @@ class CamSection(Section):
             "marker": f"{place.key}-{MARKER}",
             "curve": Html(inline_svg(picture.curve, place.key)),
             "warning": self.motion.warning,
+            "data": data_link(picture.curve, self.title),
             "caption": self.caption,
             "means": self.means,
             "assumed": self.assumed,

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..discrepancy.effects.plain_names import kind_in_words, title
 from ..discrepancy.reporting.circumstances import settings_of
-from ..discrepancy.reporting.fitted_numbers import fitted_numbers
+from ..discrepancy.reporting.fitted_numbers import FittedNumber, fitted_numbers
 from ..discrepancy.reporting.verdict import RecordGap, Verdict, best_forms, let_go, suspicions
 from ..figures import (
     CandidateShare,
@@ -191,6 +191,19 @@ def _with_unit_of(abscissa: str, model: FlatModel) -> str:
 def _numbers(verdict: Verdict) -> list[Section]:
     """Return the declared numbers after the refit, those that left their declared range highlighted."""
     numbers = fitted_numbers(verdict.fits)
+    return fitted_table(numbers, f"{'with' if verdict.effects else 'without'} what was added")
+
+
+def fitted_table(numbers: Sequence[FittedNumber], how: str) -> list[Section]:
+    """Return the table of refitted numbers, highlighted those that left their declared range.
+
+    Parameters
+    ----------
+    numbers
+        Declared and fitted.
+    how
+        Under which model they were fitted, for the caption.
+    """
     if not numbers:
         return []
     rows = tuple(
@@ -206,9 +219,9 @@ def _numbers(verdict: Verdict) -> list[Section]:
     )
     beyond = frozenset(i for i, n in enumerate(numbers) if abs(n.strain) > _EDGE)
     caption = (
-        f"Numbers that were declared with a spread, refitted {'with' if verdict.effects else 'without'} "
-        "what was added, with standard errors. The last column is how far each moved, in declared spreads: "
-        f"beyond 1 it has left what was declared{' (marked)' if beyond else '; none has'}."
+        f"Numbers that were declared with a spread, refitted {how}, with standard errors. The last column is "
+        "how far each moved, in declared spreads: beyond 1 it has left what was declared"
+        f"{' (marked)' if beyond else '; none has'}."
     )
     columns = ("number", "declared", "spread", "refitted", "unit", "moved")
     return [TableSection("Refitted numbers", columns, rows, caption=caption, marked=beyond)]

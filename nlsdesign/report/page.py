@@ -15,7 +15,7 @@ from ..errors import ExportError, ValueRangeError
 from ..figures.style import TONES
 from ..locations import version
 from ..writing import write_text
-from .html import Html, breakable, prose, words
+from .html import Html, breakable, prose, visible, words
 from .sections import Chapter, PagePosition, Section
 
 _PAGE_TONES = {
@@ -99,7 +99,7 @@ def report_text(
         title=title, abstract=abstract, facts=facts or {}, entries=entries, version=version(),
         light=light, dark=dark, script=Html(script), script_digest=digest,
     )  # fmt: skip
-    return page
+    return visible(page)
 
 
 def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from urllib.parse import quote
 from ..errors import ExportError, ValueRangeError
 from ..figures import Figure, alternative_text, inline_svg
 from ..figures.number_text import compact, significant
+from .data_link import data_link
 from .html import Html
 
 Cell = str | int | float
@@ -149,7 +150,10 @@ class FigureSection(Section):
     def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the figure as inline SVG, and its texts."""
         svg = Html(inline_svg(self.figure, place.key, alternative=self.alternative))
-        return {"svg": svg, "caption": self.caption, "means": self.means, "assumed": self.assumed}
+        data = data_link(self.figure, self.title)
+        return {
+            "svg": svg, "data": data, "caption": self.caption, "means": self.means, "assumed": self.assumed,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,11 +231,14 @@ class KeyNumber:
         Number with unit, as text.
     note
         Value for comparison, or the condition under which it holds.
+    before
+        The same number before, or of what it is compared with; shown with an arrow in front.
     """
 
     label: str
     value: str
     note: str = ""
+    before: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +293,7 @@ class FileSection(Section):
             relative = Path(os.path.relpath(path, place.folder)).as_posix() + ("/" if path.is_dir() else "")
             size = "" if path.is_dir() else _size(path.stat().st_size)
             rows.append({"name": relative, "link": quote(relative), "size": size, "what": what})
-        return {"rows": rows, "caption": self.caption}
+        return {"title": self.title, "rows": rows, "caption": self.caption}
 
 
 def _size(count: int) -> str:

@@ -26,7 +26,13 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
         Whether it is closed until the reader opens it.
     """
     rows = tuple(
-        (name, _value(q), typeset_unit(q.unit), f"± {100 * q.spread:g} %" if q.spread else "", q.source)
+        (
+            name,
+            value_in_words(q),
+            typeset_unit(q.unit),
+            f"± {100 * q.spread:g} %" if q.spread else "",
+            q.source,
+        )
         for name, q in numbers.items()
     )
     share = sources(numbers)["assumed"]
@@ -39,7 +45,14 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
     return TableSection(title, columns, rows, caption=caption, marked=marked, folded=folded)
 
 
-def _value(q: Quantity) -> str:
+def value_in_words(q: Quantity) -> str:
+    """Return a value without its unit; of a long row its number and its ends.
+
+    Parameters
+    ----------
+    q
+        Number or row of numbers.
+    """
     shown = q.shown
     if not isinstance(shown, tuple):
         return compact(shown, 6)

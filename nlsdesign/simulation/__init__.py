@@ -2,6 +2,7 @@
 
 from .events import Event
 from .integrate import simulate
+from .limits_reached import LimitReached, limits_reached
 from .measure import measure
 from .prior import Prior, declared_prior
 from .signals import Sine, sine
@@ -9,11 +10,13 @@ from .trace import RangeWarning, Trace, range_warnings
 
 __all__ = [
     "Event",
+    "LimitReached",
     "Prior",
     "RangeWarning",
     "Sine",
     "Trace",
     "declared_prior",
+    "limits_reached",
     "measure",
     "range_warnings",
     "simulate",

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..errors import MeasurementError, unknown_name
 from ..model import Variable
-from ..quantity import with_unit
+from ..quantity import parse_unit, with_unit
+from ..tables import Axis, data_frame, data_set
 from ..writing import write_table
 from .events import Event
 
@@ -84,6 +85,17 @@ def range_warnings(
                 )
             )
     return tuple(warnings)
+
+
+def _si_unit(name: str, units: Mapping[str, str]) -> str:
+    unit = units.get(name, "")
+    if not unit:
+        raise MeasurementError(f"column '{name}'", "has no unit", next_step=f"give units={{'{name}': 'rad'}}")
+    if parse_unit(unit).factor != 1.0:
+        raise MeasurementError(
+            f"column '{name}'", f"is in '{unit}', a trace holds SI", next_step="convert it with nls.quantity"
+        )
+    return unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +189,57 @@ class Trace:
         )
 
     def to_frame(self) -> Any:
-        """Return a ``pandas.DataFrame`` indexed by time; needs pandas."""
-        import pandas as pd
+        """Return a ``pandas.DataFrame`` indexed by ``time_s``; units are in its ``attrs``; needs pandas."""
+        return data_frame(self.signals, units=self.units, index=Axis("time_s", "s", self.time))
 
-        return pd.DataFrame(dict(self.signals), index=pd.Index(self.time, name="time_s"))
+    @staticmethod
+    def from_frame(frame: Any, *, units: Mapping[str, str] | None = None, name: str = "") -> Trace:
+        """Return the trace in a ``pandas.DataFrame`` that is indexed by time in s.
+
+        Parameters
+        ----------
+        frame
+            One column for each signal, in SI.
+        units
+            SI units by name of the column; by default those in ``frame.attrs["units"]``.
+        name
+            For messages and legends.
+
+        Raises
+        ------
+        MeasurementError
+            If a column has no unit, or one that is not SI.
+        """
+        known = dict(frame.attrs.get("units", {})) | dict(units or {})
+        signals = {str(each): np.asarray(frame[each], dtype=float) for each in frame.columns}
+        time = np.asarray(frame.index, dtype=float)
+        return Trace(time, signals, {each: _si_unit(each, known) for each in signals}, name)
+
+    def to_xarray(self) -> Any:
+        """Return an ``xarray.Dataset`` over ``time``, each variable with its unit; needs xarray."""
+        signals = {name: (("time",), values) for name, values in self.signals.items()}
+        data = data_set(signals, axes=[Axis("time", "s", self.time)], units=self.units)
+        return data.assign_attrs(name=self.name)
+
+    @staticmethod
+    def from_xarray(data: Any) -> Trace:
+        """Return the trace in an ``xarray.Dataset`` over ``time`` in s.
+
+        Parameters
+        ----------
+        data
+            Variables in SI, each with its unit in ``attrs["units"]``.
+
+        Raises
+        ------
+        MeasurementError
+            If a variable has no unit, or one that is not SI.
+        """
+        known = {str(each): str(data[each].attrs.get("units", "")) for each in data.data_vars}
+        signals = {each: np.asarray(data[each].values, dtype=float) for each in known}
+        units = {each: _si_unit(each, known) for each in known}
+        name = str(data.attrs.get("name", ""))
+        return Trace(np.asarray(data["time"].values, dtype=float), signals, units, name)
 
     def write_csv(self, path: Path) -> None:
         """Write ``time [s]`` and ``name [unit]`` columns; nothing is left behind if writing fails.

@@ -52,8 +52,13 @@ def write_page(results: Results, out: Path) -> Path:
     columns = ("item", "statement", "verdict", "numbers")
     sections: list[Section] = [
         NumbersSection("Verdicts", counts),
-        TableSection("Statements", columns, tuple(rows(results.findings))),
-        TableSection("Symbols", ("symbol", "meaning"), SYMBOLS),
+        TableSection(
+            "Statements",
+            columns,
+            tuple(rows(results.findings)),
+            caption="Each statement, and what became of it.",
+        ),
+        TableSection("Symbols", ("symbol", "meaning"), SYMBOLS, caption="As the paper writes them."),
     ]
     for title, findings in results.chapters.items():
         sections += [Chapter(title), *(finding.section() for finding in findings)]
@@ -63,9 +68,12 @@ def write_page(results: Results, out: Path) -> Path:
     sections += [
         Chapter("Beyond this audit"),
         TableSection(
-            "Statements that are tested elsewhere, or not at all", ("statement", "where"), ELSEWHERE
+            "Statements that are tested elsewhere, or not at all",
+            ("statement", "where"),
+            ELSEWHERE,
+            caption="What this audit leaves to others.",
         ),
-        FileSection("Written beside this page", files),
+        FileSection("Written beside this page", files, caption="The findings for programs and as text."),
     ]
     title = "Audit of the published model"
     return nls.write_report(out / "report.html", *sections, title=title, abstract=ABSTRACT)

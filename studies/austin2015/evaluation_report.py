@@ -47,7 +47,7 @@ def _of_one(name: str, results: ActuatorResults) -> list[Section]:
             nls.figures.margins_over_angle([judged.margins]),
             caption="Of the linearised sampled loop, cut at the current, while the machine slides; nothing "
             "where it is unstable or the drive cannot hold the angle.",
-            means=f"{str(judged.onset).capitalize()}.",
+            means=f"Where it begins to oscillate: {judged.onset}.",
         ),
         FigureSection(
             f"Output impedance, {name}",

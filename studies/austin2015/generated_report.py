@@ -53,7 +53,8 @@ def _figure(generated: GeneratedCode) -> FigureSection:
     shown = first.time >= (CYCLES - 1) / FREQUENCY
     lines = {
         f"code from the {name} deck": (run["observer.spring.torque"] - run["plant.spring.torque"])[shown]
-        for name, run in runs.items()
+        # What the figure is about comes first: the code from the diagnosed deck.
+        for name, run in sorted(runs.items(), key=lambda item: item[0] != "diagnosed")
     }
     return FigureSection(
         "Error of the estimated torque under code from three decks",

@@ -38,7 +38,7 @@ def _errors(results: Results) -> FigureSection:
             np.array([[r.frequency, r.relative_error] for r in each.following if r.proportional == gain]).T
         )
         for gain in PROPORTIONAL
-        for name, each in results.both.items()
+        for name, each in reversed(results.both.items())
     }
     old, new = ([r.relative_error for r in each.following] for each in results.both.values())
     less = 100.0 * (1.0 - np.array(new) / np.array(old))
@@ -85,7 +85,7 @@ def _table(results: Results) -> TableSection:
 
 
 def _one_run(results: Results) -> FigureSection:
-    runs = {name: each.followed(*_SHOWN).run for name, each in results.both.items()}
+    runs = {name: each.followed(*_SHOWN).run for name, each in reversed(results.both.items())}
     wanted = results.published.followed(*_SHOWN).run
     shown = (wanted.time >= SETTLED) & (wanted.time <= SETTLED + 0.5)
     lines = {name: run["plant.motor.current"][shown] for name, run in runs.items()}
@@ -115,5 +115,5 @@ def _cosimulated(name: str, results: ActuatorResults) -> FigureSection:
         nls.figures.closed_loop(loop, differences={"true torque": difference}),
         caption="0.8 N·m at 1 Hz; the controller has one sample to compute.",
         means=f"The same loop simulated in one piece differs by at most "
-        f"{np.max(np.abs(difference)):.1e} N·m.",
+        f"{nls.figures.compact(float(np.max(np.abs(difference))), 2)} N·m.",
     )

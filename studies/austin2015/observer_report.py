@@ -14,17 +14,24 @@ from .results import ActuatorResults, Results
 
 def observer_sections(results: Results) -> list[Section]:
     """Show observability, and the errors of the observers on the bench, for both actuators."""
-    charts = {name: each.chart for name, each in results.both.items()}
-    drops = {name: each.spread.drops for name, each in results.both.items()}
+    # The designed one first: its colour is that of what a figure is about.
+    both = dict(reversed(results.both.items()))
+    charts = {name: each.chart for name, each in both.items()}
+    drops = {name: each.spread.drops for name, each in both.items()}
     sections: list[Section] = [
         Chapter("Observer", "The torque is not measured: it is estimated from the encoder and the current."),
         FigureSection(
             "Observability over the cam angle",
             nls.figures.observability_over_angle(charts, drops=drops),
             caption="Rank and condition of angle, speed and rubber memory, observed through the encoder; "
-            "angles of lost rank are exact. "
-            + " ".join(f"{name.capitalize()}: {'; '.join(each.lines())}." for name, each in drops.items()),
+            "angles of lost rank are exact, they stand in the table below.",
             means="At zero angle the lever arm vanishes: the rubber's memory is not observable, nor needed.",
+        ),
+        TableSection(
+            "What the encoder does not show",
+            ("actuator", "finding"),
+            tuple((name, line.replace(" -", " −")) for name, each in drops.items() for line in each.lines()),
+            caption="States that do not show at exact angles, why, and whether they decay by themselves.",
         ),
         FigureSection(
             "Stability over the cam angle",

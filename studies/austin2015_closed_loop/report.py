@@ -42,6 +42,7 @@ def write_page(
             "What becomes of each statement",
             ("statement", "outcome", "what decides it"),
             tuple((s.stated, s.outcome, s.why) for s in statements),
+            caption="Statements of the paper and of design notes, each run as a loop.",
         ),
         FigureSection("Fig. 8", pictures["fig08"], caption="Torque at rest; marks are the published points."),
         FigureSection("Fig. 8, soft spring", pictures["fig08_soft"], caption="A line of 1.7 N·m/rad."),
@@ -62,7 +63,8 @@ def write_page(
         sections += [
             Chapter(statement.stated, f"{statement.outcome.capitalize()}. {statement.why}"),
             TableSection("Loops that were run", ("loop", "outcome"),
-                         tuple((t.loop, t.outcome) for t in statement.trials)),
+                         tuple((t.loop, t.outcome) for t in statement.trials),
+                         caption="Gains in rad/s per N·m; magnitudes are those of desired to actual torque."),
         ]  # fmt: skip
     sections.append(_points(followed))
     write_report(out / "report.html", *sections, title="Torque loop of the published actuator")
@@ -169,5 +171,6 @@ def _points(followed: FollowedTorque) -> TableSection:
         "Fig. 10, point by point",
         ("setting", "N·m", "spring", "Hz", "published dB", "published °", "dB", "°", "verdict"),
         tuple(rows),
+        caption="Each published point beside the simulated one.",
         folded=True,
     )

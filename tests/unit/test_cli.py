@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Run, run
+from tests.command_line import Run, files_in, run
 
 __all__ = ["run"]
 DECK = "austin2015_figure_consistent"
@@ -172,7 +172,7 @@ def test_a_plant_that_is_no_actuator_is_exported_alone(run: Run, deck: str, tmp_
     assert (status, err) == (0, ""), err
     assert "plant.fmu" in out
     assert out.count("left out: ") == 3
-    assert [file.name for file in (tmp_path / "fmu").iterdir()] == ["plant.fmu"]
+    assert files_in(tmp_path / "fmu") == ["plant.fmu"]
     status, _, err = run("export", "c", "--deck", deck, "--out", "c")
     assert status == 2
     assert "needs the series spring" in err or "needs the driven body" in err
@@ -246,7 +246,7 @@ def test_analyse_without_a_command_goes_over_the_angle(run: Run, tmp_path: Path)
     # Headings stand whole, one word to a line.
     assert {"condition", "frequency", "stiffness"} <= set(out.split())
     assert out.index("torque sensor") < out.index("present sensors")
-    files = {path.name for path in (tmp_path / "o").iterdir()}
+    files = set(files_in(tmp_path / "o"))
     assert files == {"over_angle.csv", "poles.svg", "observability.svg"}
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Run, run
+from tests.command_line import Run, files_in, run
 
 __all__ = ["run"]
 DECK = "austin2015_figure_consistent"
@@ -22,7 +22,7 @@ def test_the_controller_is_written_as_c(run: Run, tmp_path: Path, law: str, told
     assert status == 0, err
     assert told in out
     assert "largest torque that the drive can hold: 4.379 N·m" in out
-    assert {p.name for p in (tmp_path / "c").iterdir()} == {
+    assert set(files_in(tmp_path / "c")) == {
         "controller.c", "controller.h", "controller_selftest.c",
     }  # fmt: skip
     header = (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")

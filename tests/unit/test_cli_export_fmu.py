@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fmpy.util import read_csv
 
-from tests.unit.test_cli import Run, run
+from tests.command_line import Run, files_in, run
 
 __all__ = ["run"]  # the fixture
 
@@ -26,7 +26,7 @@ def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, 
     status, out, err = run(*WORDS, "--out", "o", *about)
     assert (status, err) == (0, "")
     assert "left out" not in out
-    names = sorted(file.name for file in (tmp_path / "o").iterdir())
+    names = files_in(tmp_path / "o")
     assert names == ["controller.fmu", "observer.fmu", "observer_and_controller.fmu", "plant.fmu"]
     for name in names:
         found = described(tmp_path / "o" / name)
@@ -56,7 +56,7 @@ def test_what_is_asked_for_is_written_once_with_its_reference(run: Run, tmp_path
     status, out, err = run(*WORDS, "--out", "o", *asked)
     assert (status, err) == (0, "")
     names = {"controller.fmu", "controller_in.csv", "controller_ref.csv", "controller_ref.opt"}
-    assert {file.name for file in (tmp_path / "o").iterdir()} == names
+    assert set(files_in(tmp_path / "o")) == names
     assert all(name in out for name in names)
     reference = read_csv(str(tmp_path / "o" / "controller_ref.csv"))
     result = fmpy.simulate_fmu(

@@ -17,33 +17,15 @@ import pytest
 
 import nlsdesign.components as room
 from nlsdesign.components import (
-    MATERIAL,
-    ROTATION,
-    Assembly,
-    Body,
     Cam,
-    Controller,
-    DrivePart,
     Element,
-    Gear,
-    GearedMotor,
-    Inertia,
-    Mass,
     Parallel,
     Part,
-    Pulley,
-    ResistiveMotor,
     Sensor,
     Series,
-    Spring,
-    Tie,
     smoothed,
-    specimen,
-    through,
-    tie,
 )
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
-from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.components.core.part import walk
 from nlsdesign.components.core.part_numbers import readings
 from nlsdesign.deck import load_deck
@@ -53,6 +35,7 @@ from nlsdesign.export.fmi.fmu import fmi_headers, fmu_texts
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.quantity import parse_unit
 from tests.parts import examples
+from tests.parts.systems import around, named
 
 STEP = 1e-6
 """Relative to the size of each variable, for the finite difference."""
@@ -64,48 +47,8 @@ def public() -> list[type[Part]]:
     return sorted((c for c in found if not inspect.isabstract(c) and c is not Part), key=lambda c: c.__name__)
 
 
-def around(part: Part) -> Assembly:
-    """The smallest system in which the part does something."""
-    if isinstance(part, Sensor):
-        spring = tie(through(Pulley(radius=0.01), rubber=Spring(stiffness=2500.0)), "motor")
-        motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055)
-        return assembly("bench", motor=motor, spring=spring, part=part)
-    if isinstance(part, Body):
-        spring = (
-            Spring(stiffness=3.4, domain=ROTATION) if part.domain == ROTATION else Spring(stiffness=2500.0)
-        )
-        other = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
-        return assembly("bench", part=part, other=other, spring=tie(spring, "part", "other"))
-    if isinstance(part, Controller):
-        numbers = {"inertia": 6e-4, "torque_constant": 0.5, "resistance": 4.0, "voltage_limit": 24.0}
-        motor = ResistiveMotor(**numbers, chain=(("part", part),))
-        return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))
-    if isinstance(part, DrivePart):
-        motor = GearedMotor(inertia=6e-4, gear_ratio=4.0, torque_constant=0.055, chain=(("part", part),))
-        return assembly("bench", motor=motor, spring=tie(Spring(stiffness=3.4, domain=ROTATION), "motor"))
-    if isinstance(part, Gear):
-        bodies = {name: Inertia(inertia=6e-4) for name in part.between}
-        return assembly("bench", **bodies, part=part)
-    if isinstance(part, Tie):
-        return assembly("bench", shaft=Inertia(inertia=6e-4), part=part)
-    if isinstance(part, Cam):
-        return around(through(part, rubber=Spring(stiffness=2500.0)))
-    assert isinstance(part, Element), f"{type(part).__name__} is no kind of component that is known here"
-    if part.domain == MATERIAL:
-        return around(specimen(area=1e-4, rest_length=0.0125, law=part))
-    body = Inertia(inertia=6e-4) if part.domain == ROTATION else Mass(mass=0.4)
-    return assembly("bench", body=body, part=tie(part, "body"))
-
-
 def flat(part: Part) -> FlatModel:
     return flatten(around(part))
-
-
-def named(part: Part) -> str:
-    """Class, readings and domain of an example, as its name."""
-    held = [type(getattr(part, field)).__name__ for field in readings(type(part))]
-    domain = [part.domain.name] if isinstance(part, Element | Body) and len(part.domains()) > 1 else []
-    return "-".join([type(part).__name__, *held, *domain])
 
 
 EXAMPLES = {named(part): part for part in examples()}

@@ -117,6 +117,7 @@ def test_progress_is_told_after_each_start() -> None:
     assert len(steps) == 8
 
 
+@pytest.mark.slow
 def test_a_given_cam_leaves_pretension_and_rubber_to_find() -> None:
     """The cam of a found design stays as it is; its pretension, moved away, is found back."""
     best = design_cam(actuator(CONVEX), target=TARGET, free=PRETENSION, keep=KEEP)
@@ -129,6 +130,7 @@ def test_a_given_cam_leaves_pretension_and_rubber_to_find() -> None:
     assert back.rms < 2.0 * best.rms
 
 
+@pytest.mark.slow
 def test_the_anchor_may_be_free_with_the_contour() -> None:
     near, far = AnchorDistance(24e-3, 24e-3), AnchorDistance(24e-3, 60e-3)
     free = [*CONTOUR, "spring.cam.anchor_distance"]

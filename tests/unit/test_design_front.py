@@ -65,6 +65,7 @@ def test_limits_in_conflict_are_named_before_any_front() -> None:
         pareto(MACHINE, target=TARGET, goals=(TorqueError(), LeastSize()), free=AREA, keep=keep, points=3)
 
 
+@pytest.mark.slow
 def test_every_point_meets_the_target_as_the_settings_ask() -> None:
     for number in range(len(front().points)):
         assert front().design(number).met

@@ -117,6 +117,7 @@ def test_insensitivity_is_the_change_after_the_pretension_is_trimmed_to_its_forc
     assert rms < 0.95 * left
 
 
+@pytest.mark.slow
 def test_a_goal_of_equal_weight_leads_there() -> None:
     """Each goal, added to the torque error, makes small what it is about."""
     machine = actuator(CONCAVE, pretension=2e-3)

@@ -234,6 +234,7 @@ def test_a_torque_band_is_a_limit() -> None:
         design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=[TorqueWithin(short)])
 
 
+@pytest.mark.slow
 def test_a_target_that_no_contour_can_give_says_so() -> None:
     """A torque that first rises and then stays has a corner that no convex cam follows."""
     corner = TabulatedTorque(angles=(0.0, 0.1, 0.2, 0.5, 0.9), torques=(0.0, 1.6, 3.0, 3.0, 3.0))

@@ -128,6 +128,7 @@ def test_a_result_says_what_was_found(result: ToleranceResult) -> None:
     assert str(pickle.loads(pickle.dumps(result))) == text
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_springs(result: ToleranceResult) -> None:
     machine = declare(load_deck("austin2015_figure_consistent"))
     again = tolerance_analysis(machine, target=CURVE, draws=400)

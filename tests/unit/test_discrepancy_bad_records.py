@@ -114,6 +114,7 @@ def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
     assert (out / "notes.txt").exists(), "what is not ours stays"
 
 
+@pytest.mark.slow
 def test_code_of_the_better_deck_is_written_with_the_verdict(
     rig: Assembly, clean: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,7 +28,7 @@ def diagnosed(folder: Path, factor: float, hidden: dict[str, float]) -> Verdict:
     return diagnose(rig, load_records(folder / "records", flatten(rig)), catalogue=TWO)
 
 
-@pytest.mark.parametrize("factor", [0.65, 1.5])
+@pytest.mark.parametrize("factor", [pytest.param(0.65, marks=pytest.mark.slow), 1.5])
 def test_a_single_wrong_number_is_named_with_its_value(tmp_path: Path, factor: float) -> None:
     found = diagnosed(tmp_path, factor, {})
     assert found.verdict == "data_suspect"
@@ -48,6 +48,7 @@ def test_a_number_inside_its_declared_range_is_not_called_wrong(tmp_path: Path) 
     assert found.where == ()
 
 
+@pytest.mark.slow
 def test_an_effect_beside_a_wrong_number_is_named_and_the_number_said(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, 1.5, {"coulomb_friction": 1.0})
     assert found.verdict == "named"

@@ -147,6 +147,7 @@ def test_the_seed_fixes_a_set_and_what_is_hidden_changes_no_number(machine: Mach
         make_machine_records(short, {"coulomb_frictoin": 1.0}, 3)
 
 
+@pytest.mark.slow
 def test_every_effect_shows_above_the_noise(machine: Machine) -> None:
     """In a tenth of the usual time, at twice the usual size."""
     short = short_machine(machine)

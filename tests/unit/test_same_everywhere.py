@@ -28,6 +28,7 @@ def written(kernel: str, out: Path, *words: str) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in sorted(out.rglob("*")) if file.is_file()}
 
 
+@pytest.mark.slow
 def test_the_deck_of_a_rig_is_the_same_to_the_byte(tmp_path: Path) -> None:
     write_set(tmp_path / "set", ACTUATORS["wrist"], make_records(ACTUATORS["wrist"], {}, 1))
     rig, cam = str(tmp_path / "set" / "rig.toml"), str(tmp_path / "set" / "cam.csv")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -45,7 +45,6 @@ def laws(seed: int, counts: tuple[int, int], decades: float) -> list[tuple[np.nd
     return [(np.sort(draw.uniform(-1, 1, n)), 10.0 ** draw.uniform(0.0, decades, n + 1)) for n in counts]
 
 
-@settings(max_examples=300)
 @given(bends)
 def test_two_bent_springs_in_series(case: tuple[int, int, int, float, float]) -> None:
     """Slopes up to a million apart, also shallow–steep–shallow, where plain Newton goes to and fro."""

@@ -113,7 +113,10 @@ def other_motions(end: float) -> list[np.ndarray]:
     ]
 
 
-@pytest.mark.parametrize("name", ["diagnosed", "austin2015_as_printed", "test_rig"])
+@pytest.mark.parametrize(
+    "name",
+    ["diagnosed", *(pytest.param(n, marks=pytest.mark.slow) for n in ("austin2015_as_printed", "test_rig"))],
+)
 def test_other_motions_find_the_torque_error_that_is_stated(name, designs):
     """Reference: the equations of the observer, with matrices computed at every single angle."""
     design = designs[name]

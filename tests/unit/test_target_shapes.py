@@ -7,7 +7,6 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from nlsdesign.design import (
     ExponentialTorque,
@@ -32,9 +31,15 @@ CURVES: dict[str, Target] = {
 
 @pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
 def test_energy_is_the_integral_of_torque(curve: Target) -> None:
+    at, weights = np.polynomial.legendre.leggauss(12)
     for angle in (0.07, 0.31, 0.9):
         kinks = [each for each in getattr(curve, "angles", ()) if 0.0 < each < angle]
-        expected, _ = quad(curve.torque, 0.0, angle, points=kinks or None, epsabs=1e-13, limit=400)
+        # A rule of Gauss between kinks is exact for the polynomials that stand there.
+        ends = np.array([0.0, *kinks, angle])
+        middles, halves = (ends[1:] + ends[:-1]) / 2, (ends[1:] - ends[:-1]) / 2
+        places = middles[:, None] + halves[:, None] * at
+        torques = np.reshape(curve.torque(places.ravel()), places.shape)
+        expected = float(np.sum(halves[:, None] * weights * torques))
         assert float(curve.energy(angle)) == pytest.approx(expected, rel=1e-9)
 
 

@@ -8,12 +8,13 @@ import importlib
 import inspect
 import pkgutil
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
 from ...deck import NUMBER_FIELDS, Deck, ParentDeck
-from ...errors import DeckError, NlsError, brief, nearest, unknown_name
+from ...errors import ArrangementError, DeckError, NlsError, brief, nearest, unknown_name
+from ...extensions import extension_modules
 from ...quantity import Quantity
 from ..core.domain import Domain
 from ..core.element import Combination, Element
@@ -24,6 +25,7 @@ from ..mechanics.bodies import Body, Free
 from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from ..transmission.cam_drive import Through
+from .library_rubber import FIELDS, takes_material, with_library_rubber
 from .renamed import NUMBERS, renamed
 
 _PARENT_FIELDS = ("name", "digest", "change", "parent")
@@ -38,15 +40,31 @@ def _modules() -> tuple[ModuleType, ...]:
 
 
 def component_classes() -> dict[str, type[Part]]:
-    """Return the components that a deck can name, by name: all public parts that are not abstract."""
+    """Return the components that a deck can name, by name: all public parts that are not abstract.
+
+    Those of packages that the present block is extended by are among them.
+
+    Raises
+    ------
+    ArrangementError
+        If two of them have one name.
+    """
+    own, brought = _parts_in(_modules()), _parts_in(extension_modules())
+    for name, kind in brought.items():
+        if own.setdefault(name, kind) is not kind:
+            rule = f"has the name of a component of {own[name].__module__}"
+            raise ArrangementError(f"{kind.__module__}.{name}", rule, next_step="give it another name")
+    return {name: own[name] for name in sorted(own) if not inspect.isabstract(own[name])}
+
+
+def _parts_in(modules: Sequence[ModuleType]) -> dict[str, type[Part]]:
     kinds = (
         kind
-        for module in _modules()
+        for module in modules
         for name, kind in vars(module).items()
         if inspect.isclass(kind) and kind.__module__ == module.__name__ and name[0] != "_"
     )
-    parts = {c.__name__: c for c in kinds if issubclass(c, Part) and c not in (Part, Tie)}
-    return {name: parts[name] for name in sorted(parts) if not inspect.isabstract(parts[name])}
+    return {c.__name__: c for c in kinds if issubclass(c, Part) and c not in (Part, Tie)}
 
 
 class Builder:
@@ -75,6 +93,12 @@ class Builder:
         """
         before = len(self.problems)
         kind = self._kind(path, table)
+        if kind is not None and takes_material(kind) and any(key in table for key in FIELDS):
+            try:
+                table = with_library_rubber(self.deck, path, table)
+            except NlsError as error:
+                self.problems.append(error)
+                return None
         inner = {key: raw for key, raw in table.items() if _is_part(raw)}
         children = {key: self.part(f"{path}.{key}", raw) for key, raw in inner.items()}
         if kind is None:
@@ -352,6 +376,20 @@ def _is_pair(raw: object) -> bool:
     return isinstance(raw, list) and len(raw) == 2 and all(isinstance(end, str) for end in raw)
 
 
+def _without_one_behind(has_cam: bool, names: list[str]) -> DeckError:
+    if not has_cam:
+        step = 'add a table such as [spring.cam] with component = "TwoSidedCam"'
+        return DeckError("Through", "needs a table 'cam'", next_step=step)
+    if not names:
+        step = 'add a table such as [spring.rubber] with component = "Specimen"'
+        return DeckError("Through", "needs a table for the element behind the cam", next_step=step)
+    return DeckError(
+        "Through", f"has {len(names)} elements behind its cam, {', '.join(map(repr, names))}, and takes one",
+        next_step='put both into one table: component = "Parallel" where they share the stretch, "Series" '
+        "where they share the force",
+    )  # fmt: skip
+
+
 def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str, Part]) -> dict[str, Any]:
     """Return the fields of a part that are not numbers."""
     if issubclass(kind, Combination):
@@ -359,7 +397,7 @@ def _structure(kind: type[Part], table: Mapping[str, Any], children: Mapping[str
     if issubclass(kind, Through):
         behind = [pair for pair in children.items() if pair[0] != "cam"]
         if "cam" not in children or len(behind) != 1:
-            raise DeckError("Through", "needs a table 'cam' and one table for the element behind it")
+            raise _without_one_behind("cam" in children, [name for name, _ in behind])
         return {"cam": children["cam"], "behind": behind[0]}
     if issubclass(kind, Free):
         return {"chain": tuple(children.items())}

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
-from decimal import Context
-from fractions import Fraction
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, ParentDeck, Written
+from ...deck import Deck, ParentDeck
 from ...errors import DeckError, NlsError, nearest
-from ...quantity import Quantity, parse_unit
+from ...quantity import Quantity
 from ...writing import write_text
 from ..core.element import Element
 from ..core.part import Part
@@ -22,6 +18,7 @@ from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from .deck_reader import Builder
 from .named_parts import Assembly, arrangement_problems
+from .part_text import part_lines, text_of
 from .sensor_chains import source_problems
 
 
@@ -88,7 +85,7 @@ def deck_text(assembly: Assembly) -> str:
     assembly
         Parts, made in Python or read from another deck.
     """
-    lines = ["[deck]", f"name = {_string(assembly.name)}", f"description = {_string(assembly.description)}"]
+    lines = ["[deck]", f"name = {text_of(assembly.name)}", f"description = {text_of(assembly.description)}"]
     if assembly.parent:
         lines.append(f"parent = {_parent(assembly.parent)}")
     return "\n".join([*lines, *_parts_lines(assembly, {})]) + "\n"
@@ -116,19 +113,20 @@ def _parts_lines(assembly: Assembly, changed: Mapping[str, Quantity]) -> list[st
     lines: list[str] = []
     for name, part in assembly.parts:
         if isinstance(part, Tie | Gear):
-            ends = ", ".join(_string(end) for end in part.between)
+            ends = ", ".join(text_of(end) for end in part.between)
             inner = part.element if isinstance(part, Tie) else part
-            lines += _table(name, inner, [f"between = [{ends}]"], changed)
+            structure = [f"between = [{ends}]"]
+            lines += part_lines(name, inner, structure=structure, changed=changed)
         else:
-            of = [f"of = {_string(part.of)}"] if isinstance(part, Sensor) else []
-            lines += _table(name, part, of, changed)
+            of = [f"of = {text_of(part.of)}"] if isinstance(part, Sensor) else []
+            lines += part_lines(name, part, structure=of, changed=changed)
     return lines
 
 
 def _parent(parent: ParentDeck) -> str:
     """Return the deck before this one, and those before it, as an inline table."""
     fields = {"name": parent.name, "digest": parent.digest, "change": parent.change}
-    items = [f"{key} = {_string(text)}" for key, text in fields.items() if text]
+    items = [f"{key} = {text_of(text)}" for key, text in fields.items() if text]
     items += [f"parent = {_parent(parent.parent)}"] if parent.parent else []
     return "{" + ", ".join(items) + "}"
 
@@ -144,40 +142,6 @@ def write_deck(assembly: Assembly, path: Path) -> None:
         File to write.
     """
     write_text(path, deck_text(assembly))
-
-
-def _table(path: str, part: Part, structure: list[str], changed: Mapping[str, Quantity]) -> list[str]:
-    lines = ["", f"[{path}]", f"component = {_string(type(part).__name__)}", *structure]
-    domain = part.stated_domain()
-    if domain:
-        lines.append(f"domain = {_string(domain.name)}")
-    for name, declared in part.parameters().items():
-        lines.append(f"{name} = {_number(changed.get(f'{path}.{name}', declared))}")
-    for name, child in part.children().items():
-        lines += _table(f"{path}.{name}", child, [], changed)
-    return lines
-
-
-def _number(given: Quantity) -> str:
-    factor = parse_unit(given.unit).factor
-    items = [_shortest(v, factor) for v in given.values]
-    value = "[" + ", ".join(items) + "]" if isinstance(given.value, tuple) else items[0]
-    text = f"{{value = {value}, unit = {_string(given.unit)}, source = {_string(given.source)}"
-    return text + (f", spread = {given.spread!r}}}" if given.spread else "}")
-
-
-def _shortest(value: float, factor: float) -> str:
-    """Return the shortest decimal that reads back as the same number in SI."""
-    exact = Fraction(value) / Fraction(factor)
-    short = (repr(float(f"{float(exact):.{digits}g}")) for digits in (6, 12, 15))
-    # Where no float times the factor is the value, the text has more digits than a float.
-    long = (str(Context(prec=n).divide(exact.numerator, exact.denominator)) for n in range(17, 40))
-    return next(text for text in chain(short, long) if Written(text).times(factor) == value)
-
-
-def _string(text: str) -> str:
-    """Return a text as TOML writes it, which is as JSON does but for the delete character."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def numbers_of(deck: Deck, path: str, kind: type[Part]) -> dict[str, Any]:

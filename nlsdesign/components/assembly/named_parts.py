@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...deck import ParentDeck
-from ...errors import ArrangementError, NlsError, unknown_name
+from ...errors import ArrangementError, NlsError, unknown_name, visible
 from ...quantity import Quantity
 from ..core.element import Element, Parallel
-from ..core.part import Part, check_names, find, quantities, replaced, resolved, walk, with_values
+from ..core.part import LONGEST, Part, check_names, find, quantities, replaced, resolved, walk, with_values
 from ..core.tie import Tie
 from ..mechanics.bodies import Body, Fixed
 from ..mechanics.gear import Gear, gear_problems
@@ -48,6 +48,14 @@ class Assembly(NotebookCircuits):
     parent: ParentDeck | None = None
 
     def __post_init__(self) -> None:
+        for field in ("name", "description"):
+            object.__setattr__(self, field, visible(getattr(self, field)))
+        if len(self.name) > LONGEST:
+            raise ArrangementError(
+                f"assembly '{self.name[:20]}...'",
+                f"its name has {len(self.name)} letters, more than {LONGEST}",
+                next_step="give a short name, which also names files; the description may be long",
+            )  # fmt: skip
         # In a deck the table [deck] holds name and description.
         check_names(f"assembly '{self.name}'", [name for name, _ in self.parts], taken=("deck",))
         for _, error in arrangement_problems(self.parts):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ...errors import unknown_name
+from ..core.contacts import Regularised, Rounded, Sharp, WithCorners, WithFriction
 from ..core.element import Element
 from ..core.part import Part
 from ..core.tie import Tie
@@ -48,6 +50,32 @@ def smoothed(assembly: Assembly, widths: Mapping[str, float] | None = None) -> A
         law = _law(assembly[path])
         if isinstance(law, Element):
             assembly = assembly.with_part(path, law.smooth(asked.get(path)))
+    return assembly
+
+
+def sharpened(assembly: Assembly) -> Assembly:
+    """Return the assembly with every law that was declared rounded in its sharp form.
+
+    Dry friction sticks, corners are corners; simulation locates where they change.
+
+    Parameters
+    ----------
+    assembly
+        Parts.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import CoulombFriction, Inertia, Regularised, assembly, tie
+    >>> smooth = Regularised(creep_speed=0.01)
+    >>> rub = tie(CoulombFriction(sliding_effort=0.05, contact=smooth), "wheel")
+    >>> sharpened(assembly("a", wheel=Inertia(inertia=1e-3), rub=rub)).element("rub").title()
+    'CoulombFriction(sliding_effort = 0.05 N·m)'
+    """
+    # Innermost parts first: a wrapper that is read anew keeps the parts inside it.
+    for path, _ in sorted(assembly.walk(), key=lambda each: -each[0].count(".")):
+        law = _law(assembly[path])
+        if isinstance(law, (WithCorners, WithFriction)) and isinstance(law.contact, (Regularised, Rounded)):
+            assembly = assembly.with_part(path, replace(law, contact=Sharp()))
     return assembly
 
 

@@ -16,6 +16,8 @@ from .part_numbers import ParameterInfo as ParameterInfo
 from .part_numbers import Reading, Template, domain_by_units, readings, templates
 from .part_numbers import parameter as parameter
 
+LONGEST = 100
+"""Letters in the longest name of a deck or a part: names become those of variables, files and columns."""
 RESERVED = frozenset({"component", "between", "of", "domain"})
 """Keys of a deck that say what a part is and where it sits."""
 
@@ -186,6 +188,12 @@ def check_names(owner: str, names: Sequence[str], taken: Collection[str] = ()) -
                 f"{owner}: name '{name}'",
                 "is not a plain word",
                 next_step="use letters, digits and underscores, and a letter first",
+            )
+        if len(name) > LONGEST:
+            raise ArrangementError(
+                f"{owner}: name '{name[:20]}...'",
+                f"has {len(name)} letters, more than {LONGEST}",
+                next_step="give a shorter name",
             )
         if name in taken or name in names[:number]:
             raise ArrangementError(f"{owner}: name '{name}'", "is taken", next_step="choose another name")

@@ -38,6 +38,8 @@ class ParameterInfo:
         Whether it may be a row of numbers.
     domain
         Name of the domain that the unit is of; empty where there is but one.
+    whole
+        Whether it counts something, so that only whole numbers make sense.
     """
 
     unit: str
@@ -46,6 +48,7 @@ class ParameterInfo:
     maximum: float
     row: bool = False
     domain: str = ""
+    whole: bool = False
 
     def checked(self, name: str, given: Given) -> Quantity:
         """Return the number as a quantity of the right dimension and size.
@@ -86,6 +89,11 @@ class ParameterInfo:
                     + with_unit(f"[{self.minimum:g}, {self.maximum:g}]", self.unit),
                     next_step=self._slip(result, value),
                 )
+            if self.whole and value != round(value):
+                raise ValueRangeError(
+                    f"{name} = {result}", f"{self.description} must be a whole number",
+                    next_step=f"write {math.floor(value)} or {math.ceil(value)}",
+                )  # fmt: skip
         return result
 
     def _slip(self, given: Quantity, value: float) -> str | None:
@@ -121,7 +129,7 @@ class Template:
     ----------
     unit
         SI unit; ``{motion}``, ``{rate}``, ``{effort}`` and ``{inertia}`` in it stand for those of a domain.
-    description, minimum, maximum, row
+    description, minimum, maximum, row, whole
         As in :class:`ParameterInfo`; the range may differ between domains.
     """
 
@@ -130,6 +138,7 @@ class Template:
     minimum: PerDomain
     maximum: PerDomain
     row: bool = False
+    whole: bool = False
 
     def within(self, domain: Domain | None) -> ParameterInfo:
         """Return what is said of the number in a domain.
@@ -140,10 +149,11 @@ class Template:
             Of the part; ``None`` where it has none and the unit is the same everywhere.
         """
         if domain is None:
-            return ParameterInfo(self.unit, self.description, _of(self.minimum), _of(self.maximum), self.row)
+            least, most = _of(self.minimum), _of(self.maximum)
+            return ParameterInfo(self.unit, self.description, least, most, self.row, whole=self.whole)
         return ParameterInfo(
             domain.unit(self.unit), self.description, _of(self.minimum, domain), _of(self.maximum, domain),
-            self.row, domain.name if "{" in self.unit else "",
+            self.row, domain.name if "{" in self.unit else "", self.whole,
         )  # fmt: skip
 
 
@@ -161,6 +171,7 @@ def parameter(
     maximum: PerDomain = math.inf,
     default: float | tuple[float, ...] | None = None,
     row: bool = False,
+    whole: bool = False,
 ) -> Any:
     """Declare a number of a part as a dataclass field.
 
@@ -176,8 +187,10 @@ def parameter(
         Value in SI where there is a natural one; such a value is marked as assumed. Not for a template.
     row
         Whether it may be a row of numbers.
+    whole
+        Whether it counts something.
     """
-    template = Template(unit, description, minimum, maximum, row)
+    template = Template(unit, description, minimum, maximum, row, whole)
     if default is None:
         return dataclasses.field(metadata={"parameter": template})
     value = Quantity(default, unit, "assumed: default of the component")

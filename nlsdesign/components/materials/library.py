@@ -9,6 +9,7 @@ from typing import Any
 
 from ...deck import NUMBER_FIELDS, Deck, read_deck
 from ...errors import DeckError, nearest, unknown_name
+from ...extensions import extension_files
 from ...locations import folder
 from ...quantity import Quantity, same_dimension, with_unit
 from ...reading import text_of
@@ -19,6 +20,7 @@ CONDITIONS = {"strain": "1", "strain_rate": "1/s", "frequency": "Hz", "temperatu
 """Under what a value was found, with the unit of each."""
 _WORDS = ("family", "grade", "remark")
 _LONGEST_ROW = 6
+_FILE = "materials.toml"
 
 
 @dataclass(frozen=True)
@@ -135,21 +137,33 @@ def materials(path: Path | None = None) -> dict[str, Material]:
     Parameters
     ----------
     path
-        TOML file; the library that comes with the project if it is left out.
+        TOML file; if it is left out, the library that comes with the project, and those of packages that the
+        present block is extended by.
 
     Raises
     ------
     NlsError
         If an entry is not sound; file, line, column and field are named.
     DeckError
-        If the file cannot be read.
+        If the file cannot be read, or a rubber stands in two libraries.
 
     Examples
     --------
     >>> materials()["butyl_rubber"]["loss_tangent"].shown
     '0.2 to 0.5'
     """
-    chosen = path or folder("models") / "materials.toml"
+    if path is not None:
+        return _library(path)
+    known = _library(folder("models") / _FILE)
+    for file in extension_files(_FILE):
+        for name, brought in _library(file).items():
+            if known.setdefault(name, brought) is not brought:
+                rule = f"'{name}' stands in another library already"
+                raise DeckError(str(file), rule, next_step="give it another name")
+    return known
+
+
+def _library(chosen: Path) -> dict[str, Material]:
     deck = read_deck(text_of(chosen, DeckError), chosen)
     return {name: _material(deck, name, table) for name, table in deck.tables.items()}
 

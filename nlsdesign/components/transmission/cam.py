@@ -53,6 +53,7 @@ class Cam(Part):
         minimum=1.0,
         maximum=100.0,
         default=1.0,
+        whole=True,
     )
     cable: Reading = read_as(NotDeclared, Cable, default=NotDeclared())
 

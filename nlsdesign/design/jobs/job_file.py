@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from ...deck import Deck, read_deck
 from ...errors import DeckError, NlsError, UnitError, brief, unknown_name
-from ...quantity import Quantity, quantity
+from ...quantity import Quantity, quantity, split_number
 from ...reading import text_of
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
@@ -316,16 +316,12 @@ def _plain(raw: object, place: str) -> float:
 
 
 def _number(text: str, place: str) -> Quantity:
-    head, _, tail = text.strip().partition(" ")
     try:
-        number = float(head)
-    except ValueError:
-        raise UnitError(
-            f"{place} = '{text}'", "does not start with a number", next_step="write for instance '20 mm'"
-        ) from None
-    return _placed(
-        lambda: quantity(number, tail.strip() or "1", source="asked for in the design file"), place
-    )
+        number, unit = split_number(text)
+    except UnitError as error:
+        step = "write for instance '20 mm'"
+        raise UnitError(f"{place} = '{text}'", error.rule, next_step=step) from None
+    return _placed(lambda: quantity(number, unit or "1", source="asked for in the design file"), place)
 
 
 def _stock(deck: Deck) -> Iterator[StockChoice]:

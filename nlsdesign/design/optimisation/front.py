@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ValueRangeError
 from ...quantity import parse_unit, typeset_unit
+from ...tables import Axis, data_frame
 from ...writing import write_table
 from ..curves.target import Target
 from .finish import SolvedSearch, finished
@@ -126,6 +127,20 @@ class ParetoFront:
         """
         head, rows = self._table()
         write_table(path, [head, *rows])
+
+    def to_frame(self) -> Any:
+        """Return a ``pandas.DataFrame``, one row for each point, units in its ``attrs``; needs pandas.
+
+        Goals are in the units in which they are shown, free numbers in SI.
+        """
+        columns: dict[str, Any] = {goal: self.shown[:, k] for k, goal in enumerate(self.goals)}
+        units = dict(zip(self.goals, self.units, strict=True))
+        first = self.points[0]
+        for k, (name, _) in enumerate(first.numbers):
+            columns[name] = [point.numbers[k][1] for point in self.points]
+        columns["binding limits"] = ["; ".join(point.binding) for point in self.points]
+        numbers = {name: unit for (name, _), unit in zip(first.numbers, first.units, strict=True)}
+        return data_frame(columns, units=units | numbers, index=Axis("point", "", range(len(self.points))))
 
     def _table(self) -> tuple[list[str], list[list[str]]]:
         first = self.points[0]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
 from ...quantity import Quantity, parse_unit, with_unit
+from ...tables import Axis, data_frame
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
@@ -300,6 +302,15 @@ class CamDesign:
         """Twelve hexadecimal digits that stand for the numbers."""
         return fingerprint(self.values)
 
+    def to_frames(self) -> dict[str, Any]:
+        """Return ``pandas.DataFrame`` objects by name; needs pandas.
+
+        ``numbers`` has the changed numbers, ``limits`` the state of each limit, ``torque`` the check against
+        the target over the angle, ``curves`` what the optimiser saw of cam and rubber. Rows of the first
+        two are in the unit that they name, the others in SI.
+        """
+        return design_frames(self)
+
     def rows(self) -> list[tuple[str, str]]:
         """Return a table of what was found: pairs of text."""
         return result_rows(self)
@@ -309,6 +320,48 @@ class CamDesign:
         width = max(len(name) for name, _ in rows)
         lines = ["cam design", *(f"  {name:<{width}}  {text}" for name, text in rows)]
         return "\n".join([*lines, "  limits", *(f"    {state}" for state in self.limits)])
+
+
+def _in_its_unit(state: LimitState) -> LimitState:
+    factor = parse_unit(state.unit).factor
+    return replace(state, value=state.value / factor, bound=state.bound / factor)
+
+
+def design_frames(design: CamDesign) -> dict[str, Any]:
+    """Return the tables of a design as data frames; see :meth:`CamDesign.to_frames`.
+
+    Parameters
+    ----------
+    design
+        Finished.
+    """
+    rows = [
+        (name if len(q.values) == 1 else f"{name}[{k}]", each, q.unit, q.source, q.spread)
+        for name, q in design.changes
+        for k, each in enumerate(np.atleast_1d(np.asarray(q.shown)).tolist(), start=1)
+    ]
+    keys = ("name", "value", "unit", "source", "spread")
+    limits = [_in_its_unit(state) for state in design.limits]
+    check, curves = design.check, design.curves
+    torque = {"torque": check.torques, "target": check.targets, "error": check.errors}
+    over = {
+        "lever_arm": curves.lever_arms, "radius": curves.radii, "torque": curves.torques,
+        "radius_of_curvature": curves.radii_of_curvature, "stiffness": curves.stiffnesses,
+        "extension": curves.extensions, "force": curves.forces,
+    }  # fmt: skip
+    units = {"lever_arm": "m", "radius": "m", "radius_of_curvature": "m", "torque": "N*m",
+             "stiffness": "N*m/rad", "extension": "m", "force": "N"}  # fmt: skip
+    for what, unit, by_path in (("strain", "1", curves.strains), ("stress", "Pa", curves.stresses)):
+        over |= {f"{path}.{what}": values for path, values in by_path.items()}
+        units |= {f"{path}.{what}": unit for path in by_path}
+    return {
+        "numbers": data_frame({key: [row[k] for row in rows] for k, key in enumerate(keys)}),
+        "limits": data_frame({f.name: [getattr(s, f.name) for s in limits] for f in fields(LimitState)}),
+        "torque": data_frame(
+            torque, units=dict.fromkeys(torque, "N*m"), index=Axis("angle", "rad", check.angles)
+        ),
+        "curves": data_frame(over, units=units, index=Axis("angle", "rad", curves.angles)),
+    }
 
 
 def result_rows(design: CamDesign) -> list[tuple[str, str]]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from ...quantity import parse_unit, with_unit
+from ...tables import Axis, data_frame
 from ..curves.target import Target
 from .causes import Cause
 
@@ -223,6 +225,27 @@ class ToleranceResult:
         if self.held:
             rows.append(("held", f"a number was held at the end of its range in {self.held} draws"))
         return rows
+
+    def to_frames(self) -> dict[str, Any]:
+        """Return ``pandas.DataFrame`` objects by name, in SI; needs pandas.
+
+        ``causes`` has one row for each cause, ``draws`` the rms torque error of each draw as built and after
+        each trim, ``band`` the torque without deviations and those that 5, 50 and 95 % of the springs lie
+        below, over the angle.
+        """
+        figures = ("share", "share_after_trim", "alone", "halved", "measured", "halved_after_trim",
+                   "measured_after_trim")  # fmt: skip
+        causes = {"cause": [each.cause.name for each in self.causes]}
+        causes |= {name: [getattr(each, name) for each in self.causes] for name in figures}
+        draws = {"as_built": self.errors} | {trim.name: trim.errors for trim in self.trims}
+        band = {"nominal": self.nominal} | dict(zip(("p05", "p50", "p95"), self.band, strict=True))
+        return {
+            "causes": data_frame(causes, units=dict.fromkeys(figures[2:], "N*m")),
+            "draws": data_frame(draws, units=dict.fromkeys(draws, "N*m")),
+            "band": data_frame(
+                band, units=dict.fromkeys(band, "N*m"), index=Axis("angle", "rad", self.angles)
+            ),
+        }
 
     def table(self) -> list[tuple[str, ...]]:
         """Return the causes as rows of text under a head: shares in per cent, 95 % quantiles in mN·m rms."""

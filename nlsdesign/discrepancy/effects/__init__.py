@@ -8,24 +8,36 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Iterator
+from types import ModuleType
 
-from ...errors import unknown_name
+from ...errors import ArrangementError, unknown_name
+from ...extensions import extension_modules
 from .candidate import Candidate, EffectFunction, Unknown, wrapped
 from .effect import Edit, Effect, Form, Ranked, ranked
 
 
-def _rows() -> Iterator[Effect | Ranked]:
+def _own() -> Iterator[ModuleType]:
     for listed in pkgutil.iter_modules(__path__, f"{__name__}."):
-        module = importlib.import_module(listed.name)
-        yield from (value for value in vars(module).values() if isinstance(value, Effect | Ranked))
+        yield importlib.import_module(listed.name)
 
 
 def catalogue() -> tuple[Effect | Ranked, ...]:
     """Return the effects of all modules of this room, in the order of their ranks.
 
-    The order decides between effects that the records cannot tell apart.
+    Those of packages that the present block is extended by are among them. The order decides between effects
+    that the records cannot tell apart.
+
+    Raises
+    ------
+    ArrangementError
+        If two effects have one name.
     """
-    by_name = {row.__name__: row for row in _rows()}
+    by_name: dict[str, Effect | Ranked] = {}
+    for module in (*_own(), *extension_modules()):
+        for row in vars(module).values():
+            if isinstance(row, Effect | Ranked) and by_name.setdefault(row.__name__, row) is not row:
+                rule = f"has an effect '{row.__name__}', and so has the catalogue"
+                raise ArrangementError(module.__name__, rule, next_step="give it another identifier")
     return tuple(sorted(by_name.values(), key=lambda row: row.rank))
 
 

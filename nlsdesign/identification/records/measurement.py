@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import MeasurementError, nearest, unknown_name
+from ...errors import MeasurementError, nearest, unknown_name, visible
 from ...model import FlatModel
 from ...quantity import parse_unit
 from ...simulation import Trace
@@ -61,6 +61,10 @@ class Record:
     source: str = ""
     resolution: Mapping[str, Resolution] = field(default_factory=dict)
     masked: Mapping[str, Mask] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        # Names of files may hold anything.
+        object.__setattr__(self, "name", visible(self.name))
 
     @property
     def step(self) -> float:

@@ -209,7 +209,9 @@ class AngleForm:
             raise ArrangementError(
                 f"observer: rate of '{self.model.states[self.order[worst]].name}'",
                 "is not a sum of functions of angle, speed and inputs, and a part linear in the other states",
-                next_step="hysteresis led by the speed, or a moving load, has no observer over one angle",
+                next_step="friction inside the spring that follows its speed, as of a cable on a guide "
+                "(CapstanFriction), and a load that moves have no observer over one angle: take the "
+                "friction out of the spring, or hold the load",
             )
 
     def affine_error(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,7 @@ from ...quantity import three_digits
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior, declared_prior
 from ...simulation.sampled_batch import PLANT, BatchTrace, run_batch
+from ...tables import Axis, data_set
 from ..adaptive.adaptive_observer import encoder_quantum
 from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from .observer_bench import ObserverBench
@@ -112,6 +114,20 @@ class SpreadErrors:
         place = self.observers.index(observer)
         sizes = {name: math.sqrt(float(np.mean(each[place] ** 2))) for name, each in self.causes.items()}
         return sorted(sizes.items(), key=lambda item: -item[1])
+
+    def to_xarray(self) -> Any:
+        """Return an ``xarray.Dataset`` over observer, frequency in Hz, draw and cause; needs xarray."""
+        names, over = tuple(self.causes), ("observer", "frequency")
+        data = {
+            "exact": (over, self.exact),
+            "drawn": (("observer", "draw", "frequency"), self.drawn),
+            "causes": (("cause", *over), np.array([self.causes[name] for name in names])),
+        } | ({"bound": (("frequency",), self.bound)} if len(self.bound) else {})
+        axes = [
+            Axis("observer", "", list(self.observers)), Axis("frequency", "Hz", list(self.frequencies)),
+            Axis("draw", "", np.arange(self.drawn.shape[1])), Axis("cause", "", list(names)),
+        ]  # fmt: skip
+        return data_set(data, axes=axes, units=dict.fromkeys(data, self.unit))
 
     def rows(self) -> list[list[str]]:
         """Return a table: observer, frequency, error with exact numbers, median and 90 % over the spread."""

@@ -1,0 +1,104 @@
+"""``nlsdesign completion``: the script by which a shell completes commands, decks, materials and studies."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem, ShellComplete, get_completion_class
+
+from ..deck import deck_names
+from ..locations import folder
+from .output import examples, json_option, show_json
+
+INSTALL = {
+    "bash": "nlsdesign completion bash > ~/.local/share/bash-completion/completions/nlsdesign",
+    "zsh": "nlsdesign completion zsh > ~/.zfunc/_nlsdesign, with fpath+=~/.zfunc and autoload -Uz compinit; "
+    "compinit in ~/.zshrc",
+    "fish": "nlsdesign completion fish > ~/.config/fish/completions/nlsdesign.fish",
+}
+COMPLETE = "_NLSDESIGN_COMPLETE"
+"""Variable by which a shell asks for completions, whatever the program is started by."""
+
+
+@click.command(epilog=examples("nlsdesign completion bash", "nlsdesign completion zsh --json"))
+@click.argument("shell", type=click.Choice(list(INSTALL)))
+@json_option
+@click.pass_context
+def completion(context: click.Context, /, shell: str, as_json: bool) -> None:
+    """Print the script that makes a shell complete commands, options, decks, materials and studies.
+
+    A comment on top says where to put it; it takes effect in a new shell.
+    """
+    kind = get_completion_class(shell)
+    assert kind is not None, "click knows each of these shells"
+    # The class for bash asks the bash of this machine for its version; the script may be for another one.
+    script = ShellComplete.source(kind(context.find_root().command, {}, "nlsdesign", COMPLETE))
+    # The script for zsh is known by its first line.
+    first, mark, rest = script.partition("\n") if script.startswith("#compdef") else ("", "", script)
+    if as_json:
+        show_json({"shell": shell, "install": INSTALL[shell], "script": script})
+        return
+    click.echo(f"{first}{mark}# To install: {INSTALL[shell]}\n{rest}")
+
+
+def _decks() -> list[str]:
+    return deck_names()
+
+
+def _materials() -> list[str]:
+    with (folder("models") / "materials.toml").open("rb") as stream:
+        return sorted(name for name, each in tomllib.load(stream).items() if isinstance(each, dict))
+
+
+def _studies() -> list[str]:
+    from .studies import study_names
+
+    return study_names()
+
+
+def _templates() -> list[str]:
+    return sorted(path.stem for path in (folder("models") / "templates").glob("*.toml"))
+
+
+_NAMES: dict[str, tuple[Callable[[], list[str]], bool]] = {
+    "DECK": (_decks, True),
+    "MATERIAL": (_materials, False),
+    "STUDY": (_studies, True),
+    "TEMPLATE": (_templates, False),
+}
+"""What gives the names, and whether a file can be given as well, by the word that stands in a help text."""
+
+
+def complete_names(program: click.Group) -> None:
+    """Let all parameters of a program that take the name of a deck, material, study or template complete it.
+
+    Parameters
+    ----------
+    program
+        With all its commands.
+    """
+    for command in _commands(program):
+        for parameter in command.params:
+            word = (parameter.metavar or "").strip("[]")
+            if parameter.name == "material":
+                word = "MATERIAL"
+            if word in _NAMES:
+                parameter._custom_shell_complete = _completer(*_NAMES[word])
+
+
+def _commands(command: click.Command) -> Iterator[click.Command]:
+    yield command
+    for inner in getattr(command, "commands", {}).values():
+        yield from _commands(inner)
+
+
+def _completer(names: Callable[[], list[str]], files: bool) -> Any:
+    def complete(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
+        # The scripts begin anew at a mark for files, so that stands first.
+        items = [CompletionItem(begun, type="file")] if files else []
+        return items + [CompletionItem(name) for name in names() if name.startswith(begun)]
+
+    return complete

@@ -1,0 +1,195 @@
+"""``--out`` with ``--force`` and ``--dry-run``: nothing is replaced that somebody has changed or brought."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+import click
+
+from ..written_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
+from .output import show_json
+
+F = TypeVar("F", bound=Callable[..., Any])
+Names: TypeAlias = Iterable[str] | Callable[[Mapping[str, Any]], Iterable[str]]
+"""Names of files or suffixes, or what gives them from the options of a command."""
+
+force_option = click.option(
+    "--force", is_flag=True, help="Replace files that were changed, or that nlsdesign has not written."
+)
+dry_run_option = click.option(
+    "--dry-run", is_flag=True, help="Only list what would be written or replaced; exit status 1 if a file "
+    "would be refused."
+)  # fmt: skip
+
+
+def out_option(default: str = "out", *, writes: Names = ()) -> Callable[[F], F]:
+    """Return the option ``--out`` for a folder, with ``--force`` and ``--dry-run``.
+
+    Parameters
+    ----------
+    default
+        Folder if none is given.
+    writes
+        Files that the command writes there, so far as their names are known beforehand. Those that an earlier
+        run has listed there are looked at too where none is named.
+    """
+    kind = click.Path(path_type=Path, file_okay=False)
+    text = "Folder for all files that are written."
+    option = click.option(
+        "--out", type=kind, default=default, show_default=True, help=text, callback=can_be_made
+    )
+
+    def below(given: Mapping[str, Any]) -> tuple[Path, list[Path]]:
+        folder: Path = given["out"]
+        names = list(writes(given) if callable(writes) else writes)
+        return folder, [folder / name for name in names] or listed_files(folder)
+
+    return _guarded(option, below)
+
+
+def out_file_option(default: str | None, text: str, *, beside: Names = ()) -> Callable[[F], F]:
+    """Return the option ``--out`` for a file, with ``--force`` and ``--dry-run``.
+
+    Parameters
+    ----------
+    default
+        File if none is given; ``None`` where it must be given.
+    text
+        Help.
+    beside
+        Suffixes of further files of the same stem, or what gives them from the options.
+    """
+    kind = click.Path(path_type=Path, dir_okay=False)
+    shown = {"default": default, "show_default": True} if default else {"required": True}
+    option = click.option("--out", type=kind, help=text, callback=_file_can_be_made, **shown)
+
+    def files(given: Mapping[str, Any]) -> tuple[Path, list[Path]]:
+        out: Path = given["out"]
+        suffixes = beside(given) if callable(beside) else beside
+        return out.parent, [out, *(out.with_suffix(each) for each in suffixes)]
+
+    return _guarded(option, files)
+
+
+def _guarded(
+    option: Callable[[Any], Any], files: Callable[[Mapping[str, Any]], tuple[Path, list[Path]]]
+) -> Callable[[F], F]:
+    def decorate(command: F) -> F:
+        @functools.wraps(command)
+        def guarded(*words: Any, **given: Any) -> Any:
+            force, dry_run = given.pop("force"), given.pop("dry_run")
+            only_asked = click.get_current_context().invoked_subcommand is not None or given.get("listed")
+            if only_asked:
+                return command(*words, **given)
+            folder, paths = files(given)
+            if dry_run:
+                return list_files(paths, folder, as_json=given.get("as_json", False))
+            with kept(folder, paths, force=force):
+                return command(*words, **given)
+
+        result: F = option(force_option(dry_run_option(guarded)))
+        return result
+
+    return decorate
+
+
+def c_names(name: str) -> tuple[str, str, str]:
+    """Return the files of an export as C.
+
+    Parameters
+    ----------
+    name
+        Of what is exported.
+    """
+    return f"{name}.h", f"{name}.c", f"{name}_selftest.c"
+
+
+@contextmanager
+def kept(folder: Path, paths: Iterable[Path], *, force: bool = False) -> Iterator[None]:
+    """Refuse at once what would be lost, and say at the end what was written beside.
+
+    Parameters
+    ----------
+    folder
+        Where a command writes.
+    paths
+        Files whose names are known beforehand.
+    force
+        Whether everything may be replaced.
+
+    Raises
+    ------
+    ExportError
+        If a file was changed, or not written by this package.
+    """
+    if not force:
+        refuse_to_lose(paths)
+    with keeping(folder, force=force) as done:
+        try:
+            yield
+        finally:
+            for target, place in done.beside.items():
+                words = f"{target} {WORDS[file_state(target)]} and was kept; the new one is {place}"
+                click.echo(f"warning: {words}", err=True)
+
+
+def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool) -> None:
+    """Print what would be written or replaced, and end with status 1 if a file would be refused.
+
+    Parameters
+    ----------
+    paths
+        Files whose names are known beforehand.
+    folder
+        Where the command writes.
+    as_json
+        Whether JSON is printed.
+    """
+    states = {path: file_state(path) for path in paths}
+    refused = [path for path, state in states.items() if state in ("changed", "foreign")]
+    if as_json:
+        show_json({"folder": folder, "files": {str(p): s for p, s in states.items()}, "refused": refused})
+    else:
+        for path, state in states.items():
+            verb = {"new": "write", "as written": "replace"}.get(state, "refuse to replace")
+            click.echo(f"would {verb}: {path}, which {WORDS[state]}")
+        if not states:
+            click.echo(f"the names of the files in {folder} are not known before the work")
+    sys.exit(1 if refused else 0)
+
+
+def can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
+    """Refuse, before any work, a folder that could not be written into; it is made with its first file.
+
+    Parameters
+    ----------
+    folder
+        As it was given.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is below a file, or may not be written.
+    """
+    try:
+        place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    except OSError as error:
+        raise click.BadParameter(f"{folder} cannot be made: {error.strerror}") from None
+    if not place.is_dir():
+        raise click.BadParameter(f"{folder} cannot be made: {place} is a file")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise click.BadParameter(f"{folder} cannot be made: {place} is not writable")
+    return folder
+
+
+def _file_can_be_made(context: click.Context, parameter: click.Parameter, file: Path | None) -> Path | None:
+    """Refuse, before any work, a file whose folder could not be written into."""
+    if file is not None:
+        can_be_made(context, parameter, file.parent)
+    return file

@@ -1,0 +1,97 @@
+"""Warnings of commands: laws that are used beyond their stated range, angles beyond the end of a cam."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import click
+
+from ..errors import visible
+
+if TYPE_CHECKING:
+    from ..components.assembly.named_parts import Assembly
+    from ..model import FlatModel
+
+_COUNT = 41
+
+
+def range_remarks(
+    declared: Assembly, *, last: float | None = None, first: float | None = None, measured: str | None = None
+) -> list[str]:
+    """Return what is to be known of the angles that a command goes over, with the next step.
+
+    Parameters
+    ----------
+    declared
+        As the deck declares it.
+    last, first
+        Ends of the angles in rad; by default those of the contour of the cams, or ±90° where there is none.
+    measured
+        State that is swept; decided from the structure if it is left out.
+    """
+    import numpy as np
+
+    from ..analysis import ranges_at_rest
+    from ..errors import NlsError
+    from ..model import flatten
+    from ..observer.scheduling.scheduled import whole_contour
+    from .analyse_angle import swept_angle
+
+    try:
+        model = flatten(declared)
+        reach = whole_contour(model).upper
+        high = reach if last is None else last
+        angles = np.linspace(-high if first is None else first, high, _COUNT)
+        left = ranges_at_rest(model, angles, angle=swept_angle(model, measured))
+    except NlsError:
+        # Without an angle to go over, or a rest on it, the command itself says what is wrong.
+        return []
+    remarks = [] if last is None else beyond_contour(model, (angles[0], high))
+    for each in left:
+        law = type(_part(declared, each.part)).__name__
+        remarks.append(
+            f"{each} ({law}) -> take a law that is stated to hold so far, such as one fitted to a measured "
+            "curve (nlsdesign materials), or keep the stretch smaller: more rest length, less pretension or "
+            "angle"
+        )
+    return remarks
+
+
+def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
+    """Return which cams end before an angle.
+
+    Parameters
+    ----------
+    model
+        Flat model of the machine.
+    angles
+        In rad.
+    """
+    furthest = max(abs(angle) for angle in angles)
+    cams = [cam for spring in model.springs for cam in spring.cams if cam.last_angle]
+    return [
+        f"the contour of {cam.name} ends at {math.degrees(model.values[cam.last_angle or '']):.4g}°, the "
+        f"angles go to {math.degrees(furthest):.4g}°: beyond its end the lever arm stays what it is there -> "
+        "stay within it (--to), or declare a longer contour"
+        for cam in cams
+        if furthest > model.values[cam.last_angle or ""] * (1.0 + 1e-9)
+    ]
+
+
+def warn(remarks: Iterable[str]) -> None:
+    """Print remarks where they do not mix with what a command prints for others to read.
+
+    Parameters
+    ----------
+    remarks
+        Sentences.
+    """
+    for remark in remarks:
+        click.echo(f"warning: {visible(remark)}", err=True)
+
+
+def _part(declared: Assembly, path: str) -> object:
+    part = declared[path]
+    return getattr(part, "element", part)

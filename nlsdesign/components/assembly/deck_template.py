@@ -1,0 +1,262 @@
+"""Templates: ordinary decks with comments, whose numbers and rubber are replaced line by line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ...deck import Deck, read_deck
+from ...errors import DeckError, unknown_name
+from ...locations import folder
+from ...quantity import Quantity
+from ..mechanics.bodies import GearedMotor
+from ..mechanics.gear import Gear
+from ..mechanics.motor import ElectricMotor
+from .deck_writer import declare
+from .named_parts import Assembly
+from .part_text import number_of, text_of
+
+GIVEN = "assumed: given when the deck was made; say here where it is from"
+"""Source of a number that was given without one."""
+ROTOR, OUTPUT = PLACES = ("rotor", "output")
+"""Where the inertia of a motor may be given: in front of the gear, or behind it."""
+_ASKED, _READY = "# Asked: ", "# Ready for: "
+
+
+@dataclass(frozen=True)
+class Question:
+    """A number that a template asks for.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    meaning
+        One line.
+    usual
+        The number of the template.
+    """
+
+    name: str
+    meaning: str
+    usual: Quantity
+
+
+@dataclass(frozen=True)
+class DeckTemplate:
+    """A deck to begin with.
+
+    Parameters
+    ----------
+    name
+        For instance ``"cam-actuator"``.
+    text
+        TOML; a comment ``# Asked: ...`` stands above each number that is asked for, and ``# Ready for: ...``
+        names the commands that the template is meant for.
+    """
+
+    name: str
+    text: str
+
+    @property
+    def deck(self) -> Deck:
+        """The template as a deck."""
+        return read_deck(self.text, Path(f"{self.name}.toml"))
+
+    @property
+    def ready_for(self) -> tuple[str, ...]:
+        """The commands that the template is meant for."""
+        line = next(line for line in self.text.splitlines() if line.startswith(_READY))
+        return tuple(line.removeprefix(_READY).split(", "))
+
+    def questions(self) -> list[Question]:
+        """Return the numbers that are asked for, in written order."""
+        deck, lines = self.deck, self.text.splitlines()
+        return [
+            Question(name, lines[number - 2].removeprefix(_ASKED), deck.quantity(name))
+            for name in deck.numbers()
+            if (number := deck.places[name][0]) > 1 and lines[number - 2].startswith(_ASKED)
+        ]
+
+    def materials(self) -> dict[str, str]:
+        """Return the rubber of the library that each piece is made of, by the name of its field."""
+        return dict(_materials("", self.deck.tables))
+
+    def carried(self, at: MotorInertia, numbers: Mapping[str, Quantity]) -> dict[str, Quantity]:
+        """Return the inertia of the motor at the output where a gear has another ratio than the template.
+
+        Parameters
+        ----------
+        at
+            Of this template.
+        numbers
+            In place of those of the template, by full name.
+
+        Returns
+        -------
+        dict
+            The inertia by its name; empty where the ratio is that of the template, where the inertia itself
+            is given, or where it is that of the rotor, which no gear changes.
+        """
+        if at.place == ROTOR or at.ratio not in numbers or at.name in numbers:
+            return {}
+        usual, ratio, new = self.deck.quantity(at.name), self.deck.quantity(at.ratio), numbers[at.ratio]
+        factor = (new.number / ratio.number) ** 2
+        source = f"{usual.source}; times ({new}/{ratio})^2, for another gear ratio"
+        return {at.name: Quantity(float(f"{usual.number * factor:.6g}"), usual.unit, source, usual.spread)}
+
+    def filled(
+        self,
+        name: str,
+        *,
+        numbers: Mapping[str, Quantity] | None = None,
+        material: str | None = None,
+    ) -> str:
+        """Return the text of a deck of one's own; it was read once and declares a machine.
+
+        Parameters
+        ----------
+        name
+            Of the deck.
+        numbers
+            In place of those of the template, by full name; one without a spread keeps that of the template.
+        material
+            Rubber of the library, in place of that of the template.
+
+        Raises
+        ------
+        UnknownNameError
+            If the template has no such number.
+        DeckError
+            If a rubber is named and the template has none.
+        NlsError
+            If the deck does not declare a machine with these numbers.
+        """
+        deck, lines = self.deck, self.text.splitlines()
+        for full, given in (numbers or {}).items():
+            if full not in deck.numbers():
+                raise unknown_name(f"template {self.name}: number", full, deck.numbers())
+            kept = given if given.spread else replace(given, spread=deck.quantity(full).spread)
+            lines[deck.places[full][0] - 1] = f"{full.rpartition('.')[2]} = {number_of(kept)}"
+        lines[deck.places["deck.name"][0] - 1] = f"name = {text_of(name)}"
+        if material is not None:
+            if not self.materials():
+                rule = "has no piece of rubber, so no material belongs to it"
+                raise DeckError(f"template {self.name}", rule, next_step="leave --material out")
+            for field in self.materials():
+                lines[deck.places[field][0] - 1] = f"material = {text_of(material)}"
+        lines = [f"# {line.removeprefix(_ASKED)}." if line.startswith(_ASKED) else line for line in lines]
+        text = "\n".join(lines) + "\n"
+        declare(read_deck(text, Path(f"{name}.toml")))
+        return text
+
+
+def template_names() -> list[str]:
+    """Return the names of the templates that come with the project."""
+    return sorted(path.stem for path in (folder("models") / "templates").glob("*.toml"))
+
+
+def load_template(name: str) -> DeckTemplate:
+    """Return a template.
+
+    Parameters
+    ----------
+    name
+        One of :func:`template_names`.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest name that exists.
+    """
+    if name not in template_names():
+        raise unknown_name("template", name, template_names())
+    path = folder("models") / "templates" / f"{name}.toml"
+    return DeckTemplate(name, path.read_text(encoding="utf8"))
+
+
+@dataclass(frozen=True)
+class MotorInertia:
+    """Where a machine holds the inertia of its motor, and which gear lies between rotor and output.
+
+    Parameters
+    ----------
+    name
+        Full name of the inertia.
+    place
+        ``"rotor"`` or ``"output"``: where the component takes it.
+    ratio
+        Full name of the ratio of the gear.
+    """
+
+    name: str
+    place: str
+    ratio: str
+
+    def converted(self, given: Quantity, *, at: str, ratio: Quantity) -> Quantity:
+        """Return an inertia as the component takes it; the source says how it was converted.
+
+        Parameters
+        ----------
+        given
+            Inertia.
+        at
+            ``"rotor"`` or ``"output"``: where it was given.
+        ratio
+            Of the gear.
+        """
+        if at == self.place:
+            return replace(given, source=f"{given.source}, at the {at}")
+        squared = ratio.number**2
+        if at == ROTOR:
+            factor, how = squared, f"times the gear ratio squared, {ratio}^2"
+        else:
+            factor, how = 1.0 / squared, f"divided by the gear ratio squared, {ratio}^2"
+        return Quantity(
+            float(f"{given.number * factor:.12g}"),
+            given.unit,
+            f"{given.source}; {given} at the {at}, {how}",
+            given.spread,
+        )
+
+
+def motor_inertia(machine: Assembly) -> MotorInertia | None:
+    """Return where a machine holds the inertia of its motor; ``None`` where there is no gear.
+
+    Parameters
+    ----------
+    machine
+        As declared.
+    """
+    for name, part in machine.parts:
+        if isinstance(part, GearedMotor):
+            return MotorInertia(f"{name}.inertia", OUTPUT, f"{name}.gear_ratio")
+    for name, part in machine.parts:
+        if isinstance(part, Gear) and isinstance(machine[part.between[0]], ElectricMotor):
+            return MotorInertia(f"{part.between[0]}.inertia", ROTOR, f"{name}.ratio")
+    return None
+
+
+def plain_name(text: str) -> str:
+    """Return a name for a deck from the name of its file.
+
+    Parameters
+    ----------
+    text
+        Any.
+    """
+    return re.sub(r"\W+", "_", text).strip("_") or "deck"
+
+
+def _materials(path: str, table: Mapping[str, Any]) -> list[tuple[str, str]]:
+    found: list[tuple[str, str]] = []
+    for key, raw in table.items():
+        full = f"{path}.{key}" if path else key
+        if key == "material" and isinstance(raw, str):
+            found.append((full, raw))
+        elif isinstance(raw, Mapping):
+            found += _materials(full, raw)
+    return found

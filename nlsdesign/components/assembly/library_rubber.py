@@ -1,0 +1,102 @@
+"""Rubbers of the library in a deck: ``material = "..."`` in a piece stands for its laws and its strength."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from ...deck import Deck, Written
+from ...errors import DeckError, NlsError
+from ..materials.library import material
+from ..materials.material_law import MaterialLaw, law_of
+from ..materials.relaxing_rubber import relaxing_law_of
+from ..materials.specimen import Specimen, specimen
+from .part_text import part_lines
+
+MATERIAL, USING, LOSS = FIELDS = ("material", "using", "loss_tangent")
+"""Fields of a piece of rubber that name what the library knows."""
+_KNOWN = "library"
+
+
+def with_library_rubber(deck: Deck, path: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table of a piece with the laws and the strength of the rubber that it names.
+
+    What stands in the table itself comes first: a number of its own, a law in a table of the same name (with
+    a component it replaces the law of the library, without one it changes numbers of it), a further law.
+
+    Parameters
+    ----------
+    deck
+        For messages.
+    path
+        Full name of the table.
+    table
+        As read, with ``material``.
+
+    Raises
+    ------
+    DeckError
+        If a field is not a text, or there is nothing that the field could belong to.
+    NlsError
+        If there is no such rubber, with the nearest, or nothing that is known of it gives a law.
+    """
+    own = {key: raw for key, raw in table.items() if key not in FIELDS}
+    for key in (MATERIAL, USING):
+        if key in table and not isinstance(table[key], str):
+            raise DeckError(
+                deck.place(f"{path}.{key}"), f"is {table[key]!r}, not a text",
+                next_step='write the name of a rubber of `nlsdesign materials`, for instance "PMC-770"',
+            )  # fmt: skip
+    if MATERIAL not in table:
+        key = next(key for key in FIELDS if key in table)
+        rule = "belongs to a material of the library, and none is named"
+        raise DeckError(deck.place(f"{path}.{key}"), rule, next_step='add material = "..."')
+    try:
+        law = _law(deck, path, table)
+    except NlsError as error:
+        raise error.at(deck.place(f"{path}.{MATERIAL}")) from None
+    return _merged(_tables(law), own)
+
+
+def _law(deck: Deck, path: str, table: Mapping[str, Any]) -> MaterialLaw:
+    named, using = material(table[MATERIAL]), table.get(USING)
+    if LOSS not in table:
+        return law_of(named, using=using)
+    if table[LOSS] == _KNOWN:
+        return relaxing_law_of(named, using=using)
+    if isinstance(table[LOSS], str):
+        rule = f"is {table[LOSS]!r}, neither a number nor {_KNOWN!r}"
+        step = f'write "{_KNOWN}" for what is known of the rubber, or a number with unit "1" and source'
+        raise DeckError(LOSS, rule, next_step=step)
+    return relaxing_law_of(named, using=using, loss_tangent=deck.number(f"{path}.{LOSS}", table[LOSS]).number)
+
+
+def _tables(law: MaterialLaw) -> dict[str, Any]:
+    """Return the fields and tables of a piece of that rubber, as a deck has them, without its sizes."""
+    piece = specimen(rest_length=0.01, area=1e-4, section=None, strength=law.strength, **dict(law.members))
+    tables = tomllib.loads("\n".join(part_lines("piece", piece)), parse_float=Written)["piece"]
+    return {key: raw for key, raw in tables.items() if key not in ("component", "rest_length", "area")}
+
+
+def _merged(known: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of the library with what stands in the deck put over them."""
+    result = {**known, **own}
+    for key in own.keys() & known.keys():
+        law, other = known[key], own[key]
+        is_law = isinstance(law, dict) and "component" in law and isinstance(other, dict)
+        # Another component is another law, not other numbers of this one.
+        if is_law and other.get("component", law["component"]) == law["component"]:
+            result[key] = _merged(law, other)
+    return result
+
+
+def takes_material(kind: type) -> bool:
+    """Tell whether a component can be made of a rubber of the library.
+
+    Parameters
+    ----------
+    kind
+        The component.
+    """
+    return issubclass(kind, Specimen)

@@ -1,0 +1,76 @@
+"""Parts as the text of a deck: tables, numbers that read back exactly, texts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from decimal import Context
+from fractions import Fraction
+from itertools import chain
+
+from ...deck import Written
+from ...quantity import Quantity, parse_unit
+from ..core.part import Part
+
+
+def part_lines(
+    path: str, part: Part, *, structure: Sequence[str] = (), changed: Mapping[str, Quantity] | None = None
+) -> list[str]:
+    """Return the lines of a part and of everything in it, the first one empty.
+
+    Parameters
+    ----------
+    path
+        Full name of the table.
+    part
+        As declared.
+    structure
+        Lines that say where the part sits, such as ``between = ["motor"]``.
+    changed
+        Numbers that stand in place of those of the parts, by full name.
+    """
+    new = changed or {}
+    lines = ["", f"[{path}]", f"component = {text_of(type(part).__name__)}", *structure]
+    domain = part.stated_domain()
+    if domain:
+        lines.append(f"domain = {text_of(domain.name)}")
+    for name, declared in part.parameters().items():
+        lines.append(f"{name} = {number_of(new.get(f'{path}.{name}', declared))}")
+    for name, child in part.children().items():
+        lines += part_lines(f"{path}.{name}", child, changed=new)
+    return lines
+
+
+def number_of(given: Quantity) -> str:
+    """Return a number as an inline table that reads back as the same number.
+
+    Parameters
+    ----------
+    given
+        With unit, source and spread.
+    """
+    factor = parse_unit(given.unit).factor
+    items = [_shortest(v, factor) for v in given.values]
+    value = "[" + ", ".join(items) + "]" if isinstance(given.value, tuple) else items[0]
+    text = f"{{value = {value}, unit = {text_of(given.unit)}, source = {text_of(given.source)}"
+    return text + (f", spread = {given.spread!r}}}" if given.spread else "}")
+
+
+def text_of(text: str) -> str:
+    """Return a text as TOML writes it, which is as JSON does but for the delete character.
+
+    Parameters
+    ----------
+    text
+        Any.
+    """
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _shortest(value: float, factor: float) -> str:
+    """Return the shortest decimal that reads back as the same number in SI."""
+    exact = Fraction(value) / Fraction(factor)
+    short = (repr(float(f"{float(exact):.{digits}g}")) for digits in (6, 12, 15))
+    # Where no float times the factor is the value, the text has more digits than a float.
+    long = (str(Context(prec=n).divide(exact.numerator, exact.denominator)) for n in range(17, 40))
+    return next(text for text in chain(short, long) if Written(text).times(factor) == value)

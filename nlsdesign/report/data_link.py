@@ -1,0 +1,48 @@
+"""The numbers behind a figure, as a link that holds them."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import NamedTuple
+from urllib.parse import quote
+
+from ..figures import Figure
+from ..figures.figure_data import figure_data
+
+_NO_LETTERS = re.compile(r"[^a-z0-9]+")
+_KEPT = ",:[]{}()/ "
+"""Characters that need no escape in such a link; each escape would take three."""
+
+
+class DataLink(NamedTuple):
+    """A link that holds a file.
+
+    Parameters
+    ----------
+    name
+        Of the file, when it is saved.
+    link
+        The whole content.
+    """
+
+    name: str
+    link: str
+
+
+def data_link(figure: Figure, title: str) -> DataLink | None:
+    """Return the numbers that a figure shows as a link that holds them; none where it shows none.
+
+    Parameters
+    ----------
+    figure
+        Any figure.
+    title
+        Gives the file its name.
+    """
+    content = figure_data(figure)
+    if not content["panels"]:
+        return None
+    name = _NO_LETTERS.sub("_", title.lower()).strip("_")[:60] or "figure"
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
+    return DataLink(f"{name}.json", f"data:application/json;charset=utf-8,{quote(text, safe=_KEPT)}")

@@ -1,0 +1,116 @@
+"""Which declared limits a run reaches: of the drive, the sensors, the cam and the strength of materials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import FlatModel
+from ..model.declared_limits import declared_reading
+from ..quantity import with_unit
+from .trace import Trace
+
+Array = NDArray[np.float64]
+_ROUNDING = 1e-9
+
+
+class LimitReached(NamedTuple):
+    """A signal that goes beyond a declared number.
+
+    Parameters
+    ----------
+    name, unit
+        Of the signal.
+    time
+        Of the first sample beyond, in s.
+    furthest
+        Value furthest beyond.
+    limit
+        The declared number, with the sign of the side that is reached.
+    meaning
+        What the number is, and what holds beyond it.
+    """
+
+    name: str
+    unit: str
+    time: float
+    furthest: float
+    limit: float
+    meaning: str
+
+    def __str__(self) -> str:
+        reached, limit = (with_unit(f"{each:.4g}", self.unit) for each in (self.furthest, self.limit))
+        return f"{self.name} reaches {reached}, beyond {limit} from t = {self.time:.4g} s: {self.meaning}"
+
+
+def limits_reached(model: FlatModel, run: Trace) -> tuple[LimitReached, ...]:
+    """Return the declared limits that a run goes beyond.
+
+    Parameters
+    ----------
+    model
+        Continuous, with its declared numbers.
+    run
+        A simulation of it.
+    """
+    result = [*_drive(model, run), *_sensors(model, run), *_cams(model, run), *_strength(model, run)]
+    return tuple(sorted(result, key=lambda each: each.time))
+
+
+def _drive(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
+    for body in model.bodies:
+        motor = body.motor
+        if motor is None or motor.command not in run or motor.current_limit not in model.values:
+            continue
+        limit = model.values[motor.current_limit]
+        meaning = f"{motor.current_limit}, the drive gives no more"
+        yield from _beyond(run, motor.command or "", run[motor.command or ""], (-limit, limit), meaning)
+
+
+def _sensors(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
+    for reading in model.readings:
+        limits = declared_reading(model, reading.measured).limits
+        if limits is not None and reading.measured in run:
+            meaning = f"outside what {reading.sensors[0]} can show"
+            yield from _beyond(run, reading.measured, run[reading.measured], limits[:2], meaning)
+
+
+def _cams(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
+    for cam in (cam for spring in model.springs for cam in spring.cams):
+        if cam.last_angle is None or cam.angle not in run:
+            continue
+        last, angle = model.values[cam.last_angle], run[cam.angle]
+        # A cam that acts on one side has no lever arm on the other, where nothing ends.
+        acts = cam.lever_arm in run and bool(np.any(run[cam.lever_arm][angle < -last] != 0.0))
+        meaning = f"the contour of {cam.name} ends, its lever arm is held"
+        yield from _beyond(run, cam.angle, angle, (-last if acts else -math.inf, last), meaning)
+
+
+def _strength(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
+    values = model.values
+    pieces = [piece for spring in model.springs for cam in spring.cams for piece in cam.specimens]
+    for piece in pieces:
+        if piece.elongation_at_break in values and piece.strain in run:
+            limit = values[piece.elongation_at_break or ""]
+            meaning = f"{piece.elongation_at_break}, it breaks"
+            yield from _beyond(run, piece.strain, run[piece.strain], (-math.inf, limit), meaning)
+        if piece.tensile_strength in values and piece.force in run:
+            area = math.prod(values[name] for name in piece.section)
+            limit = area * values[piece.tensile_strength or ""]
+            meaning = f"{piece.tensile_strength} times its section, it breaks"
+            yield from _beyond(run, piece.force, run[piece.force], (-math.inf, limit), meaning)
+
+
+def _beyond(
+    run: Trace, name: str, values: Array, limits: tuple[float, float], meaning: str
+) -> Iterator[LimitReached]:
+    for side, limit in ((-1.0, limits[0]), (1.0, limits[1])):
+        over = side * (values - limit)
+        outside = np.flatnonzero(over > _ROUNDING * max(1.0, abs(limit)))
+        if math.isfinite(limit) and len(outside):
+            furthest = float(values[int(np.argmax(over))])
+            yield LimitReached(name, run.units[name], float(run.time[outside[0]]), furthest, limit, meaning)

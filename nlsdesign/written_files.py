@@ -1,0 +1,233 @@
+"""What was written into a folder, so that nothing is replaced that somebody has changed or brought.
+
+Every folder holds a small list, name → SHA-256 of what was written. While a command runs (:func:`keeping`), a
+file that is not as it was written is not replaced: what should have taken its place is written beside it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, Literal
+
+from .errors import ExportError
+
+LIST_NAME: Final = ".nlsdesign.json"
+"""Name of the list in each folder."""
+_FORMAT = "nlsdesign written files 1"
+_LARGEST = 1 << 24
+FileState = Literal["new", "as written", "changed", "foreign"]
+WORDS: Final[dict[FileState, str]] = {
+    "new": "is new",
+    "as written": "is as nlsdesign wrote it",
+    "changed": "was changed since nlsdesign wrote it",
+    "foreign": "was not written by nlsdesign",
+}
+
+
+@dataclass
+class Keeping:
+    """What a command may replace in one folder and below, and what it wrote beside instead.
+
+    Parameters
+    ----------
+    folder
+        Where it writes; other places are not looked at.
+    force
+        Whether everything may be replaced.
+    beside
+        Where the new file stands, by the file that was kept.
+    """
+
+    folder: Path
+    force: bool = False
+    beside: dict[Path, Path] = field(default_factory=dict)
+
+    def covers(self, path: Path) -> bool:
+        """Tell whether a file lies in the folder or below.
+
+        Parameters
+        ----------
+        path
+            Of the file.
+        """
+        return path.absolute().is_relative_to(self.folder.absolute())
+
+
+_now: ContextVar[Keeping | None] = ContextVar("keeping", default=None)
+
+
+@contextmanager
+def keeping(folder: Path, *, force: bool = False) -> Iterator[Keeping]:
+    """Keep what is not as it was written in a folder and below, and list what is written.
+
+    Parameters
+    ----------
+    folder
+        Where a command writes.
+    force
+        Whether everything may be replaced; what is written is listed all the same.
+    """
+    kept = Keeping(folder, force)
+    token = _now.set(kept)
+    try:
+        yield kept
+    finally:
+        _now.reset(token)
+
+
+def file_state(path: Path) -> FileState:
+    """Return whether a file is new, as it was written, changed since, or was never written here.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    """
+    # What stands in the way as a folder is refused by whoever writes.
+    if not os.path.lexists(path) or path.is_dir():
+        return "new"
+    stated = _listed(path.parent).get(path.name)
+    if stated is None:
+        return "foreign"
+    return "as written" if stated == _digest(path) else "changed"
+
+
+def listed_files(folder: Path) -> list[Path]:
+    """Return the files that were written into a folder and below, those that still exist, sorted.
+
+    Parameters
+    ----------
+    folder
+        To look through.
+    """
+    lists = sorted(folder.rglob(LIST_NAME)) if folder.is_dir() else []
+    return sorted(place for each in lists for name in _listed(each.parent)
+                  if (place := each.parent / name).exists())  # fmt: skip
+
+
+def refuse_to_lose(paths: Iterable[Path]) -> None:
+    """Refuse to begin where a file that would be replaced was changed or brought by somebody.
+
+    Parameters
+    ----------
+    paths
+        Of the files that will be written.
+
+    Raises
+    ------
+    ExportError
+        Naming the files.
+    """
+    lost = {path: state for path in paths if (state := file_state(path)) in ("changed", "foreign")}
+    if not lost:
+        return
+    first, *others = lost
+    more = f", and {len(others)} more: {', '.join(each.name for each in others[:5])}" if others else ""
+    raise ExportError(
+        str(first),
+        f"{WORDS[lost[first]]}{more}",
+        next_step="nothing was done; name another --out, add --force to replace, or --dry-run to list",
+    )
+
+
+def place_for(target: Path, draft: Path) -> Path:
+    """Return where a finished draft is to go: its target, or a place beside a file that must be kept.
+
+    Parameters
+    ----------
+    target
+        Where it should go.
+    draft
+        The finished file.
+    """
+    kept = _now.get()
+    if kept is None or kept.force or not kept.covers(target):
+        return target
+    if file_state(target) in ("new", "as written") or _digest(target) == _digest(draft):
+        return target
+    for number in range(1, 1000):
+        place = target.with_name(f"{target.stem}.new{number if number > 1 else ''}{target.suffix}")
+        if file_state(place) in ("new", "as written"):
+            kept.beside[target] = place
+            return place
+    raise ExportError(str(target), "was changed, and there is no free name beside it", next_step="tidy up")
+
+
+def note_written(path: Path) -> None:
+    """Write the name and digest of a written file into the list of its folder, while a command keeps one.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    """
+    kept = _now.get()
+    if kept is not None and kept.covers(path):
+        _write_list(path.parent, {**_listed(path.parent), path.name: _digest(path)})
+
+
+def discard(path: Path) -> None:
+    """Remove what an earlier run has left, unless a command keeps it because somebody changed or brought it.
+
+    Parameters
+    ----------
+    path
+        Of the file; need not exist.
+    """
+    kept = _now.get()
+    guarded = kept is not None and kept.covers(path)
+    if kept is not None and guarded and not kept.force and file_state(path) in ("changed", "foreign"):
+        return
+    path.unlink(missing_ok=True)
+    names = _listed(path.parent) if guarded else {}
+    if names.pop(path.name, None) is not None:
+        _write_list(path.parent, names)
+
+
+def _digest(path: Path) -> str:
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError:
+        return ""  # a folder of that name, or a file that must not be read: never as it was written
+
+
+def _listed(folder: Path) -> dict[str, str]:
+    """Return the list of a folder; a damaged one counts as none, so that nothing is replaced unasked."""
+    path = folder / LIST_NAME
+    try:
+        if path.stat().st_size > _LARGEST:
+            return {}
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    if not isinstance(content, dict) or content.get("format") != _FORMAT:
+        return {}
+    files = content.get("files")
+    if not isinstance(files, dict):
+        return {}
+    return {n: d for n, d in files.items() if isinstance(d, str) and d and Path(n).name == n}
+
+
+def _write_list(folder: Path, names: dict[str, str]) -> None:
+    """Write the list whole or not at all; without it the next run asks, so its failure loses nothing."""
+    text = json.dumps({"format": _FORMAT, "files": dict(sorted(names.items()))}, indent=1) + "\n"
+    try:
+        handle, name = tempfile.mkstemp(prefix=f"{LIST_NAME}.", dir=folder)
+    except OSError:
+        return
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+        os.chmod(name, 0o644)
+        os.replace(name, folder / LIST_NAME)
+    except OSError:
+        Path(name).unlink(missing_ok=True)

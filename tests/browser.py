@@ -1,0 +1,158 @@
+"""A headless Chromium without any library: its debugging protocol over two pipes.
+
+Pages are looked at as a reader has them: at a width, in a theme, on paper. Requests and messages of the
+console are collected.
+"""
+
+from __future__ import annotations
+
+import base64
+import fcntl
+import itertools
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def chromium() -> str | None:
+    """Return the program, or nothing where there is none."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+@dataclass
+class Tab:
+    """One page of a browser.
+
+    Parameters
+    ----------
+    commands, answers
+        Pipes to and from the browser; messages end with a null byte.
+    """
+
+    commands: IO[bytes]
+    answers: IO[bytes]
+    session: str = ""
+    requests: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
+    happened: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._numbers = itertools.count(1)
+        target = self.ask("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.ask(f"{domain}.enable")
+
+    def ask(self, method: str, /, **parameters: Any) -> dict[str, Any]:
+        """Send a command and return its result."""
+        number = next(self._numbers)
+        message: dict[str, Any] = {"id": number, "method": method, "params": parameters}
+        if self.session:
+            message["sessionId"] = self.session
+        self.commands.write(json.dumps(message).encode() + b"\0")
+        self.commands.flush()
+        while True:
+            answer = self._next()
+            if answer.get("id") == number:
+                assert "error" not in answer, f"{method}: {answer['error']}"
+                return dict(answer["result"])
+
+    def open(self, path: Path) -> None:
+        """Load a file and wait for it."""
+        self.requests.clear()
+        self.messages.clear()
+        self.happened.clear()
+        self.ask("Page.navigate", url=path.absolute().as_uri())
+        while "Page.loadEventFired" not in self.happened:
+            self._next()
+        self.evaluate("document.fonts.ready.then(() => 1)")
+
+    def look(self, width: int, *, height: int = 800, theme: str = "light") -> None:
+        """Show the page on a screen of a width in CSS pixels."""
+        self.ask(
+            "Emulation.setDeviceMetricsOverride", width=width, screenWidth=width, screenHeight=height, height=height, deviceScaleFactor=1,
+            mobile=width < 600,
+        )  # fmt: skip
+        wanted = [{"name": "prefers-color-scheme", "value": theme}]
+        self.ask("Emulation.setEmulatedMedia", media="screen", features=wanted)
+
+    def evaluate(self, expression: str) -> Any:
+        """Return the value of an expression of JavaScript."""
+        answer = self.ask("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def picture(self, path: Path) -> Path:
+        """Write the whole page as PNG."""
+        data = self.ask("Page.captureScreenshot", captureBeyondViewport=True)["data"]
+        path.write_bytes(base64.b64decode(data))
+        return path
+
+    def paper(self) -> bytes:
+        """Return the page as PDF, on A4."""
+        options = {"paperWidth": 8.27, "paperHeight": 11.69, "preferCSSPageSize": True}
+        self.ask("Emulation.setEmulatedMedia", media="")
+        return base64.b64decode(self.ask("Page.printToPDF", printBackground=True, **options)["data"])
+
+    def _next(self) -> dict[str, Any]:
+        text = bytearray()
+        while (letter := self.answers.read(1)) != b"\0":
+            assert letter, "the browser has ended"
+            text += letter
+        answer: dict[str, Any] = json.loads(text)
+        method, given = answer.get("method", ""), answer.get("params", {})
+        self.happened.append(method)
+        if method == "Network.requestWillBeSent":
+            self.requests.append(given["request"]["url"])
+        elif method == "Runtime.consoleAPICalled":
+            self.messages.append(" ".join(str(each.get("value")) for each in given["args"]))
+        elif method == "Runtime.exceptionThrown":
+            self.messages.append(str(given["exceptionDetails"]))
+        elif method == "Log.entryAdded":
+            self.messages.append(given["entry"]["text"])
+        return answer
+
+
+@contextmanager
+def browser() -> Iterator[Tab]:
+    """Start a browser with an empty profile; it has ended on leaving."""
+    program = chromium()
+    assert program is not None
+    command_end, our_commands = os.pipe()
+    our_answers, answer_end = os.pipe()
+    # The browser listens at 3 and answers at 4; copies far above leave those two free.
+    ends = [fcntl.fcntl(each, fcntl.F_DUPFD_CLOEXEC, 64) for each in (command_end, answer_end)]
+
+    def place() -> None:
+        for end, number in zip(ends, (3, 4), strict=True):
+            os.dup2(end, number)
+
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        options = [
+            "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe",
+            "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run",
+            f"--user-data-dir={profile}",
+        ]  # fmt: skip
+        started = subprocess.Popen(
+            [program, *options], pass_fds=(3, 4), preexec_fn=place,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        for end in ends:
+            os.close(end)
+        os.close(command_end)
+        os.close(answer_end)
+        with os.fdopen(our_commands, "wb") as commands, os.fdopen(our_answers, "rb", 1 << 20) as answers:
+            try:
+                yield Tab(commands, answers)
+            finally:
+                started.terminate()
+                started.wait(20)
