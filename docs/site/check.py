@@ -30,7 +30,9 @@ class _Page(HTMLParser):
         self.anchors |= {given[name] for name in ("id", "name") if given.get(name)}
         if tag == "a" and "href" in given:
             self.links.append(given["href"])
-        if tag == "link" and "stylesheet" in given.get("rel", "") or tag in _LOADED and _LOADED[tag] in given:
+        if (tag == "link" and "stylesheet" in given.get("rel", "")) or (
+            tag in _LOADED and _LOADED[tag] in given
+        ):
             self.loaded.append(given.get(_LOADED.get(tag, "href"), ""))
         if tag == "img" and not given.get("alt"):
             self.nameless.append(given.get("src", ""))

@@ -13,10 +13,10 @@ from nlsdesign.components import (
     Element,
     Part,
     Specimen,
-    assembly,
     Spring,
-    through,
+    assembly,
     specimen,
+    through,
     tie,
 )
 from nlsdesign.figures import Figure

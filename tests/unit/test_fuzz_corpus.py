@@ -118,7 +118,7 @@ def test_numbers_of_a_calibration(text: str, tmp_path: Path) -> None:
 
 def test_a_device_and_a_folder_are_no_text_files(tmp_path: Path) -> None:
     for place in (Path("/dev/zero"), tmp_path):
-        with pytest.raises(MeasurementError, match="a folder or a device|cannot be read"):
+        with pytest.raises(MeasurementError, match="cannot be read: it is a folder or a device"):
             text_of(place, MeasurementError)
     with pytest.raises(MeasurementError, match="cannot be read"):
         text_of(tmp_path / ("x" * 300), MeasurementError)
@@ -129,6 +129,9 @@ WORDS = {
     "a deck file of 300 characters": ("deck", "check", "x" * 300 + ".toml"),
     "a deck that is no text": ("deck", "show", "\udcff.toml"),
     "a deck that is a device": ("analyse", "--deck", "/dev/null"),
+    "a folder of 300 characters": ("fit", "--deck", "test_rig", "--records", "x" * 300),
+    "an export of 300 characters": ("export", "check", "x" * 300),
+    "a folder of thousands of levels": ("fit", "--deck", "dfki_pendulum", "--records", "a/" * 2500),
     "a count below zero": ("analyse", "--deck", "dfki_pendulum", "--count", "-3"),
     "a mapping that is a device": ("simulate", "--deck", "test_rig", "--record", "a.csv", "--out", "x.csv",
                                    "--mapping", "/dev/zero"),
