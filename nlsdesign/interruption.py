@@ -80,6 +80,13 @@ class _Guard:
             self._folder.mkdir(mode=0o700)
             tempfile.tempdir = str(self._folder)
         self._process = os.getpid()
+        sys.unraisablehook = self._unraisable
+
+    @staticmethod
+    def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
+        """Say nothing of an interrupt that came while an object was let go of; the watch ends the program."""
+        if unraisable.exc_type is not KeyboardInterrupt:
+            sys.__unraisablehook__(unraisable)
 
     def _handle(self, number: int, _: FrameType | None) -> None:
         if self.received or self._leaving:

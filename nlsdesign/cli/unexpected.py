@@ -12,9 +12,21 @@ import traceback
 
 import click
 
+from ..errors import fit_for_message
 from ..interruption import usual_temporary_folder, was_interrupted
 from ..locations import version
 
+_ADVICE = {
+    errno.ENAMETOOLONG: "give a shorter name",
+    errno.ELOOP: "give a name that is no link to itself",
+    errno.EACCES: "give a file that you may use",
+    errno.EPERM: "give a file that you may use",
+    errno.EROFS: "name a place that can be written",
+    errno.ENOSPC: "make room for it",
+    errno.EDQUOT: "make room for it",
+    errno.EIO: "give a file on a device that works",
+}
+"""What the system refuses whatever the program does, and what helps."""
 FAULT, BROKEN_PIPE, INTERRUPTED, BAD_INPUT = 70, 141, 130, 2
 
 
@@ -36,8 +48,9 @@ def status_of(error: Exception) -> int:
     if isinstance(error, MemoryError):
         click.echo("error: there is not enough memory for this -> ask for less at once", err=True)
         return BAD_INPUT
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EIO):
-        click.echo(f"error: {error.filename or 'a file'}: {error.strerror} -> make room for it", err=True)
+    if isinstance(error, OSError) and error.errno in _ADVICE:
+        name = fit_for_message(str(error.filename or "a file"))
+        click.echo(f"error: {name}: {error.strerror} -> {_ADVICE[error.errno]}", err=True)
         return BAD_INPUT
     reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
     click.echo(f"error: this is a fault of nlsdesign, not of your input ({reason})", err=True)

@@ -59,7 +59,7 @@ def main() -> int:
             smallest = shrunk(family, smallest, outcome)
         place = given.out / f"{given.family}-{given.seed}-fault-{order + 1}"
         smallest.written(place)
-        words = f", words {smallest.words}" if smallest.words else ""
+        words = f", words {[word[:60] for word in smallest.words]}" if smallest.words else ""
         print(f"{outcome.kind}: {outcome.detail}\n    {len(numbers)} times, first {numbers[0]}, "
               f"by {smallest.how}{words}, {smallest.size} bytes in {place}")  # fmt: skip
     return 1 if faults else 0

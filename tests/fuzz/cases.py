@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from nlsdesign.errors import NlsError
+from nlsdesign.errors import NlsError, visible
 
 REFUSED, ACCEPTED = "refused", "accepted"
 WRONG = ("traceback", "read back differently", "unreadable message", "too long", "crashed", "left over")
@@ -69,9 +69,8 @@ def judged_by(use: Callable[[], Outcome]) -> Outcome:
 
 
 def _judged_message(text: str) -> Outcome:
-    odd = [c for c in text if not c.isprintable() and c not in "\n\t"]
-    if odd:
-        return Outcome("unreadable message", f"holds {odd[0]!r}: {_kind_of(text)}")
+    if visible(text) != text:
+        return Outcome("unreadable message", f"holds control characters: {_kind_of(text)}")
     if len(text) > _LONGEST_MESSAGE:
         return Outcome("unreadable message", f"is too long: {_kind_of(text)}")
     return Outcome(REFUSED, "")

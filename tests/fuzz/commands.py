@@ -28,20 +28,28 @@ DECKS = (
 ODD_PATHS = (
     "", ".", "..", "/", "-", "--", "/dev/null", "/dev/null/x", "/dev/full", "/dev/zero", "/proc/self/mem",
     "/proc/x", "missing", "missing.toml", "empty", "empty.toml", "empty.csv", "binary.toml", "binary.csv",
-    "latin.toml", "folder", "folder.toml", "folder/x", "x" * 300, "x" * 300 + ".toml", "a/" * 2500, "\udcff.toml",
+    "latin.toml", "folder", "folder.toml", "folder/x", "x" * 300, "x" * 300 + ".toml",
+    "a/" * 2500, "\udcff.toml",
     "\udcff", "\x1b[31mred\x1b[0m", "deck.toml/x", "deck.toml", "record.csv", "records", "job.toml", "~", "*",
     "locked/x", "new\nline", "a\x00b",
 )  # fmt: skip
 ODD_NUMBERS = (
-    "", "-1", "0", "-0", "1e308", "-1e308", "1e400", "nan", "inf", "-inf", "1e-320", "3.5", "9" * 400, "9" * 5000,
-    "1_000", "0x10", "\uff11", "text", "5 apples", "5 N*m", "5 ms", "5 rad", "5 deg", "1e308 Gg*m^2", "1 m^99",
-    "5 Hz", "-5 ms", "nan s", "1e-300 s", "1e300 s", "5 " + "m*" * 500, "\x1b[2J", "\udcff", "1,5", "--", "1e6 s",
+    "", "-1", "0", "-0", "1e308", "-1e308", "1e400", "nan", "inf", "-inf", "1e-320", "3.5",
+    "9" * 400, "9" * 5000,
+    "1_000", "0x10", "\uff11", "text", "5 apples", "5 N*m", "5 ms", "5 rad", "5 deg", "1e308 Gg*m^2",
+    "1 m^99",
+    "5 Hz", "-5 ms", "nan s", "1e-300 s", "1e300 s", "5 " + "m*" * 500, "\x1b[2J", "\udcff", "1,5", "--",
+    "1e6 s",
 )  # fmt: skip
 ODD_WORDS = (
-    "", " ", "x" * 300, "x" * 5000, "\udcff", "\x1b]0;title\x07", "../..", "motor", "spring", "motor.angle", "load",
-    "spring.rubber", "nothing.there", "=", "a=b", "a=", "=b", "a=b*", "a=b@", "[", "*", "**", "{", "'", "-1", "@",
-    "MaximumCamRadius = {radius = '20 mm'}", "MaximumCamRadius = {radius = [[", "TorqueError = {}", "x = 1\ny = 2",
-    "PowerTorque = {coefficient = 4.35}", "one=one.fmu", "one.u=one.y", "1@2", "1@0", "nan@nan", "1e308@1e308",
+    "", " ", "x" * 300, "x" * 5000, "\udcff", "\x1b]0;title\x07", "../..", "motor", "spring",
+    "motor.angle", "load",
+    "spring.rubber", "nothing.there", "=", "a=b", "a=", "=b", "a=b*", "a=b@", "[", "*", "**", "{", "'",
+    "-1", "@",
+    "MaximumCamRadius = {radius = '20 mm'}", "MaximumCamRadius = {radius = [[", "TorqueError = {}",
+    "x = 1\ny = 2",
+    "PowerTorque = {coefficient = 4.35}", "one=one.fmu", "one.u=one.y", "1@2", "1@0", "nan@nan",
+    "1e308@1e308",
 )  # fmt: skip
 STUDIES = {
     "no_main.py": b"x = 1\n",
@@ -70,9 +78,11 @@ class Commands:
         csv = records._csv.encode()
         deck = (Path(__file__).parents[2] / "models/decks/dfki_pendulum.toml").read_bytes()
         self._files = {
-            "deck.toml": deck, "record.csv": csv, "records/a.csv": csv, "records/b.csv": csv, "records/c.csv": csv,
+            "deck.toml": deck, "record.csv": csv,
+            **{f"records/{name}.csv": csv for name in "abc"},
             "mapping.toml": _MAPPING.encode(), "job.toml": _JOB.encode(), "curve.csv": _TARGET.encode(),
-            "empty": b"", "empty.toml": b"", "empty.csv": b"", "binary.toml": bytes(range(256)), "locked/.keep": b"",
+            "empty": b"", "empty.toml": b"", "empty.csv": b"", "locked/.keep": b"",
+            "binary.toml": bytes(range(256)),
             "binary.csv": bytes(range(256)) * 20, "latin.toml": 'x = "\xe4"'.encode("latin-1"),
             "folder/x.txt": b"x", "folder.toml/x": b"", **STUDIES,
         }  # fmt: skip
@@ -137,6 +147,8 @@ class Commands:
             os.chdir(here)
             sys.argv, tempfile.tempdir = words, before
             (folder / "locked").chmod(0o700)
+        if outcome.wrong:
+            return outcome
         # The kept binaries of the compiler stay; drafts and folders of work do not.
         left = [each.name for each in place.iterdir() if not each.name.startswith("nlsdesign-0")
                 and each.name != f"nlsdesign-{os.getuid()}"]  # fmt: skip

@@ -98,7 +98,8 @@ def _renumbered(chance: random.Random, text: str) -> str:
         text = text[: match.start()] + new + text[match.end() :]
         if pattern is _VALUE and chance.random() < 0.3:
             unit = f'unit = "{chance.choice(EVIL_UNITS)}"'
-            text = text[: match.start()] + _UNIT.sub(lambda _: unit, text[match.start() :], count=1)
+            head, tail = text[: match.start()], text[match.start() :]
+            text = head + _UNIT.sub(unit.replace("\\", r"\\"), tail, count=1)
     return text
 
 
@@ -143,8 +144,8 @@ def _restructured(chance: random.Random, text: str) -> str:
     if kind == 9:
         line = chance.choice([each for each in text.split("\n") if " = " in each])
         key, _, value = line.partition(" = ")
-        return text.replace(line, chance.choice((f"{key}.x = {value}", f'"{key}" = {value}', f"{key} = [{value}]",
-                                                 f"{key} = {{x = {value}}}", f"{line}\n{line}")), 1)  # fmt: skip
+        ways = (f"{key}.x = {value}", f'"{key}" = {value}', f"{key} = [{value}]", f"{key} = {{x = {value}}}")
+        return text.replace(line, chance.choice((*ways, f"{line}\n{line}")), 1)
     if kind == 10:
         parent = f'parent = {{name = "x", digest = "{"0" * 64}", parent = ' * min(depth, 400)
         return text.replace(

@@ -1,4 +1,4 @@
-"""Mutated FMUs in a co-simulation: archives, descriptions, binaries; their crashes stay in their own process."""
+"""Mutated FMUs in a co-simulation: archives, descriptions, binaries; a crash ends no other process."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from .mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_tokens
 DESCRIPTION = "modelDescription.xml"
 FILE = "one.fmu"
 _ODD_NAMES = (
-    "../out.txt", "/tmp/out.txt", "a\\..\\b", "C:/x", "x" * 300, "a/" * 200, "nul\x01", "resources/../../x", "", ".",
+    "../out.txt", "/tmp/out.txt", "a\\..\\b", "C:/x", "x" * 300, "a/" * 200, "nul\x01",
+    "resources/../../x", "", ".",
     "..", "a//b", "binaries", "ü/ß", "resources", "modelDescription.xml/x",
 )  # fmt: skip
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import random
 import signal
@@ -41,12 +40,12 @@ class Interrupts:
 
     limit = 60.0
 
-    def __init__(self) -> None:
+    def __init__(self, *, fmu: bool = True) -> None:
         csv = Records().long_csv()
-        stream = io.BytesIO()
-        with tempfile.TemporaryDirectory() as folder:
-            stream.write(export_fmu(controller(), Path(folder) / "one.fmu").read_bytes())
-        self._files = {f"records/{name}.csv": csv for name in "abcd"} | {"one.fmu": stream.getvalue()}
+        self.files = {f"records/{name}.csv": csv for name in "abcd"}
+        if fmu:
+            with tempfile.TemporaryDirectory() as folder:
+                self.files["one.fmu"] = export_fmu(controller(), Path(folder) / "one.fmu").read_bytes()
 
     def made(self, random: random.Random, number: int) -> Case:
         name = tuple(COMMANDS)[number % len(COMMANDS)]
@@ -54,7 +53,7 @@ class Interrupts:
         # Half of the moments lie in the imports.
         after = random.uniform(0.0, 1.5 if random.random() < 0.4 else length)
         kind = "SIGTERM" if random.random() < 0.3 else "SIGINT"
-        return Case(self._files, (name, f"{after:.4f}", kind), f"{kind} after {after:.3f} s of {name}")
+        return Case(self.files, (name, f"{after:.4f}", kind), f"{kind} after {after:.3f} s of {name}")
 
     def judged(self, case: Case, folder: Path) -> Outcome:
         name, after, kind = case.words

@@ -134,8 +134,8 @@ class Records:
             ending = (".parquet", ".mat", ".h5")[kind - 2]
             return Case({f"a{ending}": self._damaged(random, ending)}, how=f"bytes of {ending}")
         if kind == 5:
-            return Case({"a.csv": self._csv.encode(), "b.csv": self._csv.encode(), "c.csv": self._csv.encode(),
-                         "records.toml": _text(random, _MAPPING)}, how="mapping")  # fmt: skip
+            tables = {f"{name}.csv": self._csv.encode() for name in "abc"}
+            return Case({**tables, "records.toml": _text(random, _MAPPING)}, how="mapping")
         if kind == 6:
             return Case({"job.toml": _text(random, _JOB)}, how="design file")
         if kind == 7:
@@ -166,8 +166,10 @@ class Records:
         noise = np.random.default_rng(1)
         time = np.arange(rows) * 0.002
         angle = 0.5 * np.sin(6.0 * time)
-        columns = (time, angle + 5e-4 * noise.standard_normal(rows), 3.0 * np.sin(6.0 * time + 0.3)
-                   + 0.04 * noise.standard_normal(rows), 60.0 * np.abs(angle) + 0.6 * noise.standard_normal(rows))  # fmt: skip
+        sound = (angle, 3.0 * np.sin(6.0 * time + 0.3), 60.0 * np.abs(angle))
+        sizes = (5e-4, 0.04, 0.6)
+        noisy = [s + size * noise.standard_normal(rows) for s, size in zip(sound, sizes, strict=True)]
+        columns = (time, *noisy)
         lines = (",".join(f"{v:.6g}" for v in row) for row in np.column_stack(columns))
         return "\n".join([",".join(_HEADS), *lines, ""]).encode()
 
@@ -323,7 +325,8 @@ def _odd_binary(chance: random.Random, ending: str, columns: dict[str, Any]) -> 
     kinds: tuple[Any, ...] = (
         np.array([]), np.float64(3.0), np.zeros((3, 4, 5)), np.array(["a"] * ROWS), np.full(ROWS, np.nan),
         np.full(ROWS, np.inf), np.arange(ROWS), np.ones(ROWS, dtype=bool), np.zeros(ROWS, dtype=np.int8),
-        np.full(ROWS, 2**63 - 1), np.zeros(10), np.full(ROWS, 1e308), np.zeros((ROWS, 1)), np.zeros((1, ROWS)),
+        np.full(ROWS, 2**63 - 1), np.zeros(10), np.full(ROWS, 1e308), np.zeros((ROWS, 1)),
+        np.zeros((1, ROWS)),
     )  # fmt: skip
     changed = {**columns, chance.choice((*_HEADS, "other")): chance.choice(kinds)}
     try:

@@ -1,4 +1,4 @@
-"""Cases in worker processes: a limit of time and memory for each, and a list that a stopped run goes on from."""
+"""Cases in worker processes, with a limit of time and memory for each."""
 
 from __future__ import annotations
 

@@ -23,7 +23,9 @@ from nlsdesign.identification import (
     resampled,
 )
 from nlsdesign.identification.equation_error.evidence import estimate_noise
-from nlsdesign.identification.records.mapping import read_mapping
+from nlsdesign.identification.records.ingest import read_run
+from nlsdesign.identification.records.mapping import Column, ColumnMap, read_mapping
+from nlsdesign.identification.records.table_files import RecordTable
 from nlsdesign.simulation import Trace
 from tests.unit.test_identification_measurement import COUNT, MAPPING, STEP, model, table, write
 
@@ -330,3 +332,22 @@ def test_a_column_that_no_signal_stands_for_moves_the_clock_that_it_shares(
     (tmp_path / "records.toml").write_text(TWO + alone, encoding="utf8")
     with pytest.raises(MeasurementError, match=r"differ in length.*'again_deg'.*time = '<head"):
         load_records(tmp_path, model)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(1e3, "2 s apart; if it counts milliseconds"), (1e-3, "2e-06 s apart; if it counts seconds"), (1.0, "")],
+)
+def test_a_clock_of_doubtful_unit_is_remarked_on(factor: float, words: str) -> None:
+    time = 0.002 * factor * np.arange(100)
+    table = RecordTable("a.csv", {"t_s": time, "x": np.sin(np.arange(100.0))})
+    mapping = ColumnMap(Column("t_s", "time", "s"), (Column("x", "load.angle", "rad"),))
+    remarks = [str(each) for each in read_run("a", table, mapping).remarks if "samples lie" in str(each)]
+    assert [words in each for each in remarks] == [True] * bool(words)
+
+
+def test_a_clock_that_no_bench_has_is_refused() -> None:
+    table = RecordTable("a.csv", {"t_s": 1e-300 * np.arange(1.0, 101.0), "x": np.sin(np.arange(100.0))})
+    mapping = ColumnMap(Column("t_s", "time", "s"), (Column("x", "load.angle", "rad"),))
+    with pytest.raises(MeasurementError, match=r"'t_s': its samples lie 1e-300 s apart"):
+        read_run("a", table, mapping)

@@ -21,6 +21,8 @@ from .table_files import RecordTable
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_LEAST_STEP, _SHORT_STEP, _LONG_STEP = 1e-8, 1e-5, 0.5
+"""Steps in s below which a clock cannot be one of a bench, and outside which its unit is doubtful."""
 _YEAR = 3.16e7
 _SINCE_1970, _NO_TIME = 1e8, 1e11
 """A clock that begins later than this, in s, counts from 1970; beyond the second it has another unit."""
@@ -84,7 +86,24 @@ def read_run(name: str, table: RecordTable, mapping: ColumnMap) -> Run:
         for c in mapping.columns
         if c.name in checked.masked
     }
-    return Run(trace, f"{table.file}{began}{note}", resolution, masked, checked.findings, checked.remarks)
+    remarks = (*checked.remarks, *_odd_rate(table, mapping))
+    return Run(trace, f"{table.file}{began}{note}", resolution, masked, checked.findings, remarks)
+
+
+def _odd_rate(table: RecordTable, mapping: ColumnMap) -> tuple[Finding, ...]:
+    """Return a remark on a clock whose samples lie so far apart, or so close, that its unit is doubtful."""
+    step = float(np.median(np.diff(_seconds(table, mapping.time))))
+    place = f"{table.file}: column '{mapping.time.name}'"
+    if step < _LEAST_STEP:
+        raise MeasurementError(
+            place, f"its samples lie {step:.3g} s apart, which no instrument of a bench does",
+            next_step="correct the unit of the time, in its head or in records.toml",
+        )  # fmt: skip
+    if _SHORT_STEP <= step <= _LONG_STEP:
+        return ()
+    unit = "milliseconds or microseconds" if step > _LONG_STEP else "seconds"
+    text = f"its samples lie {step:.3g} s apart; if it counts {unit}, give it that unit ('t_ms', 't_s')"
+    return (Finding(place, text),)
 
 
 def _from_zero(table: RecordTable, mapping: ColumnMap) -> tuple[RecordTable, str]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MeasurementError, missing_library, nearest
+from ...reading import is_there
 from .csv_files import read_csv
 
 Array = NDArray[np.float64]
@@ -94,7 +95,7 @@ def table_files(folder: Path) -> list[Path]:
     MeasurementError
         If there is none, or two files differ only in the ending.
     """
-    if not folder.exists():
+    if not is_there(folder):
         near = nearest(folder.name, [f.name for f in folder.parent.glob("*") if f.is_dir()])
         raise MeasurementError(
             str(folder),
