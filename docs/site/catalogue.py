@@ -48,7 +48,9 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
 
 def _class(name: str, kind: type) -> str:
     written = markup.sections(kind)
-    described = documented(written.get("Parameters", ""))
+    described: dict[str, str] = {}
+    for each in reversed(kind.__mro__[:-1]):  # fields of a base are described there
+        described |= documented(markup.sections(each).get("Parameters", ""))
     hints = typing.get_type_hints(kind)
     rows = [
         [

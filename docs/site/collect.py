@@ -94,10 +94,11 @@ def figures_of(report: str, name: str) -> Iterator[tuple[str, str, str]]:
     name
         Put before all identifiers, so that figures of several studies can stand on one page.
     """
+    # One with classes is drawn by the style and the script of its report.
     small = [
         each
         for each in _FIGURE.finditer(report)
-        if len(each["svg"]) <= _LARGEST and "<script" not in each["svg"]
+        if len(each["svg"]) <= _LARGEST and "class=" not in each["svg"]
     ]
     for each in small[:_MOST]:
         svg = re.sub(r'id="', f'id="{name}-', each["svg"])

@@ -96,7 +96,7 @@ def _row(parameter: click.Parameter, context: click.Context) -> list[str]:
     if isinstance(parameter.type, click.Choice):
         metavar = "CHOICE"
     shown = names if parameter.is_flag else f"{names} {metavar}"
-    if parameter.hidden or parameter.name == "help":
+    if parameter.hidden or "--help" in parameter.opts:
         return []
     help_text = markup.inline(" ".join((parameter.help or "").split()))
     choices = ""

@@ -70,7 +70,7 @@ def _figure(title: str, edges: Sequence[tuple[str, str]]) -> str:
     heading = f"<figcaption>{title}</figcaption>" if title else ""
     return (
         f'<figure class="chart">{heading}<svg viewBox="0 0 {width:.0f} {height}" role="img" '
-        f'style="max-width: {width:.0f}px" aria-label="{escape(words)}">'
+        f'style="width: {width:.0f}px; max-width: 100%" aria-label="{escape(words)}">'
         + "".join(lines + boxes)
         + "</svg></figure>"
     )

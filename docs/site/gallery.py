@@ -73,7 +73,7 @@ def _study(root: Path, name: str, made: dict[str, object]) -> str:
         by, using = escape(str(made["command"])), escape(str(made["with"]))
         text += f'<p class="facts">Made on {made["date"]} by <code>{by}</code> with {using}.</p>\n\n'
     rows = [
-        [f"<code>{key}</code>", f"{c.value:g} ± {c.tolerance:g}", escape(c.unit), markup.inline(c.why)]
+        [markup.breakable(key), f"{c.value:g} ± {c.tolerance:g}", escape(c.unit), markup.inline(c.why)]
         for key, c in claims(name).items()
     ]
     if rows:

@@ -60,6 +60,17 @@ def plot(svg: str, caption: str) -> str:
     return f'<figure class="plot">{whole}<figcaption>{caption}</figcaption></figure>\n\n'
 
 
+def breakable(name: str) -> str:
+    """Return a name as code that may break after an underline.
+
+    Parameters
+    ----------
+    name
+        As in Python.
+    """
+    return f"<code>{escape(name).replace('_', '_<wbr>')}</code>"
+
+
 def code(text: str, language: str) -> str:
     """Return a block of code.
 

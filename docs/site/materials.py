@@ -29,6 +29,9 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
 def _material(material: library.Material) -> str:
     columns = ("property", "value", *(c.replace("_", " ") for c in library.CONDITIONS), "evidence", "source")
     rows = [[escape(str(cell)) for cell in row] for row in material.rows()]
+    said = [any(row[i].strip("–") for row in rows) for i in range(len(columns))]
+    columns = tuple(c for c, kept in zip(columns, said, strict=True) if kept)
+    rows = [[cell for cell, kept in zip(row, said, strict=True) if kept] for row in rows]
     remark = f"<p>{markup.inline(material.remark)}</p>\n\n" if material.remark else ""
     every = " ".join(row[-1] for row in material.rows())
     return (

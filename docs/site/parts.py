@@ -20,6 +20,7 @@ from tests.parts import examples
 from tests.parts.systems import around
 
 from . import bibliography, formula, markup, part_figures
+from .rooms import room_of
 
 ROOMS = {
     "core": ("Springs, dampers, combinations", "What any network is made of."),
@@ -67,17 +68,6 @@ def instances() -> dict[str, list[Part]]:
     for part in examples():
         found.setdefault(type(part).__name__, []).append(part)
     return found
-
-
-def room_of(kind: type[Part]) -> str:
-    """Return the inner room of ``components`` in which a law stands.
-
-    Parameters
-    ----------
-    kind
-        A component.
-    """
-    return kind.__module__.split(".components.")[1].partition(".")[0]
 
 
 def drawing(name: str, parts: list[Part]) -> str:

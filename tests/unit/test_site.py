@@ -111,6 +111,15 @@ def test_a_formula_becomes_mathml_with_its_marks_and_scripts() -> None:
     assert "(" not in formula.mathml("(a)[b]|c|").replace("&#", ""), "Markdown would read a link"
 
 
+@pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="needs the extra docs")
+def test_formulas_of_docstrings_are_marked_and_examples_left_alone() -> None:
+    from docs.site.typeset import mark_formulas
+
+    lines = ["The torque is T = k·θ, nothing else.", ">>> a = b", "``x = y``"]
+    mark_formulas(lines)
+    assert lines == ["The torque is :formula:`T = k·θ`, nothing else.", ">>> a = b", "``x = y``"]
+
+
 def test_every_public_name_limit_goal_effect_material_and_source_is_listed(
     root: Path, tmp_path: Path
 ) -> None:
