@@ -14,7 +14,8 @@ from tests.command_line import Run, run
 __all__ = ["run"]
 SMALLER = {
     "nlsdesign design": ["--draws", "0", "--starts", "1"],
-    "nlsdesign analyse": ["--count", "2"],
+    "nlsdesign simulate": ["--dry-run"],
+    "nlsdesign analyse": ["--dry-run"],
     "nlsdesign observer": ["--kind", "cascade"],
     "nlsdesign export c": ["--kind", "cascade"],
 }
