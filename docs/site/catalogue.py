@@ -36,7 +36,7 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     asked = "# Targets, limits and goals\n\n"
     asked += (
         "Made from the classes. In Python they are `nlsdesign.design.Name(field=…)`; in a design file (`nlsdesign design --job`) "
-        'one line `Name = {field = "number unit"}` below `[target]`, `[limits]` or `[goals]`. '
+        "one line `Name = {field = \"number unit\"}` below `[target]`, `[limits]` or `[goals]`. "
         "How they work together: [Design a cam](../how_to/design_a_cam.md).\n\n"
     )
     for name, (base, _, sentence) in _BASES.items():
@@ -59,11 +59,7 @@ def _class(name: str, kind: type) -> str:
         for field in dataclasses.fields(kind)
         if field.init
     ]
-    table = (
-        markup.table(("field", "kind", "default", "meaning"), rows, caption=f"Fields of {name}")
-        if rows
-        else ""
-    )
+    table = markup.table(("field", "kind", "default", "meaning"), rows, caption=f"Fields of {name}") if rows else ""
     examples = written.get("Examples", "")
     shown = markup.code(examples, "pycon") if examples.lstrip().startswith(">>>") else ""
     return (
@@ -90,9 +86,7 @@ def documented(section: str) -> dict[str, str]:
 
 def _shown(hint: object) -> str:
     text = hint.__name__ if isinstance(hint, type) else str(hint)
-    return re.sub(r"\b(?:nlsdesign|collections|typing|numpy)\.(?:\w+\.)*", "", text).replace(
-        "Quantity | float", "number with unit"
-    )
+    return re.sub(r"\b(?:nlsdesign|collections|typing|numpy)\.(?:\w+\.)*", "", text).replace("Quantity | float", "number with unit")
 
 
 def _default(field: dataclasses.Field[object]) -> str:

@@ -37,26 +37,14 @@ def main() -> int:
     """Run the studies that are named, or all; return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m docs.site.collect", description=__doc__)
     parser.add_argument("study", nargs="*", help="all where none is named")
-    parser.add_argument(
-        "--reports", type=Path, help="folder with one folder for each study, instead of running them"
-    )
+    parser.add_argument("--reports", type=Path, help="folder with one folder for each study, instead of running them")
     arguments = parser.parse_args()
     made = read_made()
     for name in arguments.study or study_names():
         with tempfile.TemporaryDirectory() as folder:
             out = arguments.reports / name if arguments.reports else Path(folder)
             if not arguments.reports:
-                command = [
-                    sys.executable,
-                    "-m",
-                    "nlsdesign",
-                    "study",
-                    "run",
-                    name,
-                    "--fast",
-                    "--out",
-                    str(out),
-                ]
+                command = [sys.executable, "-m", "nlsdesign", "study", "run", name, "--fast", "--out", str(out)]
                 subprocess.run(command, check=True)
             report = out / "report.html"
             text = report.read_text(encoding="utf-8") if report.is_file() else ""
@@ -91,11 +79,7 @@ def figures_of(report: str, name: str) -> Iterator[tuple[str, str, str]]:
     name
         Put before all identifiers, so that figures of several studies can stand on one page.
     """
-    small = [
-        each
-        for each in _FIGURE.finditer(report)
-        if len(each["svg"]) <= _LARGEST and "<script" not in each["svg"]
-    ]
+    small = [each for each in _FIGURE.finditer(report) if len(each["svg"]) <= _LARGEST and "<script" not in each["svg"]]
     for each in small[:_MOST]:
         svg = re.sub(r'id="', f'id="{name}-', each["svg"])
         svg = re.sub(r'(href="|url\()#', rf"\1#{name}-", svg)
@@ -111,8 +95,7 @@ def _plain(html: str) -> str:
 def _toml(made: dict[str, dict[str, object]]) -> str:
     head = "# Written by `make gallery`: when and with what the figures of the gallery were made.\n"
     tables = (
-        f"\n[{name}]\n"
-        + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in entry.items())
+        f"\n[{name}]\n" + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in entry.items())
         for name, entry in sorted(made.items())
     )
     return head + "".join(tables)

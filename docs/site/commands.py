@@ -26,10 +26,7 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     top = {name: command for name, command in sorted(program.commands.items())}
     made = {f"reference/commands/{name}.md": _page(name, command) for name, command in top.items()}
     rows = [
-        [
-            f'<a href="{path[1]}.html#{_place(path)}"><code>{" ".join(path)}</code></a>',
-            escape(command.get_short_help_str(200)),
-        ]
+        [f'<a href="{path[1]}.html#{_place(path)}"><code>{" ".join(path)}</code></a>', escape(command.get_short_help_str(200))]
         for name, each in top.items()
         for path, command in _tree(("nlsdesign", name), each)
     ]
@@ -65,9 +62,7 @@ def _command(path: tuple[str, ...], command: click.Command) -> str:
     text = markup.anchor(_place(path)) + heading + markup.code(usage, "text") + _help(command.help or "")
     rows = [_row(each, context) for each in command.get_params(context)]
     rows = [row for row in rows if row]
-    text += markup.table(
-        ("argument", "default", "meaning"), rows, caption=f"Arguments and options of {' '.join(path)}"
-    )
+    text += markup.table(("argument", "default", "meaning"), rows, caption=f"Arguments and options of {' '.join(path)}")
     shown = _examples(command.epilog or "")
     return text + (("<p>Examples</p>\n\n" + markup.code(shown, "console")) if shown else "")
 
@@ -99,9 +94,7 @@ def _row(parameter: click.Parameter, context: click.Context) -> list[str]:
     help_text = markup.inline(" ".join((parameter.help or "").split()))
     choices = ""
     if isinstance(parameter.type, click.Choice):
-        choices = (
-            " One of " + ", ".join(f"<code>{escape(str(c))}</code>" for c in parameter.type.choices) + "."
-        )
+        choices = " One of " + ", ".join(f"<code>{escape(str(c))}</code>" for c in parameter.type.choices) + "."
     return [f"<code>{escape(shown)}</code>", _default(parameter, context), help_text + choices]
 
 
@@ -109,13 +102,7 @@ def _default(parameter: click.Option, context: click.Context) -> str:
     if parameter.required:
         return "required"
     value: Any = parameter.get_default(context, call=False)
-    if (
-        parameter.is_flag
-        or value is None
-        or callable(value)
-        or value in ((), [], "")
-        or "UNSET" in repr(value).upper()
-    ):
+    if parameter.is_flag or value is None or callable(value) or value in ((), [], "") or "UNSET" in repr(value).upper():
         return ""
     if isinstance(value, tuple | list):
         value = " ".join(str(each) for each in value)

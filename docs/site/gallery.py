@@ -57,18 +57,14 @@ def _card(root: Path, name: str) -> str:
 
 def _study(root: Path, name: str, made: dict[str, object]) -> str:
     paragraphs = (load_study(name).__doc__ or "").split("\n\n")[1:]
-    text = (
-        f"# {name}\n\n" + f"<p>{markup.inline(title(name))}.</p>\n\n" + markup.prose("\n\n".join(paragraphs))
-    )
+    text = f"# {name}\n\n" + f"<p>{markup.inline(title(name))}.</p>\n\n" + markup.prose("\n\n".join(paragraphs))
     text += markup.code(f"nlsdesign study run {name}", "console")
     titles, captions = made.get("titles", []), made.get("captions", [])
     assert isinstance(titles, list)
     assert isinstance(captions, list)
     for number, (head, caption) in enumerate(zip(titles, captions, strict=True), start=1):
         svg = _svg(root, name, number)
-        text += (
-            f'## {head}\n\n<figure class="plot">{svg}<figcaption>{escape(caption)}</figcaption></figure>\n\n'
-        )
+        text += f'## {head}\n\n<figure class="plot">{svg}<figcaption>{escape(caption)}</figcaption></figure>\n\n'
     if made:
         text += f'<p class="facts">Made on {made["date"]} by <code>{escape(str(made["command"]))}</code> with {escape(str(made["with"]))}.</p>\n\n'
     rows = [
@@ -77,7 +73,5 @@ def _study(root: Path, name: str, made: dict[str, object]) -> str:
     ]
     if rows:
         columns = ("number", "value", "unit", "what the tolerance covers")
-        text += "## What it claims\n\n" + markup.table(
-            columns, rows, caption=f"Claims of {name}, held by tests"
-        )
+        text += "## What it claims\n\n" + markup.table(columns, rows, caption=f"Claims of {name}, held by tests")
     return text

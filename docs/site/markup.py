@@ -65,9 +65,7 @@ def sections(documented: object) -> dict[str, str]:
         Class or function.
     """
     pieces = _SECTION.split(inspect.getdoc(documented) or "")
-    return {"": pieces[0].strip()} | dict(
-        zip(pieces[1::2], (p.strip("\n") for p in pieces[2::2]), strict=True)
-    )
+    return {"": pieces[0].strip()} | dict(zip(pieces[1::2], (p.strip("\n") for p in pieces[2::2]), strict=True))
 
 
 def prose(text: str) -> str:
@@ -78,9 +76,7 @@ def prose(text: str) -> str:
     text
         Without sections.
     """
-    return (
-        "\n\n".join(f"<p>{inline(' '.join(p.split()))}</p>" for p in text.split("\n\n") if p.strip()) + "\n\n"
-    )
+    return "\n\n".join(f"<p>{inline(' '.join(p.split()))}</p>" for p in text.split("\n\n") if p.strip()) + "\n\n"
 
 
 def inline(text: str) -> str:

@@ -114,10 +114,7 @@ class Page:
             return link.group()
         target = (self.path.parent / address).resolve()
         docs = self.root / "docs"
-        known = {
-            self.root / "README.md": docs / "index.md",
-            self.root / "CHANGELOG.md": docs / "changelog.md",
-        }
+        known = {self.root / "README.md": docs / "index.md", self.root / "CHANGELOG.md": docs / "changelog.md"}
         if target in known or target.is_relative_to(docs):
             shown = os.path.relpath(known.get(target, target), self.place.parent)
             return f"[{link['text']}]({shown}{'#' * bool(fragment)}{fragment})"
