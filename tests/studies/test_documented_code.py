@@ -16,7 +16,7 @@ def run_blocks(document: Path) -> list[dict[str, Any]]:
     ran = []
     for text in PYTHON.findall(document.read_text(encoding="utf-8")):
         names: dict[str, Any] = {"__name__": "documented"}
-        exec(compile(text, document.name, "exec"), names)
+        exec(compile(text, document.name, "exec", dont_inherit=True), names)
         ran.append(names)
     return ran
 

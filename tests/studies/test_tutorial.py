@@ -59,7 +59,7 @@ def test_the_commands_and_scripts_work_with_smaller_settings(
                 tutorial.carried_out(block, tmp_path)
             elif block.kind == "python":
                 if "loop.csv" not in block.text:
-                    exec(compile(block.text, page.name, "exec"), {"__name__": "tutorial"})
+                    exec(compile(block.text, page.name, "exec", dont_inherit=True), {"__name__": "tutorial"})
                     printed, as_shown = capsys.readouterr().out, True
                 else:
                     as_shown = False
