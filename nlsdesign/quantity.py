@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from .errors import UnitError, ValueRangeError, nearest, visible
+from .unit_slips import misspelt_unit
 
 NOT_STATED = "not stated"
 _CHANGED = f"{NOT_STATED}; changed from"
@@ -47,22 +48,9 @@ _ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
 }
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "u": 1e-6, "n": 1e-9}
 _PREFIXED = {"g", "m", "s", "A", "N", "Pa", "J", "W", "V", "Hz", "rad", "Ohm", "Ω", "H", "K"}
-_FOREIGN = {
-    "psi": "6.895 kPa for one psi", "bar": "100 kPa for one bar", "atm": "101.325 kPa for one atm",
-    "lbf": "4.448 N for one lbf", "lb": "0.4536 kg for one lb", "lbs": "0.4536 kg for one lb",
-    "oz": "28.35 g for one oz (a force: 0.278 N)", "ozf": "0.278 N for one ozf", "kgf": "9.807 N for one kgf",
-    "kp": "9.807 N for one kp", "in": "25.4 mm for one inch", "inch": "25.4 mm for one inch",
-    "ft": "304.8 mm for one foot", "mil": "25.4 um for one mil", "thou": "25.4 um for one thou",
-    "C": "temperatures in K: 20 degrees Celsius are 293.15 K", "°C": "temperatures in K: 20 °C are 293.15 K",
-    "degC": "temperatures in K: 20 degrees Celsius are 293.15 K", "sec": "'s'", "hr": "'h'", "turn": "'rev'",
-    "turns": "'rev'", "hp": "745.7 W for one hp", "percent": "'%'", "ohm": "'Ohm'",
-    "L": "1e-3 m^3 for one litre", "l": "1e-3 m^3 for one litre", "t": "1000 kg for one tonne",
-}  # fmt: skip
-_RUN_TOGETHER = re.compile(r"^(?P<head>[GMkcmµun]?(?:N|Pa|g|V|A|W|J|Ohm))(?P<tail>mm|cm|ms|m|s|h|rad)$")
 # Superscripts, and the Greek mu and the ohm sign that look like the micro sign and the Greek omega.
 _TO_ASCII = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻\u03bc\u2126", "0123456789-\u00b5\u03a9")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*\[(?P<unit>[^\]]+)\]$")
 _POWER = re.compile(r"^(?P<atom>[^\d^\-]+|1)(?:\^?(?P<power>-?\d+))?$")
 
 
@@ -90,26 +78,6 @@ class Unit:
         return self.exponents[:-1]
 
 
-def _foreign(token: str, unit: str) -> UnitError | None:
-    """Return the error for a unit that is known and not one of ours, with what to write."""
-    if token in _FOREIGN:
-        return UnitError(
-            f"unit '{unit}'", f"'{token}' is not a unit of the SI", next_step=f"write {_FOREIGN[token]}"
-        )
-    match = _RUN_TOGETHER.match(token)
-    if match is None:
-        return None
-    tail = {"ms": "m*s"}.get(match["tail"], match["tail"])
-    # The power of the last symbol comes behind it: kgcm2 is kg*cm^2.
-    written = re.sub(rf"{re.escape(token)}\^?(-?\d+)?", lambda found: (
-        f"{match['head']}*{tail}" + (f"^{found[1]}" if found[1] else "")
-    ), unit.strip().translate(_TO_ASCII).replace(" ", ""), count=1)  # fmt: skip
-    return UnitError(
-        f"unit '{unit}'", f"'{token}' stands for a product, which needs its sign",
-        next_step=f"write '{written}'",
-    )  # fmt: skip
-
-
 def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
     if token in _ATOMS:
         return _ATOMS[token]
@@ -117,9 +85,9 @@ def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
     if head in _PREFIXES and tail in _PREFIXED:
         factor, exponents = _ATOMS[tail]
         return _PREFIXES[head] * factor, exponents
-    foreign = _foreign(token, unit)
-    if foreign is not None:
-        raise foreign
+    slip = misspelt_unit(token, unit, unit.strip().translate(_TO_ASCII).replace(" ", ""))
+    if slip is not None:
+        raise slip
     names = list(_ATOMS) + [p + a for p in _PREFIXES for a in _PREFIXED]
     raise UnitError(
         f"unit '{unit}'",
@@ -337,31 +305,6 @@ class Quantity:
         return with_unit(text, self.unit)
 
 
-def split_number(text: str) -> tuple[float, str]:
-    """Return number and unit of ``"5 N·m"``, ``"5N*m"`` or ``"5N.m"``; a full stop in a unit is a product.
-
-    Parameters
-    ----------
-    text
-        Number and unit.
-
-    Raises
-    ------
-    UnitError
-        If it does not begin with a number.
-
-    Examples
-    --------
-    >>> split_number("5N.m")
-    (5.0, 'N*m')
-    """
-    match = re.match(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)\b)\s*(.*)$", text)
-    if match is None:
-        raise UnitError(f"'{text}'", "does not start with a number")
-    unit = re.sub(r"(?<=[^\W\d])\.(?=[^\W\d])", "*", match.group(2).strip())
-    return float(match.group(1)), unit
-
-
 def changed_source(old: str, source: str) -> str:
     """Return the source of a number that was changed without one.
 
@@ -493,23 +436,6 @@ def with_error(value: float, error: float) -> str:
     pair = [f"{round(number / scale, digit):.{max(0, digit)}f}" for number in (value, error)]
     text = " ± ".join(pair).replace("-", "−")
     return f"({text})·10{str(exponent).translate(_SUPERSCRIPTS)}" if small else text
-
-
-def name_and_unit(head: str) -> tuple[str, str | None]:
-    """Return what the head of a column says, ``name [unit]`` or ``name_unit``: its name and its unit.
-
-    Parameters
-    ----------
-    head
-        Without a unit it is the name as it stands, and the unit is ``None``.
-    """
-    match = _BRACKETED.match(head)
-    name, _, unit = (match["name"], "", match["unit"]) if match else head.rpartition("_")
-    try:
-        parse_unit(unit)
-    except UnitError:
-        return head, None  # brackets that hold no unit belong to the name
-    return name, unit
 
 
 def degrees(value: float) -> float:

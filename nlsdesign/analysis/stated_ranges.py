@@ -83,14 +83,14 @@ def ranges_at_rest(model: FlatModel, angles: Array, *, angle: str) -> tuple[Rang
     function = ca.Function("watched", [s.time, s.state, s.input, s.parameter], [ca.densify(watched)])
     states = rest_states(model, angles, angle=angle)
     (values,) = evaluate_rows(function, states, model.start(model.inputs), model.start(model.parameters))
-    found = []
+    result = []
     for (_, v), row in zip(bounded, values.T, strict=True):
         over = np.maximum(v.minimum - row, row - v.maximum)
         outside = angles[over > _ROUNDING * v.nominal]
         if outside.size:
             near = outside[np.argsort(np.abs(outside))]
             furthest = float(row[int(np.argmax(over))])
-            found.append(
+            result.append(
                 RangeAtRest(v.name, v.unit, float(near[0]), float(near[-1]), furthest, v.minimum, v.maximum)
             )
-    return tuple(found)
+    return tuple(result)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UnitError, ValueRangeError
+from ..errors import ValueRangeError
 from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
@@ -20,7 +20,7 @@ from .output import (
     spring_option,
 )
 from .overwriting import out_option
-from .range_remarks import range_remarks, warn
+from .range_remarks import range_remarks, swept_angle, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -103,33 +103,6 @@ def analyse_angle(
     else:
         click.echo(f"sensors are not ranked: {unranked}")
     click.echo(f"written: {', '.join(map(str, files))}")
-
-
-def swept_angle(model: FlatModel, measured: str | None) -> str:
-    """Return the angle that an analysis goes over.
-
-    Parameters
-    ----------
-    model
-        As flattened.
-    measured
-        Name of the state; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnitError
-        If it is no angle.
-    """
-    from ..model.roles import measured_motion
-
-    name = measured_motion(model, measured)
-    unit = model.variable(name).unit
-    if unit != "rad":
-        raise UnitError(
-            f"'{name}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
-            next_step="name the angle of a body that turns, with --measured",
-        )  # fmt: skip
-    return name
 
 
 def _ranking(model: FlatModel, angles: Any, measured: str, torque: str) -> tuple[SensorRanking | None, str]:

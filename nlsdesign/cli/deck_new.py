@@ -15,7 +15,7 @@ from .output import examples
 from .units import parse_number, split_number
 
 if TYPE_CHECKING:
-    from ..components.assembly.deck_template import DeckTemplate, MotorInertia, Question
+    from ..components.assembly.deck_template import AskedNumber, DeckTemplate, MotorInertia
 
 ROTOR, OUTPUT = "rotor", "output"
 force_option = click.option("--force", is_flag=True, help="Replace the file where there is one.")
@@ -181,7 +181,7 @@ def _asked(
     template: DeckTemplate, at: MotorInertia | None, known: dict[str, Quantity]
 ) -> dict[str, Quantity]:
     """Ask for the numbers that are not given yet; the inertia last, for its ratio must be known."""
-    from ..components.assembly.deck_template import Question
+    from ..components.assembly.deck_template import AskedNumber
 
     questions = [question for question in template.questions() if question.name not in known]
     click.echo("Press return to take the usual value; a number without a unit is in the unit that is shown.")
@@ -196,11 +196,11 @@ def _asked(
         ratio = {**known, **answers}.get(at.ratio, template.deck.quantity(at.ratio))
         carried = template.carried(at, {**known, **answers})
         usual = carried.get(at.name, about.usual)
-        answers |= carried | _asked_inertia(Question(about.name, about.meaning, usual), at, ratio)
+        answers |= carried | _asked_inertia(AskedNumber(about.name, about.meaning, usual), at, ratio)
     return answers
 
 
-def _answer(question: Question) -> dict[str, Quantity]:
+def _answer(question: AskedNumber) -> dict[str, Quantity]:
     from ..components.assembly.deck_template import GIVEN
 
     usual = question.usual
@@ -222,7 +222,7 @@ def _answer(question: Question) -> dict[str, Quantity]:
     return {} if answer is None else {question.name: answer}
 
 
-def _asked_inertia(question: Question, at: MotorInertia, ratio: Quantity) -> dict[str, Quantity]:
+def _asked_inertia(question: AskedNumber, at: MotorInertia, ratio: Quantity) -> dict[str, Quantity]:
     """Ask where an inertia is given, then how large it is there, and convert it."""
     from dataclasses import replace
 

@@ -86,6 +86,7 @@ def observer(
     from ..export import export_c
     from ..model import flatten
     from ..observer import certified_design
+    from ..progress import Steps
     from ..report import write_observer_report
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
@@ -96,13 +97,14 @@ def observer(
     plant = flatten(declared)
     roles = {name: options[name] for name in ("spring", "measured")}
     sample_time, real = options["sample_time"], options["real"]
-    chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
-    proved = None if wanted is None else prove(plant, deck, chosen, wanted)
-    errors = (
-        spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
-        if options["with_errors"]
-        else None
-    )
+    steps = Steps()
+    with steps.step("observer"):
+        chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
+        proved = None if wanted is None else prove(plant, deck, chosen, wanted)
+    errors = None
+    if options["with_errors"]:
+        with steps.step("errors over the spread"):
+            errors = spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
     model = chosen.model if proved is None else with_statement(certified_design(proved, plant).model, proved)
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]

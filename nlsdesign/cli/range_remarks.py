@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import visible
+from ..errors import UnitError, visible
+from ..quantity import typeset_unit
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -37,7 +38,6 @@ def range_remarks(
     from ..errors import NlsError
     from ..model import flatten
     from ..observer.scheduling.scheduled import whole_contour
-    from .analyse_angle import swept_angle
 
     try:
         model = flatten(declared)
@@ -90,6 +90,33 @@ def warn(remarks: Iterable[str]) -> None:
     """
     for remark in remarks:
         click.echo(f"warning: {visible(remark)}", err=True)
+
+
+def swept_angle(model: FlatModel, measured: str | None) -> str:
+    """Return the angle that an analysis goes over.
+
+    Parameters
+    ----------
+    model
+        As flattened.
+    measured
+        Name of the state; decided from the structure if it is left out.
+
+    Raises
+    ------
+    UnitError
+        If it is no angle.
+    """
+    from ..model.roles import measured_motion
+
+    name = measured_motion(model, measured)
+    unit = model.variable(name).unit
+    if unit != "rad":
+        raise UnitError(
+            f"'{name}'", f"is in {typeset_unit(unit) or '1'}; analyse goes over an angle",
+            next_step="name the angle of a body that turns, with --measured",
+        )  # fmt: skip
+    return name
 
 
 def _part(declared: Assembly, path: str) -> object:

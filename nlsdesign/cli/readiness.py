@@ -65,7 +65,7 @@ class _Machine:
 
         from ..analysis.rest_points import rest_points
         from ..model.roles import series_spring
-        from .analyse_angle import swept_angle
+        from .range_remarks import swept_angle
 
         series_spring(self.model)
         rest_points(self.model, np.linspace(0.0, self.reach, _ANGLES), angle=swept_angle(self.model, None))

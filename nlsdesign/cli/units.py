@@ -9,7 +9,7 @@ import click
 
 from ..errors import UnitError
 from ..quantity import Quantity, quantity, same_dimension, typeset_unit, with_unit
-from ..quantity import split_number as split_number
+from ..written_numbers import split_number as split_number
 
 if TYPE_CHECKING:
     _Kind = click.ParamType[float]

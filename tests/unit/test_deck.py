@@ -103,7 +103,8 @@ MISSPELT = [
 ]
 UNITS = [
     ('area = {value = 1.0, unit = "cm^2"', "§area = {value = 1.0", UnitError, "has no unit", None, "unit ="),
-    ('"Pa*s"', '"Pas"', UnitError, "not a known unit", "Pa", "SI units"),
+    ('"Pa*s"', '"Pass"', UnitError, "not a known unit", "Pa", "SI units"),
+    ('"Pa*s"', '"Pas"', UnitError, "stands for a product", None, "write 'Pa*s'"),
     (
         'rest_length = {value = 12.5, unit = "mm"',
         '§rest_length = {value = 12.5, unit = "m"',

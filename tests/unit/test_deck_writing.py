@@ -149,12 +149,32 @@ def test_written_text_is_the_number_to_half_a_digit(value: float) -> None:
     assert float(Fraction(raw) * Fraction(parse_unit("N/mm").factor)) == value
 
 
-@pytest.mark.parametrize(
-    "text", ["tab\there", "nul\x00", "bell\x07", "delete\x7f", "ümlaut ∂ 力", 'a "b" \\c', "\r\n"]
-)
+@pytest.mark.parametrize("text", ["tab\there", "ümlaut ∂ 力", 'a "b" \\c', "two\nlines", "a\u200db"])
 def test_any_text_comes_back(text: str) -> None:
     made = Assembly("a", (("point", Driven(domain=TRANSLATION)),), text)
     assert round_trip(made).description == text
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("nul\x00", "nul\\x00"),
+        ("bell\x07", "bell\\x07"),
+        ("delete\x7f", "delete\\x7f"),
+        ("red\x1b[31m", "red\\x1b[31m"),
+        ("\x9b2J", "\\x9b2J"),
+        ("\r\n", "\\x0d\n"),
+        ("turned \u202egnp.exe", "turned \\u202egnp.exe"),
+    ],
+)
+def test_control_characters_are_written_out_and_stay_so(text: str, shown: str) -> None:
+    """In names, descriptions and sources, whether they come from Python or from a deck."""
+    spring = Spring(stiffness=Quantity(1.0, "N/m", text))
+    made = Assembly("a" + text, (("point", Driven(domain=TRANSLATION)), ("s", tie(spring, "point"))), text)
+    assert made.name == "a" + shown
+    assert made.description == shown
+    assert made.quantities()["s.stiffness"].source == shown
+    assert round_trip(made) == made
 
 
 def test_write_makes_folders_and_leaves_no_draft(tmp_path: Path) -> None:

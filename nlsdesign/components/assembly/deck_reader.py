@@ -382,7 +382,7 @@ def _without_one_behind(has_cam: bool, names: list[str]) -> DeckError:
         return DeckError("Through", "needs a table 'cam'", next_step=step)
     if not names:
         step = 'add a table such as [spring.rubber] with component = "Specimen"'
-        return DeckError("Through", "needs a table for the element behind the cam", next_step=step)
+        return DeckError("Through", "needs one table for the element behind the cam", next_step=step)
     return DeckError(
         "Through", f"has {len(names)} elements behind its cam, {', '.join(map(repr, names))}, and takes one",
         next_step='put both into one table: component = "Parallel" where they share the stretch, "Series" '

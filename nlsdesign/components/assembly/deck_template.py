@@ -27,7 +27,7 @@ _ASKED, _READY = "# Asked: ", "# Ready for: "
 
 
 @dataclass(frozen=True)
-class Question:
+class AskedNumber:
     """A number that a template asks for.
 
     Parameters
@@ -72,11 +72,11 @@ class DeckTemplate:
         line = next(line for line in self.text.splitlines() if line.startswith(_READY))
         return tuple(line.removeprefix(_READY).split(", "))
 
-    def questions(self) -> list[Question]:
+    def questions(self) -> list[AskedNumber]:
         """Return the numbers that are asked for, in written order."""
         deck, lines = self.deck, self.text.splitlines()
         return [
-            Question(name, lines[number - 2].removeprefix(_ASKED), deck.quantity(name))
+            AskedNumber(name, lines[number - 2].removeprefix(_ASKED), deck.quantity(name))
             for name in deck.numbers()
             if (number := deck.places[name][0]) > 1 and lines[number - 2].startswith(_ASKED)
         ]
@@ -252,11 +252,11 @@ def plain_name(text: str) -> str:
 
 
 def _materials(path: str, table: Mapping[str, Any]) -> list[tuple[str, str]]:
-    found: list[tuple[str, str]] = []
+    fields: list[tuple[str, str]] = []
     for key, raw in table.items():
         full = f"{path}.{key}" if path else key
         if key == "material" and isinstance(raw, str):
-            found.append((full, raw))
+            fields.append((full, raw))
         elif isinstance(raw, Mapping):
-            found += _materials(full, raw)
-    return found
+            fields += _materials(full, raw)
+    return fields

@@ -8,7 +8,8 @@ from dataclasses import replace
 from ...errors import MeasurementError
 from ...model import FlatModel
 from ...model.readings import reading_of
-from ...quantity import name_and_unit, same_dimension, typeset_unit
+from ...quantity import same_dimension, typeset_unit
+from ...written_numbers import name_and_unit
 from .mapping import Column, ColumnMap
 
 _TIME_NAMES = ("t", "time")

@@ -210,7 +210,7 @@ class AngleForm:
                 f"observer: rate of '{self.model.states[self.order[worst]].name}'",
                 "is not a sum of functions of angle, speed and inputs, and a part linear in the other states",
                 next_step="friction inside the spring that follows its speed, as of a cable on a guide "
-                "(CapstanFriction), and a load that moves have no observer over one angle: take the "
+                "(CapstanFriction), or a load that moves, has no observer over one angle: take the "
                 "friction out of the spring, or hold the load",
             )
 
