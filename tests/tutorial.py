@@ -1,10 +1,11 @@
 """The pages of ``docs/tutorial``: files, commands and what they print, run in order in one folder.
 
-A page is Markdown with four kinds of blocks. ``<!-- file: NAME -->`` before a block says that the reader saves it;
-``sh`` is typed; ``python`` is tried in an interpreter that was started in the folder; ``text`` shows lines that the block before has printed,
-in their order, others may stand between them; ``…`` in a line stands for anything.
+A page is Markdown with four kinds of blocks. ``<!-- file: NAME -->`` before a block says that the reader
+saves it; ``sh`` is typed; ``python`` is tried in an interpreter that was started in the folder; ``text``
+shows lines that the block before has printed, in their order, others may stand between them; ``…`` in a
+line stands for anything.
 
-``python -m tests.tutorial --write`` runs all pages, writes the numbers that come now into the pages, copies the
+``python -m tests.tutorial --write`` runs all pages, writes the numbers that come now into them, copies the
 figures that they show, and writes the notebook anew.
 """
 

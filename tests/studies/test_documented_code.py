@@ -16,7 +16,7 @@ def run_blocks(document: Path) -> list[dict[str, Any]]:
     ran = []
     for text in PYTHON.findall(document.read_text(encoding="utf-8")):
         names: dict[str, Any] = {"__name__": "documented"}
-        exec(compile(text, document.name, "exec"), names)
+        exec(compile(text, document.name, "exec", dont_inherit=True), names)
         ran.append(names)
     return ran
 
@@ -37,7 +37,7 @@ def test_the_code_in_the_other_documents_runs(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    # The blocks of the tutorial build on one another: tests/studies/test_tutorial.py runs them in their order.
+    # The blocks of the tutorial build on one another: tests/studies/test_tutorial.py runs them in order.
     documents = [each for each in sorted((root / "docs").rglob("*.md")) if each.parent.name != "tutorial"]
     for document in documents:
         shown = document.read_text(encoding="utf-8").count("```python")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,8 @@ from tests.command_line import Run, run
 __all__ = ["run"]
 SMALLER = {
     "nlsdesign design": ["--draws", "0", "--starts", "1"],
-    "nlsdesign analyse": ["--count", "2"],
+    "nlsdesign simulate": ["--dry-run"],
+    "nlsdesign analyse": ["--dry-run"],
     "nlsdesign observer": ["--kind", "cascade"],
     "nlsdesign export c": ["--kind", "cascade"],
 }
@@ -58,7 +60,7 @@ def test_the_commands_and_scripts_work_with_smaller_settings(
                 tutorial.carried_out(block, tmp_path)
             elif block.kind == "python":
                 if "loop.csv" not in block.text:
-                    exec(compile(block.text, page.name, "exec"), {"__name__": "tutorial"})
+                    exec(compile(block.text, page.name, "exec", dont_inherit=True), {"__name__": "tutorial"})
                     printed, as_shown = capsys.readouterr().out, True
                 else:
                     as_shown = False
@@ -107,9 +109,10 @@ def test_the_notebook_is_that_of_the_pages(tmp_path: Path) -> None:
 def test_the_pages_follow_one_another_and_show_their_figures() -> None:
     pages = tutorial.pages()
     assert [int(page.name[0]) for page in pages] == list(range(1, 10))
-    for page, following in zip(pages, pages[1:], strict=False):
+    for page, following in pairwise(pages):
         last = page.read_text(encoding="utf-8").splitlines()[-1]
-        assert last.startswith("Next: [") and last.endswith(f"({following.name}).")
+        assert last.startswith("Next: [")
+        assert last.endswith(f"({following.name}).")
     shown = [m["shown"] for page in pages for m in tutorial.IMAGE.finditer(page.read_text(encoding="utf-8"))]
     assert len(shown) >= 2
     assert all((tutorial.FOLDER / name).is_file() for name in shown)
