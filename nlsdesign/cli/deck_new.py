@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -45,7 +45,7 @@ force_option = click.option("--force", is_flag=True, help="Replace the file wher
 @json_option
 def new(
     path: str, template: str | None, material: str | None, given: tuple[str, ...], yes: bool, force: bool,
-    as_json: bool, **inertia: str | None,
+    **others: Any,
 ) -> None:  # fmt: skip
     """Write a deck from a template: commented, with every number, ready for the commands that it names.
 
@@ -57,7 +57,7 @@ def new(
 
     file = Path(path) if path.endswith(".toml") else Path(f"{path}.toml")
     refuse_to_replace(file, force)
-    asking = not (yes or as_json) and on_terminal()
+    asking = not (yes or others["as_json"]) and on_terminal()
     if template is None:
         if not asking:
             raise click.UsageError(f"--template is missing; templates are: {', '.join(template_names())}")
@@ -65,12 +65,12 @@ def new(
     chosen = load_template(template)
     numbers = _given(chosen, given)
     at = motor_inertia(declare(chosen.deck))
-    numbers |= _inertia(chosen, at, numbers, inertia["inertia"], inertia["place"])
+    numbers |= _inertia(chosen, at, numbers, others["inertia"], others["place"])
     if asking:
         material = material or _asked_material(chosen)
         numbers |= _asked(chosen, at, numbers)
     write_text(file, chosen.filled(plain_name(file.stem), numbers=numbers, material=material))
-    if as_json:
+    if others["as_json"]:
         ready = list(chosen.ready_for)
         show_json({"file": file, "numbers": len(chosen.deck.numbers()), "ready_for": ready})
         return

@@ -64,12 +64,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @click.option("--with-spread", is_flag=True, help="Certify for all parameters within their spread.")
 @range_options
 def observer(
-    context: click.Context,
-    /,
-    deck_name: str | None,
-    out: Path,
-    as_json: bool,
-    **options: Any,
+    context: click.Context, /, deck_name: str | None, out: Path, as_json: bool, **options: Any
 ) -> None:
     """Design the torque observer and write it as C with a self-test.
 
