@@ -398,6 +398,9 @@ def _distortion(run: PeriodicRun, torque: str) -> float:
     fundamental, values = run.fundamental(torque), run[torque]
     turn = np.exp(2j * math.pi * run.frequency * run.time)
     rest = values - np.mean(values) - np.real(fundamental * turn)
+    if fundamental == 0.0:
+        # A spring that pulls to one side only need not follow a swing about zero at all.
+        return math.inf
     return _rms(rest) / (abs(fundamental) / math.sqrt(2.0))
 
 
