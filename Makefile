@@ -17,7 +17,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets environment lock clean distclean
+.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets wheels docs gallery environment lock clean distclean
 
 help:
 	@echo 'make study      run the study of the published actuator; the report goes to $(OUT)/report.html'
@@ -27,10 +27,13 @@ help:
 	@echo 'make kernels    the tests under several kernels of linear algebra: same results on every processor'
 	@echo 'make mutation   break the package in places drawn by chance and list what no test notices'
 	@echo 'make lint       style and types only'
-	@echo 'make bench      the benchmarks: ratios against named peers'
+	@echo 'make bench      the benchmarks: ratios against named peers, docs/benchmarks.md'
+	@echo 'make docs       the documentation site, into out/docs; warnings and dead links are errors'
+	@echo 'make gallery    run all studies and keep some of their figures for the site (minutes)'
 	@echo 'make masters    our FMUs in foreign masters: docs/fmi_masters.md'
 	@echo 'make targets    generated C on Cortex-M4F and M7 in an emulator: docs/targets.md'
 	@echo 'make tutorial   run the tutorial and write its numbers, figures and notebook anew'
+	@echo 'make wheels     build wheel and sdist, install and try each on every Python that is here'
 	@echo 'make lock       write requirements/locked.txt anew (newest versions: make lock UPGRADE=--upgrade)'
 	@echo 'make clean      remove what study, test and build have written'
 	@echo 'make distclean  remove .venv too'
@@ -67,6 +70,12 @@ mutation: environment
 bench: environment
 	$(BIN)/python -m benchmarks
 
+docs: environment
+	$(BIN)/python -m docs.site out/docs --jobs $(WORKERS)
+
+gallery: environment
+	$(BIN)/python -m docs.site.collect
+
 masters: environment
 	$(BIN)/python -m benchmarks.foreign_masters --write docs/fmi_masters.md
 
@@ -76,12 +85,16 @@ tutorial: environment
 targets: environment
 	$(BIN)/python -m benchmarks.targets
 
+wheels: environment
+	$(BIN)/python -m tests.wheels
+
 # Needs a network but no .venv, which a broken lock could not make. What is locked stays unless UPGRADE is given.
 lock:
 	'$(or $(PYTHON),python3)' -m venv .venv-lock
 	.venv-lock/bin/python -m pip install --quiet '$(UV)'
 	.venv-lock/bin/uv pip compile pyproject.toml \
-		--extra export --extra records --extra cma --extra masters --extra test --extra lint --group build \
+		--extra export --extra tables --extra records --extra modelica --extra cma --extra masters --extra docs \
+		--extra test --extra lint --group build \
 		--universal --python-version 3.11 --generate-hashes --only-binary :all: \
 		--custom-compile-command 'make lock' --quiet $(UPGRADE) \
 		--output-file requirements/locked.txt

@@ -41,6 +41,7 @@ from nlsdesign.design.optimisation.limits import Limit
 from nlsdesign.design.optimisation.program import Rows
 from nlsdesign.design.optimisation.solve import GOALS, USUAL, Wanted
 from nlsdesign.design.optimisation.starts import starts
+from nlsdesign.export.compilation.cross_compiler import BASELINE
 
 Floats = NDArray[np.float64]
 
@@ -414,7 +415,7 @@ def _compiled(function: ca.Function) -> ca.Function:
 
 
 def _zig() -> list[str]:
-    return [sys.executable, "-m", "ziglang", "cc"] if importlib.util.find_spec("ziglang") else []
+    return [sys.executable, "-m", "ziglang", "cc", *BASELINE] if importlib.util.find_spec("ziglang") else []
 
 
 def compared(problem: Problem, limit: float) -> None:

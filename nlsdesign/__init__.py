@@ -9,7 +9,6 @@ asked for.
 
 from __future__ import annotations
 
-import ast
 import functools
 import importlib
 from pathlib import Path
@@ -18,8 +17,6 @@ from types import ModuleType
 from .errors import nearest
 from .locations import bundled, version
 from .quantity import quantity as quantity  # the function; a later import of the module leaves it in place
-
-__version__ = version()
 
 
 def __getattr__(name: str) -> object:
@@ -35,6 +32,8 @@ def __getattr__(name: str) -> object:
     AttributeError
         If it is not public here; the message names its module, or the nearest public name.
     """
+    if name == "__version__":
+        return version()
     if name.startswith("_"):
         raise AttributeError(name)
     if name not in _homes():
@@ -57,6 +56,8 @@ def __dir__() -> list[str]:
 @functools.cache
 def _homes() -> dict[str, str]:
     """Return the module of each public name, below this package; "" for the modules of the package itself."""
+    import ast
+
     stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
     homes = {a.name: a.name for node in stub.body if isinstance(node, ast.Import) for a in node.names}
     for node in stub.body:

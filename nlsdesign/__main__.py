@@ -1,5 +1,20 @@
-"""``python -m nlsdesign`` is the command line."""
+"""``python -m nlsdesign`` and ``nlsdesign`` are the command line; interrupts are handled from here on."""
 
-from .cli import main
+from __future__ import annotations
 
-main()
+from .interruption import guarded
+
+
+def main() -> None:
+    """Run the command line, whose modules are imported where an interrupt is handled already."""
+    guarded(_run)
+
+
+def _run() -> None:
+    from .cli import main as program
+
+    program()
+
+
+if __name__ == "__main__":
+    main()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -15,6 +14,7 @@ from typing import Any, Self
 from .errors import DeckError, NlsError, UnitError, ValueRangeError, brief, nearest, unknown_name, visible
 from .locations import folder
 from .quantity import Quantity, parse_unit
+from .reading import is_there, text_of
 
 _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
@@ -25,7 +25,6 @@ MOST_SPREAD = 5.0
 _MOST_LEVELS = 64
 """Names within names; the deepest deck of the project has seven."""
 _TOO_DEEP = re.compile(rf"""(?<![\w.\-"'])(?:[\w\-"']+\s*\.\s*){{{_MOST_LEVELS}}}""")
-_MOST_BYTES = 2**24
 _MOST_DIGITS = 1000
 _TOO_MANY_DIGITS = re.compile(rf"[0-9A-Fa-f_]{{{_MOST_DIGITS}}}")
 NUMBER_FIELDS = ("value", "unit", "source", "spread")
@@ -212,7 +211,7 @@ class Deck:
         except NlsError as error:
             raise error.at(where) from None
         except OverflowError:
-            rule = f"{brief(value)} {raw['unit']} with spread {brief(spread)} is too large a number to compute with"
+            rule = f"{brief(value)} {raw['unit']}, spread {brief(spread)}, is too large to compute with"
             raise ValueRangeError(where, rule, next_step="correct the number or its unit") from None
 
 
@@ -249,25 +248,10 @@ def load_deck(name: str | Path) -> Deck:
         if str(name) not in deck_names():
             raise unknown_name("deck", str(name), deck_names())
         path = folder("models") / "decks" / f"{name}.toml"
-    # A name that is too long for the file system is no file either.
-    if not os.path.exists(path):
+    if not is_there(path):
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
-    return read_deck(_text(path), path)
-
-
-def _text(path: Path) -> str:
-    try:
-        if not path.is_file():
-            raise DeckError(str(path), "is no file", next_step="give a text file in UTF-8")
-        if path.stat().st_size > _MOST_BYTES:
-            rule = f"has {path.stat().st_size} bytes; a deck has at most {_MOST_BYTES}"
-            raise DeckError(str(path), rule, next_step="give a text file in TOML")
-        # An editor may have put a byte order mark in front.
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, ValueError) as error:  # ValueError: no text in UTF-8, or no possible name of a file
-        rule = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-        raise DeckError(str(path), rule, next_step="give a text file in UTF-8") from None
+    return read_deck(text_of(path, DeckError), path)
 
 
 def read_deck(text: str, path: Path) -> Deck:
@@ -313,7 +297,8 @@ def read_deck(text: str, path: Path) -> Deck:
 
 def _levels(tables: Mapping[str, Any]) -> int:
     """Return how many tables and lists stand within each other."""
-    levels, inner = 0, [tables]
+    levels = 0
+    inner: list[Any] = [tables]
     while inner:
         levels += 1
         each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]

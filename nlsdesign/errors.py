@@ -10,7 +10,7 @@ from collections.abc import Iterable
 _LONGEST_NAME = 120
 """Longer names are compared with nothing: no name that exists is as long."""
 _LONGEST_RUN, _LONGEST_TEXT = 300, 2500
-"""Most characters of a run without blanks, and of one text of a message; what is longer is cut in its middle."""
+"""Most characters of a run without blanks, and of a text; what is longer is cut in its middle."""
 _TURNING = "\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
 """Marks that turn the direction of writing, so that a text reads otherwise than it is."""
 
@@ -117,7 +117,7 @@ class NlsError(Exception):
 
 
 def fit_for_message(text: str) -> str:
-    """Return a text with control characters written out, and cut where it is very long.
+    r"""Return a text with control characters written out, and cut where it is very long.
 
     Parameters
     ----------
@@ -126,8 +126,8 @@ def fit_for_message(text: str) -> str:
 
     Examples
     --------
-    >>> fit_for_message("motor\x1b[2J")
-    'motor\\x1b[2J'
+    >>> print(fit_for_message("motor\x1b[2J"))
+    motor\x1b[2J
     """
     if len(text) > _LONGEST_TEXT:
         text = _cut(text, _LONGEST_TEXT)

@@ -1,15 +1,14 @@
 """Location of the folders that are distributed with the package, and its version.
 
-The rule: in a wheel the top-level folders ``models`` and ``studies`` are packed into ``nlsdesign/_bundled/``,
-so that they do not spread over site-packages. In a checkout (also an editable install) there is no
-``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is checked too,
-because a folder named ``models`` next to an *installed* package belongs to another project.
+The rule: in a wheel the top-level folders ``models``, ``studies`` and ``docs`` are packed into
+``nlsdesign/_bundled/``, so that they do not spread over site-packages. In a checkout (also an editable
+install) there is no ``_bundled``; they stand next to the package, beside ``pyproject.toml``. That file is
+checked too, because a folder named ``models`` next to an *installed* package belongs to another project.
 """
 
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import importlib.util
 import sys
 import tomllib
@@ -22,13 +21,13 @@ from .errors import UnknownNameError
 _PACKAGE: Final = Path(__file__).resolve().parent
 
 
-def folder(name: Literal["models", "studies"], *, package: Path = _PACKAGE) -> Path:
+def folder(name: Literal["models", "studies", "docs"], *, package: Path = _PACKAGE) -> Path:
     """Return the folder of that name that is distributed with the package.
 
     Parameters
     ----------
     name
-        ``"models"`` or ``"studies"``.
+        ``"models"``, ``"studies"`` or ``"docs"``.
     package
         Folder of the package ``nlsdesign``; another one only in tests.
 
@@ -99,7 +98,12 @@ def version(*, package: Path = _PACKAGE) -> str:
     str
         The version of the checkout that is running, or else of the installed distribution.
     """
-    return _checkout_version(package) or importlib.metadata.version("nlsdesign")
+    checkout = _checkout_version(package)
+    if checkout is not None:
+        return checkout
+    import importlib.metadata  # takes longer than the start of the command line, so only where it is needed
+
+    return importlib.metadata.version("nlsdesign")
 
 
 def _checkout_version(package: Path) -> str | None:

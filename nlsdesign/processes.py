@@ -7,8 +7,9 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -51,6 +52,40 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
         with signals_held():
             pool.terminate()
             pool.join()
+
+
+def run_to_end(
+    command: Sequence[str], *, environment: Mapping[str, str] | None = None, seconds: float | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a program and return what it printed; an interrupt ends it with all that it has started.
+
+    Parameters
+    ----------
+    command
+        Program and arguments.
+    environment
+        Of the program; this one's without it.
+    seconds
+        Most time that it may take; ``subprocess.TimeoutExpired`` is raised beyond it.
+    """
+    group = None if sys.platform == "win32" else 0
+    with signals_held():
+        # It inherits that signals are held; a group of its own, which is killed, makes up for that.
+        process = subprocess.Popen(
+            command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True, errors="replace", process_group=group,
+        )  # fmt: skip
+    try:
+        out, errors = process.communicate(timeout=seconds)
+    except BaseException:
+        with signals_held(), contextlib.suppress(OSError):
+            if group is not None:
+                os.killpg(process.pid, signal.SIGKILL)
+            process.kill()
+        with signals_held():
+            process.wait()
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, out, errors)
 
 
 @contextlib.contextmanager

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import os
-import tempfile
+import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import ExportError
 from .written_files import note_written, place_for
+
+_drafts: set[Path] = set()
 
 
 @contextmanager
@@ -29,14 +32,13 @@ def draft(target: Path) -> Iterator[Path]:
     ExportError
         If the folder or file cannot be written.
     """
+    # The name is noted before the file exists, so that an interrupt at any moment leaves none behind.
+    name = target.parent / f".{target.name}.{secrets.token_hex(6)}"
+    _drafts.add(name)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    except OSError as error:
-        raise _not_writable(target, error) from error
-    os.close(handle)
-    try:
-        yield Path(name)
+        os.close(os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+        yield name
         # A temporary file can be read by its owner only.
         os.chmod(name, 0o644)
         place = place_for(target, Path(name))
@@ -45,7 +47,16 @@ def draft(target: Path) -> Iterator[Path]:
     except OSError as error:
         raise _not_writable(target, error) from error
     finally:
-        Path(name).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # where its folder could not be made
+            name.unlink(missing_ok=True)
+        _drafts.discard(name)
+
+
+def remove_drafts() -> None:
+    """Remove the drafts that an interrupt has left, in the moment before they are removed or after it."""
+    for name in list(_drafts):
+        with contextlib.suppress(OSError):
+            name.unlink(missing_ok=True)
 
 
 def make_folder(folder: Path) -> None:

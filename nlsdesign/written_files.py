@@ -147,6 +147,11 @@ def place_for(target: Path, draft: Path) -> Path:
         Where it should go.
     draft
         The finished file.
+
+    Raises
+    ------
+    ExportError
+        If there is no free name beside it.
     """
     kept = _now.get()
     if kept is None or kept.force or not kept.covers(target):

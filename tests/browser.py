@@ -79,7 +79,8 @@ class Tab:
     def look(self, width: int, *, height: int = 800, theme: str = "light") -> None:
         """Show the page on a screen of a width in CSS pixels."""
         self.ask(
-            "Emulation.setDeviceMetricsOverride", width=width, screenWidth=width, screenHeight=height, height=height, deviceScaleFactor=1,
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+            screenWidth=width, screenHeight=height,
             mobile=width < 600,
         )  # fmt: skip
         wanted = [{"name": "prefers-color-scheme", "value": theme}]

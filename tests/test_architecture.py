@@ -14,7 +14,16 @@ from tests.import_graph import Import, cycles, imports, modules
 
 # Open to every room.
 BASE = {
-    *("bibliography", "errors", "extensions", "quantity", "symbolic", "tables", "unit_slips", "written_numbers"),
+    *(
+        "bibliography",
+        "errors",
+        "extensions",
+        "quantity",
+        "symbolic",
+        "tables",
+        "unit_slips",
+        "written_numbers",
+    ),
     *("locations", "processes", "progress", "writing", "written_files"),
 }
 # What the floors above the waist stand on: they see the flat model and never the components it came from.

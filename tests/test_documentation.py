@@ -38,7 +38,7 @@ def public_files(root: Path) -> list[Path]:
 
 
 def documents(root: Path) -> list[Path]:
-    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+    return [root / "README.md", root / "CONTRIBUTING.md", *sorted((root / "docs").rglob("*.md"))]
 
 
 def text_files(root: Path) -> Iterator[tuple[str, str]]:

@@ -38,7 +38,9 @@ def main() -> int:
     for problem in problems:
         print(problem, file=sys.stderr)
     pages = len(list(out.rglob("*.html")))
-    print(f"{pages} pages in {out}: {staged - begin:.0f} s to stage, {time.monotonic() - staged:.0f} s to build")
+    print(
+        f"{pages} pages in {out}: {staged - begin:.0f} s to stage, {time.monotonic() - staged:.0f} s to build"
+    )
     return 1 if problems else 0
 
 

@@ -34,14 +34,22 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
             made["reference/api/rooms.md"] = _rooms(names) + f"```{{toctree}}\n:hidden:\n\n{entries}\n```\n"
         else:
             made[f"reference/api/{slug}.md"] = f"# {title}\n\n" + "".join(_documented(name) for name in names)
-        rows = [[f'<a href="{_address(slug, n)}"><code>nls.{n}</code></a>', summary(getattr(nlsdesign, n))] for n in names]
-        listed += f"## {title}\n\n" + markup.table(("name", "what it is"), rows, caption=f"{title}: public names")
+        rows = [
+            [f'<a href="{_address(slug, n)}"><code>nls.{n}</code></a>', summary(getattr(nlsdesign, n))]
+            for n in names
+        ]
+        listed += f"## {title}\n\n" + markup.table(
+            ("name", "what it is"), rows, caption=f"{title}: public names"
+        )
     order = [re.sub(r"\W+", "_", title.lower()).strip("_") for title, _ in sections(root)]
     front = (
-        "# Python\n\n`import nlsdesign as nls` gives these names, with types; made from their docstrings. What is not here is in its "
+        "# Python\n\n`import nlsdesign as nls` gives these names, with types; made from their "
+        "docstrings. What is not here is in its "
         "[room](rooms.md).\n\n"
     )
-    made["reference/api/index.md"] = front + listed + "```{toctree}\n:hidden:\n\n" + "\n".join(order) + "\n```\n"
+    made["reference/api/index.md"] = (
+        front + listed + "```{toctree}\n:hidden:\n\n" + "\n".join(order) + "\n```\n"
+    )
     return made
 
 
@@ -90,7 +98,8 @@ def _documented(name: str, module: str = "nlsdesign") -> str:
 
 def _rooms(names: list[str]) -> str:
     rows = [
-        [f'<a href="rooms/{name}.html"><code>nls.{name}</code></a>', summary(getattr(nlsdesign, name))] for name in names
+        [f'<a href="rooms/{name}.html"><code>nls.{name}</code></a>', summary(getattr(nlsdesign, name))]
+        for name in names
     ]
     return "# Rooms\n\n" + markup.table(("room", "what lives there"), rows, caption="Rooms of the package")
 
@@ -98,7 +107,9 @@ def _rooms(names: list[str]) -> str:
 def _room(name: str) -> str:
     room = getattr(nlsdesign, name)
     listed = getattr(room, "__all__", None) or [
-        n for n, v in vars(room).items() if not n.startswith("_") and getattr(v, "__module__", "").startswith(room.__name__)
+        n
+        for n, v in vars(room).items()
+        if not n.startswith("_") and getattr(v, "__module__", "").startswith(room.__name__)
     ]
     rows = []
     for each in sorted(listed, key=str.lower):
@@ -115,5 +126,7 @@ def _speaks(value: object) -> bool:
 def _signature(value: object) -> str:
     if not inspect.isroutine(value):
         return ""
-    names = [p.name for p in inspect.signature(value).parameters.values() if p.default is inspect.Parameter.empty]
+    names = [
+        p.name for p in inspect.signature(value).parameters.values() if p.default is inspect.Parameter.empty
+    ]
     return f"({', '.join(names)})"

@@ -17,11 +17,11 @@ from nlsdesign.discrepancy.effects.plain_names import capitalised, title
 
 from . import bibliography, markup
 
-_BASES: Mapping[str, tuple[type, str, str]] = {
-    "targets": (design.Target, "target", "The torque curve that a spring shall have."),
-    "limits": (design.Limit, "limits", "What a design must keep. Without any, those of the declared cable and rubber hold."),
-    "goals": (design.Goal, "goals", "What is made small, and traded by `nlsdesign design` with a front."),
-    "goals_of_tasks": (design.TaskGoal, "target", "What the curve for a task makes small; it stands inside a `TaskTarget`."),
+_BASES: Mapping[str, tuple[type, str]] = {
+    "targets": (design.Target, "The torque curve that a spring shall have."),
+    "limits": (design.Limit, "What a design must keep; by default those of the declared cable and rubber."),
+    "goals": (design.Goal, "What is made small, and traded by `nlsdesign design` with a front."),
+    "goals_of_tasks": (design.TaskGoal, "What the curve for a task makes small, inside a `TaskTarget`."),
 }  # fmt: skip
 
 
@@ -35,11 +35,12 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     """
     asked = "# Targets, limits and goals\n\n"
     asked += (
-        "Made from the classes. In Python they are `nlsdesign.design.Name(field=…)`; in a design file (`nlsdesign design --job`) "
-        "one line `Name = {field = \"number unit\"}` below `[target]`, `[limits]` or `[goals]`. "
+        "Made from the classes. In Python they are `nlsdesign.design.Name(field=…)`; in a design file "
+        "(`nlsdesign design --task FILE`) "
+        'one line `Name = {field = "number unit"}` below `[target]`, `[limits]` or `[goals]`. '
         "How they work together: [Design a cam](../how_to/design_a_cam.md).\n\n"
     )
-    for name, (base, _, sentence) in _BASES.items():
+    for name, (base, sentence) in _BASES.items():
         asked += f"## {capitalised(name.replace('_', ' '))}\n\n{sentence}\n\n"
         asked += "".join(_class(n, kind) for n, kind in kinds(base).items())
     return {"reference/targets_limits_goals.md": asked, "reference/effects.md": _effects()}
@@ -59,7 +60,11 @@ def _class(name: str, kind: type) -> str:
         for field in dataclasses.fields(kind)
         if field.init
     ]
-    table = markup.table(("field", "kind", "default", "meaning"), rows, caption=f"Fields of {name}") if rows else ""
+    table = (
+        markup.table(("field", "kind", "default", "meaning"), rows, caption=f"Fields of {name}")
+        if rows
+        else ""
+    )
     examples = written.get("Examples", "")
     shown = markup.code(examples, "pycon") if examples.lstrip().startswith(">>>") else ""
     return (
@@ -86,7 +91,9 @@ def documented(section: str) -> dict[str, str]:
 
 def _shown(hint: object) -> str:
     text = hint.__name__ if isinstance(hint, type) else str(hint)
-    return re.sub(r"\b(?:nlsdesign|collections|typing|numpy)\.(?:\w+\.)*", "", text).replace("Quantity | float", "number with unit")
+    return re.sub(r"\b(?:nlsdesign|collections|typing|numpy)\.(?:\w+\.)*", "", text).replace(
+        "Quantity | float", "number with unit"
+    )
 
 
 def _default(field: dataclasses.Field[object]) -> str:
@@ -98,9 +105,11 @@ def _default(field: dataclasses.Field[object]) -> str:
 
 def _effects() -> str:
     text = (
-        f"# Effects of the catalogue\n\nMade from the catalogue of {len(ALL)} effects that `nlsdesign diagnose` tries, in the order in which the first "
+        f"# Effects of the catalogue\n\nMade from the catalogue of {len(ALL)} effects that "
+        "`nlsdesign diagnose` tries, in the order in which the first "
         "of several that records cannot tell apart is named. How one is chosen: "
-        "[the decision rule](../decision.md); how often it is right: [how well the diagnosis does](../discrepancy.md).\n\n"
+        "[the decision rule](../decision.md); how often it is right: "
+        "[how well the diagnosis does](../discrepancy.md).\n\n"
     )
     return text + "".join(_effect(row) for row in ALL)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 _LOADED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "object": "data"}
-_STYLED = re.compile(r"url\(\s*['\"]?((?:https?:)?//[^'\")]+)|@import\s+['\"]?((?:https?:)?//\S+)")
+_STYLED = re.compile(r"url\(\s*['\"]?((?:https?:)?//[^'\")]+)|@import\s+['\"]?((?:https?:)?//[^'\"\s;]+)")
 
 
 class _Page(HTMLParser):
@@ -30,7 +30,8 @@ class _Page(HTMLParser):
         self.anchors |= {given[name] for name in ("id", "name") if given.get(name)}
         if tag == "a" and "href" in given:
             self.links.append(given["href"])
-        if tag == "link" and "stylesheet" in given.get("rel", "") or tag in _LOADED and _LOADED[tag] in given:
+        styled = tag == "link" and "stylesheet" in given.get("rel", "")
+        if styled or given.get(_LOADED.get(tag, "")) is not None:
             self.loaded.append(given.get(_LOADED.get(tag, "href"), ""))
         if tag == "img" and not given.get("alt"):
             self.nameless.append(given.get("src", ""))

@@ -1,7 +1,7 @@
 """Run studies and keep some of their figures for the gallery: ``python -m docs.site.collect [STUDY …]``.
 
-Studies take minutes, so their figures are committed, and ``docs/gallery/made.toml`` says when and with what they were
-made. Kept are the first small figures of each report, with the colours as variables of the page.
+Studies take minutes, so their figures are committed, and ``docs/gallery/made.toml`` says when and with what
+they were made. Kept are the first small figures of each report, with the colours as variables of the page.
 """
 
 from __future__ import annotations
@@ -37,14 +37,26 @@ def main() -> int:
     """Run the studies that are named, or all; return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m docs.site.collect", description=__doc__)
     parser.add_argument("study", nargs="*", help="all where none is named")
-    parser.add_argument("--reports", type=Path, help="folder with one folder for each study, instead of running them")
+    parser.add_argument(
+        "--reports", type=Path, help="folder with one folder for each study, instead of running them"
+    )
     arguments = parser.parse_args()
     made = read_made()
     for name in arguments.study or study_names():
         with tempfile.TemporaryDirectory() as folder:
             out = arguments.reports / name if arguments.reports else Path(folder)
             if not arguments.reports:
-                command = [sys.executable, "-m", "nlsdesign", "study", "run", name, "--fast", "--out", str(out)]
+                command = [
+                    sys.executable,
+                    "-m",
+                    "nlsdesign",
+                    "study",
+                    "run",
+                    name,
+                    "--fast",
+                    "--out",
+                    str(out),
+                ]
                 subprocess.run(command, check=True)
             report = out / "report.html"
             text = report.read_text(encoding="utf-8") if report.is_file() else ""
@@ -54,7 +66,10 @@ def main() -> int:
         made[name] = {
             "command": f"nlsdesign study run {name} --fast",
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "with": f"nlsdesign {locations.version()}, CasADi {version_of('casadi')}, Python {platform.python_version()}",
+            "with": (
+                f"nlsdesign {locations.version()}, CasADi {version_of('casadi')}, "
+                f"Python {platform.python_version()}"
+            ),
             "titles": [title for title, _, _ in kept],
             "captions": [caption for _, caption, _ in kept],
         }
@@ -79,7 +94,11 @@ def figures_of(report: str, name: str) -> Iterator[tuple[str, str, str]]:
     name
         Put before all identifiers, so that figures of several studies can stand on one page.
     """
-    small = [each for each in _FIGURE.finditer(report) if len(each["svg"]) <= _LARGEST and "<script" not in each["svg"]]
+    small = [
+        each
+        for each in _FIGURE.finditer(report)
+        if len(each["svg"]) <= _LARGEST and "<script" not in each["svg"]
+    ]
     for each in small[:_MOST]:
         svg = re.sub(r'id="', f'id="{name}-', each["svg"])
         svg = re.sub(r'(href="|url\()#', rf"\1#{name}-", svg)
@@ -95,7 +114,8 @@ def _plain(html: str) -> str:
 def _toml(made: dict[str, dict[str, object]]) -> str:
     head = "# Written by `make gallery`: when and with what the figures of the gallery were made.\n"
     tables = (
-        f"\n[{name}]\n" + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in entry.items())
+        f"\n[{name}]\n"
+        + "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in entry.items())
         for name, entry in sorted(made.items())
     )
     return head + "".join(tables)

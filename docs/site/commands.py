@@ -26,7 +26,10 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     top = {name: command for name, command in sorted(program.commands.items())}
     made = {f"reference/commands/{name}.md": _page(name, command) for name, command in top.items()}
     rows = [
-        [f'<a href="{path[1]}.html#{_place(path)}"><code>{" ".join(path)}</code></a>', escape(command.get_short_help_str(200))]
+        [
+            f'<a href="{path[1]}.html#{_place(path)}"><code>{" ".join(path)}</code></a>',
+            escape(command.get_short_help_str(200)),
+        ]
         for name, each in top.items()
         for path, command in _tree(("nlsdesign", name), each)
     ]
@@ -62,7 +65,9 @@ def _command(path: tuple[str, ...], command: click.Command) -> str:
     text = markup.anchor(_place(path)) + heading + markup.code(usage, "text") + _help(command.help or "")
     rows = [_row(each, context) for each in command.get_params(context)]
     rows = [row for row in rows if row]
-    text += markup.table(("argument", "default", "meaning"), rows, caption=f"Arguments and options of {' '.join(path)}")
+    if rows:
+        caption = f"Arguments and options of {' '.join(path)}"
+        text += markup.table(("argument", "default", "meaning"), rows, caption=caption)
     shown = _examples(command.epilog or "")
     return text + (("<p>Examples</p>\n\n" + markup.code(shown, "console")) if shown else "")
 
@@ -88,13 +93,17 @@ def _row(parameter: click.Parameter, context: click.Context) -> list[str]:
         return [f"<code>{escape(metavar)}</code>", "" if not parameter.required else "required", ""]
     assert isinstance(parameter, click.Option)
     names = ", ".join([*parameter.opts, *parameter.secondary_opts])
+    if isinstance(parameter.type, click.Choice):
+        metavar = "CHOICE"
     shown = names if parameter.is_flag else f"{names} {metavar}"
-    if parameter.hidden:
+    if parameter.hidden or parameter.name == "help":
         return []
     help_text = markup.inline(" ".join((parameter.help or "").split()))
     choices = ""
     if isinstance(parameter.type, click.Choice):
-        choices = " One of " + ", ".join(f"<code>{escape(str(c))}</code>" for c in parameter.type.choices) + "."
+        choices = (
+            " One of " + ", ".join(f"<code>{escape(str(c))}</code>" for c in parameter.type.choices) + "."
+        )
     return [f"<code>{escape(shown)}</code>", _default(parameter, context), help_text + choices]
 
 
@@ -102,7 +111,13 @@ def _default(parameter: click.Option, context: click.Context) -> str:
     if parameter.required:
         return "required"
     value: Any = parameter.get_default(context, call=False)
-    if parameter.is_flag or value is None or callable(value) or value in ((), [], "") or "UNSET" in repr(value).upper():
+    if (
+        parameter.is_flag
+        or value is None
+        or callable(value)
+        or value in ((), [], "")
+        or "UNSET" in repr(value).upper()
+    ):
         return ""
     if isinstance(value, tuple | list):
         value = " ".join(str(each) for each in value)

@@ -12,7 +12,7 @@ FONTS = {"font-stack": "system-ui, sans-serif", "font-stack--monospace": "ui-mon
 
 project = "nlsdesign"
 author = "the nlsdesign authors"
-copyright = "the nlsdesign authors, MIT licence"  # noqa: A001 - Sphinx calls it so
+copyright = "the nlsdesign authors, MIT licence"
 release = locations.version()
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docs.site.typeset"]
 source_suffix = {".md": "markdown"}

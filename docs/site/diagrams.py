@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from html import escape
+from itertools import pairwise
 
 _WIDTH, _ROW, _BOX, _GAP = 720, 74, 30, 12
 
@@ -26,7 +27,7 @@ def _edges(text: str) -> list[tuple[str, str]]:
     edges = []
     for line in text.splitlines():
         steps = [[name.strip() for name in step.split("&")] for step in line.split("-->")]
-        for above, below in zip(steps, steps[1:], strict=False):
+        for above, below in pairwise(steps):
             edges += [(a, b) for a in above for b in below]
     return edges
 
@@ -79,7 +80,8 @@ def _line(above: tuple[float, float], below: tuple[float, float]) -> str:
     (a, top), (b, bottom) = above, below
     top, bottom = top + _BOX / 2, bottom - _BOX / 2
     bend = (bottom - top) * 0.5
-    return f'<path d="M{a:.1f} {top:.1f}C{a:.1f} {top + bend:.1f} {b:.1f} {bottom - bend:.1f} {b:.1f} {bottom:.1f}"/>'
+    start, leave = f"M{a:.1f} {top:.1f}", f"C{a:.1f} {top + bend:.1f}"
+    return f'<path d="{start}{leave} {b:.1f} {bottom - bend:.1f} {b:.1f} {bottom:.1f}"/>'
 
 
 def _box(name: str, centre: tuple[float, float], widths: Mapping[str, float]) -> str:

@@ -152,7 +152,9 @@ class _Reader:
     """
 
     def __init__(self, text: str) -> None:
-        self.tokens = [(m.lastgroup or "", m.group()) for m in _TOKEN.finditer(text) if m.lastgroup != "space"]
+        self.tokens = [
+            (m.lastgroup or "", m.group()) for m in _TOKEN.finditer(text) if m.lastgroup != "space"
+        ]
         self.place = 0
 
     def row(self, end: str) -> str:

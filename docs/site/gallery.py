@@ -27,8 +27,9 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     cards = "".join(_card(root, name) for name in names)
     entries = "\n".join(names)
     return shown | {
-        "gallery/index.md": "# Gallery\n\nDesign studies that come with the project; `nlsdesign study run NAME` runs one and writes its report. "
-        "Numbers that a study claims are held by tests; figures were made by `make gallery`, each page says when.\n\n"
+        "gallery/index.md": "# Gallery\n\nDesign studies that come with the project; "
+        "`nlsdesign study run NAME` runs one and writes its report. Numbers that a study claims are held by "
+        "tests; figures were made by `make gallery`, each page says when.\n\n"
         f'<div class="cards">\n{cards}</div>\n\n```{{toctree}}\n:hidden:\n\n{entries}\n```\n'
     }
 
@@ -52,26 +53,32 @@ def _svg(root: Path, name: str, number: int) -> str:
 
 def _card(root: Path, name: str) -> str:
     # Identifiers must be unique on the page; the same figure stands on the page of the study alone.
-    return f'<div><p><a href="{name}.html"><strong>{name}</strong></a></p><p>{markup.inline(title(name))}</p>{_svg(root, name, 1)}</div>\n'
+    link = f'<a href="{name}.html"><strong>{name}</strong></a>'
+    return f"<div><p>{link}</p><p>{markup.inline(title(name))}</p>{_svg(root, name, 1)}</div>\n"
 
 
 def _study(root: Path, name: str, made: dict[str, object]) -> str:
     paragraphs = (load_study(name).__doc__ or "").split("\n\n")[1:]
-    text = f"# {name}\n\n" + f"<p>{markup.inline(title(name))}.</p>\n\n" + markup.prose("\n\n".join(paragraphs))
+    text = (
+        f"# {name}\n\n" + f"<p>{markup.inline(title(name))}.</p>\n\n" + markup.prose("\n\n".join(paragraphs))
+    )
     text += markup.code(f"nlsdesign study run {name}", "console")
     titles, captions = made.get("titles", []), made.get("captions", [])
     assert isinstance(titles, list)
     assert isinstance(captions, list)
     for number, (head, caption) in enumerate(zip(titles, captions, strict=True), start=1):
         svg = _svg(root, name, number)
-        text += f'## {head}\n\n<figure class="plot">{svg}<figcaption>{escape(caption)}</figcaption></figure>\n\n'
+        text += f"## {head}\n\n" + markup.plot(svg, escape(caption))
     if made:
-        text += f'<p class="facts">Made on {made["date"]} by <code>{escape(str(made["command"]))}</code> with {escape(str(made["with"]))}.</p>\n\n'
+        by, using = escape(str(made["command"])), escape(str(made["with"]))
+        text += f'<p class="facts">Made on {made["date"]} by <code>{by}</code> with {using}.</p>\n\n'
     rows = [
         [f"<code>{key}</code>", f"{c.value:g} ± {c.tolerance:g}", escape(c.unit), markup.inline(c.why)]
         for key, c in claims(name).items()
     ]
     if rows:
         columns = ("number", "value", "unit", "what the tolerance covers")
-        text += "## What it claims\n\n" + markup.table(columns, rows, caption=f"Claims of {name}, held by tests")
+        text += "## What it claims\n\n" + markup.table(
+            columns, rows, caption=f"Claims of {name}, held by tests"
+        )
     return text

@@ -42,7 +42,9 @@ def write_listings(root: Path, folder: Path, names: Iterable[str]) -> None:
     from pygments.lexers import TextLexer, get_lexer_for_filename
     from pygments.util import ClassNotFound
 
-    shown = HtmlFormatter(linenos="inline", lineanchors="L", anchorlinenos=True, style="a11y-high-contrast-light")
+    shown = HtmlFormatter(
+        linenos="inline", lineanchors="L", anchorlinenos=True, style="a11y-high-contrast-light"
+    )
     dark = HtmlFormatter(style="a11y-high-contrast-dark").get_style_defs(".highlight")
     style = _STYLE.format(light=shown.get_style_defs(".highlight"), dark=dark)
     for name in sorted(set(names)):

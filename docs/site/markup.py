@@ -45,6 +45,21 @@ def folded(summary: str, content: str) -> str:
     return f"<details><summary>{summary}</summary>\n\n{content}\n\n</details>\n\n"
 
 
+def plot(svg: str, caption: str) -> str:
+    """Return a figure with its caption.
+
+    Parameters
+    ----------
+    svg
+        As it stands in a page.
+    caption
+        HTML.
+    """
+    # A blank line would end a block of HTML in Markdown.
+    whole = re.sub(r"\n\s*\n", "\n", svg)
+    return f'<figure class="plot">{whole}<figcaption>{caption}</figcaption></figure>\n\n'
+
+
 def code(text: str, language: str) -> str:
     """Return a block of code.
 
@@ -65,7 +80,9 @@ def sections(documented: object) -> dict[str, str]:
         Class or function.
     """
     pieces = _SECTION.split(inspect.getdoc(documented) or "")
-    return {"": pieces[0].strip()} | dict(zip(pieces[1::2], (p.strip("\n") for p in pieces[2::2]), strict=True))
+    return {"": pieces[0].strip()} | dict(
+        zip(pieces[1::2], (p.strip("\n") for p in pieces[2::2]), strict=True)
+    )
 
 
 def prose(text: str) -> str:
@@ -76,7 +93,9 @@ def prose(text: str) -> str:
     text
         Without sections.
     """
-    return "\n\n".join(f"<p>{inline(' '.join(p.split()))}</p>" for p in text.split("\n\n") if p.strip()) + "\n\n"
+    return (
+        "\n\n".join(f"<p>{inline(' '.join(p.split()))}</p>" for p in text.split("\n\n") if p.strip()) + "\n\n"
+    )
 
 
 def inline(text: str) -> str:

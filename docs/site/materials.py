@@ -19,9 +19,9 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
         Of the project and of the staged sources; not needed here.
     """
     text = (
-        "# Materials\n\nRubbers of the library (`models/materials.toml`), as `nlsdesign materials` lists them. Each value has "
-        "the conditions that its source states; a dash where it states none. How to take one: "
-        "[Choose a rubber](../how_to/choose_a_rubber.md).\n\n"
+        "# Materials\n\nRubbers of the library (`models/materials.toml`), as `nlsdesign materials` lists "
+        "them. Each value has the conditions that its source states; a dash where it states none. "
+        "How to take one: [Choose a rubber](../how_to/choose_a_rubber.md).\n\n"
     )
     return {"reference/materials.md": text + "".join(_material(m) for m in library.materials().values())}
 

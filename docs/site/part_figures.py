@@ -4,7 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from nlsdesign.components import MATERIAL, ROTATION, TRANSLATION, Cam, Driven, Element, Part, Specimen, assembly, Spring, through, specimen, tie
+from nlsdesign.components import (
+    MATERIAL,
+    ROTATION,
+    TRANSLATION,
+    Cam,
+    Driven,
+    Element,
+    Part,
+    Specimen,
+    Spring,
+    assembly,
+    specimen,
+    through,
+    tie,
+)
 from nlsdesign.figures import Figure
 from nlsdesign.figures.curves import curves
 from nlsdesign.model import FlatModel, flatten
@@ -43,7 +57,9 @@ def _element(part: Element, name: str) -> Figure:
     body = Driven(domain=ROTATION if kind == "rotation" else TRANSLATION)
     model = flatten(assembly("bench", body=body, part=tie(held, "body")))
     effort = f"part.{held.domain.effort}"
-    lines = {f"{f:g} Hz": _loop(model, effort, amplitude * length, f, centred=kind == "rotation") for f in _SPEEDS}
+    lines = {
+        f"{f:g} Hz": _loop(model, effort, amplitude * length, f, centred=kind == "rotation") for f in _SPEEDS
+    }
     per, up, across = (1.0 / length, 1e-2, "strain, 1") if kind == "material" else (1.0, 1.0, "")
     if kind == "rotation":
         per, across = 180.0 / np.pi, "angle, °"

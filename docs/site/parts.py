@@ -25,7 +25,10 @@ ROOMS = {
     "core": ("Springs, dampers, combinations", "What any network is made of."),
     "materials": ("Rubber and other materials", "Laws of stress and strain; they stand inside a `Specimen`."),
     "transmission": ("Cams and cables", "What turns an angle into an extension, and what guides the pull."),
-    "mechanics": ("Bodies, friction, gears, drives, controllers", "What moves, what drives it, what resists."),
+    "mechanics": (
+        "Bodies, friction, gears, drives, controllers",
+        "What moves, what drives it, what resists.",
+    ),
     "sensing": ("Sensors", "What is read, and what is wrong with the reading."),
 }
 """Title and one sentence for each inner room of ``components``."""
@@ -45,7 +48,9 @@ def pages(root: Path, folder: Path) -> dict[str, str]:
     by_class = instances()
     known = component_classes()
     with ProcessPoolExecutor(2) as pool:
-        drawn = dict(zip(known, pool.map(drawing, known, [by_class[n] for n in known], chunksize=6), strict=True))
+        drawn = dict(
+            zip(known, pool.map(drawing, known, [by_class[n] for n in known], chunksize=6), strict=True)
+        )
     made: dict[str, str] = {}
     for room, (title, sentence) in ROOMS.items():
         names = [name for name, kind in known.items() if room_of(kind) == room]
@@ -91,7 +96,7 @@ def drawing(name: str, parts: list[Part]) -> str:
         except NlsError:  # for instance dry friction, which needs an inertia that it can hold
             continue
         if figure is not None:
-            return f'<figure class="plot">{inline_svg(figure, name)}<figcaption>{escape(part.title())}</figcaption></figure>\n\n'
+            return markup.plot(inline_svg(figure, name), escape(part.title()))
     return ""
 
 
@@ -103,7 +108,7 @@ def deck_example(part: Part) -> str:
     part
         An example of it.
     """
-    text = deck_text(around(part)).replace(', source = "not stated"', "")
+    text = deck_text(around(part)).replace('"not stated"', '"assumed: example"')
     return re.sub(r"\A\[deck\]\n.*?\n\n", "", text, flags=re.S).strip()
 
 
@@ -118,9 +123,10 @@ def _list(known: dict[str, type[Part]]) -> str:
     ]
     entries = "\n".join(ROOMS)
     return (
-        "# Parts of decks\n\nMade from the components, as `nlsdesign parts` lists them. Every table of a deck names one of these "
-        "with `component = \"…\"`; `between` says which bodies an element ties, `of` which signal a sensor reads. "
-        "Any number may be written bare, in SI, or as a table with `value`, `unit`, `source` and `spread`.\n\n"
+        "# Parts of decks\n\nMade from the components, as `nlsdesign parts` lists them. Every table of a "
+        "deck "
+        'names one of these with `component = "…"`; `between` says which bodies an element ties, `of` which '
+        "signal a sensor reads. Every number has `value`, `unit` and `source`, and may have a `spread`.\n\n"
         + markup.table(("part", "phenomena", "law"), rows, caption=f"All {len(known)} parts")
         + f"```{{toctree}}\n:hidden:\n\n{entries}\n```\n"
     )

@@ -1,4 +1,4 @@
-"""The sources of the site in one folder: pages of ``docs`` with their links, and pages made from the package."""
+"""The sources of the site in one folder: pages of ``docs``, and pages made from the package."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from . import api, bibliography, catalogue, commands, diagrams, gallery, listings, materials, parts
+from . import api, bibliography, catalogue, commands, diagrams, gallery, landing, listings, materials, parts
 
 _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]\n]+)\]\((?P<address>[^)\s]+)\)")
 _FENCE = re.compile(r"^(?P<mark>```+|~~~+)(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=mark)[ \t]*$", re.M | re.S)
@@ -32,13 +32,15 @@ def stage(root: Path, folder: Path) -> set[str]:
         Where to write.
     """
     linked: set[str] = set()
-    pages = {name: _text(root, root / "docs" / name, linked) for name in _written(root)}
+    pages = {_named(name): _text(root, root / "docs" / name, linked) for name in _written(root)}
     pages["changelog.md"] = _text(root, root / "CHANGELOG.md", linked, at="docs/changelog.md")
     own = root / "docs" / _OWN / "pages"
     for path in sorted(own.rglob("*.md")):
         name = path.relative_to(own).as_posix()
         pages[name] = _text(root, path, linked, at=f"docs/{name}")
     pages |= _contents(pages)
+    pages["index.md"] = pages["index.md"].replace("MORE", "\n".join(_unlisted(pages)))
+    pages["index.md"] = pages["index.md"].replace("<!-- picture -->", landing.picture())
     for name, text in pages.items():
         _write(folder / name, text)
     for path in sorted((root / "docs").rglob("*")):
@@ -56,6 +58,11 @@ def _written(root: Path) -> list[str]:
     docs = root / "docs"
     names = (path.relative_to(docs) for path in sorted(docs.rglob("*.md")))
     return [name.as_posix() for name in names if name.parts[0] != _OWN]
+
+
+def _named(name: str) -> str:
+    """Return the name of a page in the site: a README is the first page of its folder."""
+    return re.sub(r"README\.md$", "index.md", name)
 
 
 def _write(path: Path, text: str) -> None:
@@ -114,9 +121,12 @@ class Page:
             return link.group()
         target = (self.path.parent / address).resolve()
         docs = self.root / "docs"
-        known = {self.root / "README.md": docs / "index.md", self.root / "CHANGELOG.md": docs / "changelog.md"}
+        known = {
+            self.root / "README.md": docs / "index.md",
+            self.root / "CHANGELOG.md": docs / "changelog.md",
+        }
         if target in known or target.is_relative_to(docs):
-            shown = os.path.relpath(known.get(target, target), self.place.parent)
+            shown = _named(os.path.relpath(known.get(target, target), self.place.parent))
             return f"[{link['text']}]({shown}{'#' * bool(fragment)}{fragment})"
         if not target.is_file():
             return link["text"]
@@ -140,6 +150,14 @@ def _contents(pages: Pages) -> Pages:
     if "{toctree}" not in text:
         text += "\n\n" + toctree(tutorial, inside="tutorial")
     return made | {"tutorial/index.md": text}
+
+
+def _unlisted(pages: Pages) -> list[str]:
+    """Return the pages at the top that no table of contents has: new ones are shown without further work."""
+    tables = "\n".join(re.findall(r"```\{toctree\}(.*?)```", "\n".join(pages.values()), re.S))
+    listed = set(re.findall(r"^(?:\.\./)?(\w+)$", tables, re.M))
+    top = sorted(name.removesuffix(".md") for name in pages if "/" not in name)
+    return [name for name in top if name not in listed | {"index"}]
 
 
 def _is_front(name: str) -> bool:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 from docutils import nodes
+from docutils.utils import math
 from docutils.utils.math import latex2mathml
+from sphinx.util import logging
+
+_LOG = logging.getLogger(__name__)
 
 
 def mathml(latex: str, *, block: bool) -> str:
@@ -25,13 +30,22 @@ def mathml(latex: str, *, block: bool) -> str:
 
 
 def _inline(translator: Any, node: nodes.math) -> None:
-    translator.body.append(mathml(node.astext(), block=False))
+    translator.body.append(_typeset(node, block=False))
     raise nodes.SkipNode
 
 
 def _block(translator: Any, node: nodes.math_block) -> None:
-    translator.body.append(f'<div class="equation">{mathml(node.astext(), block=True)}</div>\n')
+    translator.body.append(f'<div class="equation">{_typeset(node, block=True)}</div>\n')
     raise nodes.SkipNode
+
+
+def _typeset(node: nodes.Element, *, block: bool) -> str:
+    """Return MathML; what cannot be set is a warning with its place, and so ends the build."""
+    try:
+        return mathml(node.astext(), block=block)
+    except math.MathError as error:
+        _LOG.warning("equation cannot be set: %s", error, location=node)
+        return f"<code>{escape(node.astext())}</code>"
 
 
 def setup(app: Any) -> dict[str, bool]:

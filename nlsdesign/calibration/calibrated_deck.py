@@ -17,6 +17,7 @@ from ..deck import Written
 from ..errors import ExportError, MeasurementError, NlsError
 from ..model.derived_deck import derived
 from ..quantity import Quantity, parse_unit, three_digits, to_resolution, typeset_unit, with_unit
+from ..reading import text_of
 from ..simulation import Prior
 from ..writing import write_text
 from .bench_response import shared_factors
@@ -328,14 +329,14 @@ def read_joint_numbers(path: Path) -> Prior:
         If the file is none.
     """
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        content = json.loads(text_of(Path(path), MeasurementError))
         covariance = np.array(content["covariance"], dtype=float)
         return Prior(
             tuple(content["names"]),
             np.array(content["values"], dtype=float),
             0.5 * (covariance + covariance.T),
         )
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
+    except (ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
         raise MeasurementError(
             str(path), f"holds no numbers that are known jointly: {error}",
             next_step="give the joint_numbers.json of a calibration",

@@ -122,10 +122,13 @@ def loop(
     unstable anywhere in the range that is looked at; the gain where that begins is printed. The observer is
     the cascade, with the numbers of the deck for the machine as well.
     """
+    from ..progress import Steps
+
     fixed, moved = _loops(deck_name, _law(options), options["delay"], options["sample_time"])
     names = ("amplitudes", "last", "inertias", "load_amplitude")
     asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
-    result = _evaluated(fixed, moved, asked)
+    with Steps().step("evaluation of the loop"):
+        result = _evaluated(fixed, moved, asked)
     files = _written(result, out)
     remarks = _remarks(deck_name, asked.last)
     warn(remarks)

@@ -82,11 +82,11 @@ def complete_names(program: click.Group) -> None:
     """
     for command in _commands(program):
         for parameter in command.params:
-            word = (parameter.metavar or "").strip("[]")
+            kind = (parameter.metavar or "").strip("[]")
             if parameter.name == "material":
-                word = "MATERIAL"
-            if word in _NAMES:
-                parameter._custom_shell_complete = _completer(*_NAMES[word])
+                kind = "MATERIAL"
+            if kind in _NAMES:
+                parameter._custom_shell_complete = _completer(*_NAMES[kind])
 
 
 def _commands(command: click.Command) -> Iterator[click.Command]:

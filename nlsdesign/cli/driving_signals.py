@@ -24,7 +24,7 @@ FORMS = "'2 A', '2 A sine 5 Hz', '2@5', '1 A + 2 A sine 5 Hz' or '2 A step 0.1 s
 
 
 @dataclass(frozen=True)
-class Step:
+class StepAt:
     """Zero, and from a time on a constant.
 
     Parameters
@@ -49,7 +49,7 @@ class Step:
         return self.size if time >= self.begin else 0.0
 
 
-def read_driving_signal(text: str, unit: str) -> Sine | Step:
+def read_driving_signal(text: str, unit: str) -> Sine | StepAt:
     """Read a constant, a sine or a step.
 
     Parameters
@@ -76,7 +76,7 @@ def read_driving_signal(text: str, unit: str) -> Sine | Step:
     if len(sine) == 2:
         return Sine(size_in(sine[0], unit), size_in(sine[1], "Hz"), offset)
     if len(step) == 2 and not plus:
-        return Step(size_in(step[0], unit), size_in(step[1], "s"))
+        return StepAt(size_in(step[0], unit), size_in(step[1], "s"))
     if plus or len(sine) > 2 or len(step) > 2:
         raise ValueRangeError(f"'{text}'", "is no signal", next_step=f"write for instance {FORMS}")
     return Sine(0.0, 0.0, size_in(text, unit))
@@ -140,7 +140,7 @@ def read_pairs(option: str, given: Sequence[str]) -> dict[str, str]:
     return pairs
 
 
-def read_inputs(model: FlatModel, given: Sequence[str]) -> dict[str, Sine | Step]:
+def read_inputs(model: FlatModel, given: Sequence[str]) -> dict[str, Sine | StepAt]:
     """Return the inputs that are typed, and the speeds that follow from prescribed motions.
 
     Parameters
@@ -156,7 +156,7 @@ def read_inputs(model: FlatModel, given: Sequence[str]) -> dict[str, Sine | Step
         If an input does not exist, or a signal cannot be read.
     """
     units = {v.name: v.unit for v in model.inputs}
-    inputs: dict[str, Sine | Step] = {}
+    inputs: dict[str, Sine | StepAt] = {}
     for name, text in read_pairs("--input", given).items():
         _check_input(f"--input {name}", name, model)
         try:
@@ -177,7 +177,7 @@ def _check_input(where: str, name: str, model: FlatModel) -> None:
         )
 
 
-def _rates_of(model: FlatModel, inputs: Mapping[str, Sine | Step]) -> dict[str, Sine]:
+def _rates_of(model: FlatModel, inputs: Mapping[str, Sine | StepAt]) -> dict[str, Sine]:
     """Return the speeds of bodies whose motion is prescribed, where only that is given."""
     from ..simulation import Sine
 
@@ -187,7 +187,7 @@ def _rates_of(model: FlatModel, inputs: Mapping[str, Sine | Step]) -> dict[str, 
         motion = inputs.get(body.motion)
         if motion is None or body.rate not in names or body.rate in inputs:
             continue
-        if isinstance(motion, Step):
+        if isinstance(motion, StepAt):
             raise ValueRangeError(
                 f"--input {body.motion}",
                 "is a prescribed motion, which cannot jump",

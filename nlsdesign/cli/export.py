@@ -82,11 +82,13 @@ def export_code(
     from ..deck import load_deck
     from ..export import export_c, write_examples
     from ..model import flatten
+    from ..progress import Steps
 
     declared = declare(load_deck(deck_name))
     plant = flatten(declared)
     with_examples = chosen.pop("examples")
-    name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
+    with Steps().step(what):
+        name, model, sentences = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     source = export_c(model, out, real=real, name=name)
     written = [source.header, source.source, source.selftest]
     if with_examples:

@@ -57,6 +57,10 @@ class _Models:
 
         return joined(self["observer"], self["controller"])
 
+    def only(self, what: Sequence[str]) -> tuple[dict[str, FlatModel], dict[str, str]]:
+        """Return what is asked for; nothing is left out."""
+        return {each: self[each] for each in dict.fromkeys(what)}, {}
+
     def possible(self) -> tuple[dict[str, FlatModel], dict[str, str]]:
         """Return what this deck allows, and why the rest is left out."""
         models: dict[str, FlatModel] = {"plant": self.plant}
@@ -142,19 +146,18 @@ def export_fmus(
     from ..deck import load_deck
     from ..export import Authorship
     from ..model import flatten
+    from ..progress import Steps
 
     chosen = {name: others[name] for name in ("kind", "spring", "measured")}
     law = {name: others[name] for name in ("law", "bandwidth", "velocity_bandwidth")}
     declared = declare(load_deck(deck_name))
-    made = _Models(flatten(declared), sample_time, chosen, law)
+    made, steps = _Models(flatten(declared), sample_time, chosen, law), Steps()
     # Before anything is written: not every system has an observer.
-    if what:
-        models = {each: made[each] for each in dict.fromkeys(what)}
-        reasons: dict[str, str] = {}
-    else:
-        models, reasons = made.possible()
+    with steps.step("models"):
+        models, reasons = made.only(what) if what else made.possible()
     about = Authorship(others["author"], others["copyright_"], others["licence"], date=others["date"])
-    written = _write(models, out, others["version"], _systems(platforms), about)
+    with steps.step("FMUs"):
+        written = _write(models, out, others["version"], _systems(platforms), about)
     if others["reference"]:
         from ..export import write_reference
 

@@ -1,4 +1,4 @@
-"""Entry point: exit status 0 for done, 1 for a finding, 2 for bad input, 130 for an interruption."""
+"""The program: status 0 for done, 1 for a finding, 2 for bad input, 70 for a fault, 130 if interrupted."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from .cosimulate import cosimulation
 from .decks import deck
 from .design import design
 from .diagnose import diagnose
+from .docs import docs
 from .export import export
 from .export_ssp import export_ssp
 from .fit import fit
@@ -62,7 +63,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, compare, study, completion),
+    *(cosimulation, simulate, fit, diagnose, compare, study, completion, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default
@@ -82,12 +83,13 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(2)
-    except click.exceptions.Abort:
-        click.echo("interrupted", err=True)
-        sys.exit(130)
-    except KeyboardInterrupt:
+    except (click.exceptions.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         sys.exit(130)
     except NlsError as error:
         click.echo(f"error: {error}", err=True)
         sys.exit(2)
+    except Exception as error:
+        from .unexpected import status_of
+
+        sys.exit(status_of(error))

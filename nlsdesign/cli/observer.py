@@ -86,7 +86,7 @@ def observer(
     from ..export import export_c
     from ..model import flatten
     from ..observer import certified_design
-    from ..report import write_observer_report
+    from ..progress import Steps
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
@@ -96,26 +96,25 @@ def observer(
     plant = flatten(declared)
     roles = {name: options[name] for name in ("spring", "measured")}
     sample_time, real = options["sample_time"], options["real"]
-    chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
-    proved = None if wanted is None else prove(plant, deck, chosen, wanted)
-    errors = (
-        spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
-        if options["with_errors"]
-        else None
-    )
+    steps = Steps()
+    with steps.step("observer"):
+        chosen = designed_observer(plant, kind=kind, decay=options["decay"], sample_time=sample_time, **roles)
+        proved = None if wanted is None else prove(plant, deck, chosen, wanted)
+    errors = None
+    if options["with_errors"]:
+        with steps.step("errors over the spread"):
+            errors = spread_errors(plant, chosen, draws=options["draws"], sample_time=sample_time, **roles)
     model = chosen.model if proved is None else with_statement(certified_design(proved, plant).model, proved)
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]
     if proved is not None:
         files.insert(0, write_proved(proved, out, source))
-    if errors is not None:
-        files += write_errors(errors, out)
     statement = () if proved is None else proved.statement
     remarks = range_remarks(declared, measured=options["measured"])
     warn(remarks)
     words = (str(chosen.design), *filter(None, [chosen.reason]), *statement)
     if errors is not None:
-        files.append(write_observer_report(out / "report.html", model, errors, words=words, files=files))
+        files += write_errors(errors, out, model=model, words=words, files=files)
     if as_json:
         content = {
             "kind": chosen.kind, "reason": chosen.reason, "expected_rms": list(chosen.expected),

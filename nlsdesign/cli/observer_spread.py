@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,8 +79,10 @@ def spread_errors(
     return observer_errors(observers, bench, draws=draws, bounded=bounded, translate=compiled())
 
 
-def write_errors(errors: SpreadErrors, out: Path) -> list[Path]:
-    """Write the errors as table, JSON and figure.
+def write_errors(
+    errors: SpreadErrors, out: Path, *, model: FlatModel, words: Sequence[str], files: Sequence[Path]
+) -> list[Path]:
+    """Write the errors as table, JSON, figure and page.
 
     Parameters
     ----------
@@ -87,8 +90,15 @@ def write_errors(errors: SpreadErrors, out: Path) -> list[Path]:
         Of the observers.
     out
         Folder.
+    model
+        The observer.
+    words
+        What is said of it.
+    files
+        Written before; the page lists them too.
     """
     from .. import figures
+    from ..report import write_observer_report
     from ..writing import write_table, write_text
 
     numbers = ("exact", "median", "quantile 90 %", "rms", "bound")
@@ -101,7 +111,9 @@ def write_errors(errors: SpreadErrors, out: Path) -> list[Path]:
     write_table(out / "errors.csv", [heads, *rows])
     write_text(out / "errors.json", text)
     drawn = figures.write_figures(out, {"errors": figures.errors_over_spread(errors)})
-    return [out / "errors.csv", out / "errors.json", *drawn]
+    written = [out / "errors.csv", out / "errors.json", *drawn]
+    page = out / "report.html"
+    return [*written, write_observer_report(page, model, errors, words=words, files=[*files, *written])]
 
 
 def _rows(errors: SpreadErrors) -> list[tuple[Any, ...]]:

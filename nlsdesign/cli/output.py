@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from .tables import head_count, table_lines
+from .terminal_tables import head_count, table_lines
 
 WIDE = 160
 """Width of a table that is not shown on a terminal."""

@@ -42,7 +42,7 @@ def out_option(default: str = "out", *, writes: Names = ()) -> Callable[[F], F]:
     kind = click.Path(path_type=Path, file_okay=False)
     text = "Folder for all files that are written."
     option = click.option(
-        "--out", type=kind, default=default, show_default=True, help=text, callback=can_be_made
+        "--out", type=kind, default=default, show_default=True, help=text, callback=_can_be_made
     )
 
     def below(given: Mapping[str, Any]) -> tuple[Path, list[Path]]:
@@ -164,19 +164,8 @@ def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool) -> None:
     sys.exit(1 if refused else 0)
 
 
-def can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
-    """Refuse, before any work, a folder that could not be written into; it is made with its first file.
-
-    Parameters
-    ----------
-    folder
-        As it was given.
-
-    Raises
-    ------
-    click.BadParameter
-        If it is below a file, or may not be written.
-    """
+def _can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
+    """Refuse, before any work, a folder that could not be written into; it is made with its first file."""
     try:
         place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     except OSError as error:
@@ -191,5 +180,5 @@ def can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
 def _file_can_be_made(context: click.Context, parameter: click.Parameter, file: Path | None) -> Path | None:
     """Refuse, before any work, a file whose folder could not be written into."""
     if file is not None:
-        can_be_made(context, parameter, file.parent)
+        _can_be_made(context, parameter, file.parent)
     return file

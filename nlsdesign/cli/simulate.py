@@ -277,8 +277,20 @@ def _write(
         TextSection("Warnings", "\n\n".join(warnings) or "No law leaves its range, no limit is reached."),
         FigureSection("Signals over time", picture, caption="Signals of one unit share a panel."),
         TableSection("Sizes", _COLUMNS, tuple(_rows(run, shown)), caption="Over the whole run."),
-        *([TableSection("Events", ("time in s", "part", "what"), rows, folded=True)] if rows else []),
-        FileSection("Files", {out: "all rows", files[1]: "the picture"}),
+        *(
+            [
+                TableSection(
+                    "Events",
+                    ("time in s", "part", "what"),
+                    rows,
+                    caption="What sticks, slides, strikes or switches, and when.",
+                    folded=True,
+                )
+            ]
+            if rows
+            else []
+        ),
+        FileSection("Files", {out: "all rows", files[1]: "the picture"}, caption="Written beside this page."),
     ]
     facts = {"deck": f"`{deck_name}`", "time": f"{run.time[-1]:g} s"}
     return [*files, write_report(page, *sections, title=f"{model.name}: simulation", facts=facts)]

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import inspect
 import sys
 import tomllib
-from collections.abc import Mapping
+import traceback
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, SupportsFloat, runtime_checkable
 
 import click
 
-from ..errors import NlsError, unknown_name
+from ..errors import NlsError, brief, unknown_name
 from ..locations import bundled, folder
 from ..quantity import with_unit
+from ..reading import is_there, text_of
 from ..writing import make_folder
 from ..written_files import listed_files
 from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
+
+_SIGNATURE = "def main(out, fast=False): ..."
 
 
 @dataclass(frozen=True)
@@ -83,22 +89,51 @@ def load_study(name: str) -> ModuleType:
     UnknownNameError
         If there is no such study.
     NlsError
-        If there is no such file, or it cannot be loaded as Python.
+        If there is no such file, it cannot be loaded as Python, or has no ``main``.
     """
     path = Path(name)
     if path.suffix != ".py":
         if name not in study_names():
             raise unknown_name("study", name, study_names())
         return bundled("studies", name)
-    if not path.exists():
+    if not is_there(path):
         raise NlsError(str(path), "no such file", next_step="give the name of a study or a .py file")
+    text_of(path, NlsError, next_step="give a Python file")
     spec = importlib.util.spec_from_file_location(f"nlsdesign_study_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise NlsError(str(path), "cannot be loaded as Python")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    with _mistakes_named(path):
+        spec.loader.exec_module(module)
+    if not callable(getattr(module, "main", None)):
+        raise NlsError(str(path), "has no function main", next_step=f"write {_SIGNATURE}")
     return module
+
+
+@contextlib.contextmanager
+def _mistakes_named(path: Path) -> Iterator[None]:
+    """Turn whatever a study of somebody's own raises into one message with its line."""
+    try:
+        yield
+    except NlsError as error:
+        raise error.at(_line_of(error, path)) from None
+    except SystemExit as leaving:
+        rule = f"ends the program by itself (exit status {brief(leaving.code)})"
+        raise NlsError(_line_of(leaving, path), rule, next_step="return from main instead") from None
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise NlsError(_line_of(error, path), reason, next_step="correct the study") from None
+
+
+def _line_of(error: BaseException, path: Path) -> str:
+    """Return file and line of a study at which an error began."""
+    if isinstance(error, SyntaxError) and error.lineno:
+        return f"{path}:{error.lineno}"
+    lines = [
+        f.lineno for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).name == path.name
+    ]
+    return f"{path}:{lines[-1]}" if lines else str(path)
 
 
 def claims(name: str) -> dict[str, Claim]:
@@ -131,9 +166,15 @@ def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
     UnknownNameError
         If there is no such study.
     NlsError
-        If its ``main`` returns something without numbers.
+        If its ``main`` cannot be called, fails, or returns something without numbers.
     """
-    results = load_study(name).main(out, fast=fast)
+    study = load_study(name)
+    if Path(name).suffix == ".py":
+        _check_signature(name, study)
+        with _mistakes_named(Path(name)):
+            results = study.main(out, fast=fast)
+    else:
+        results = study.main(out, fast=fast)
     if results is None:
         return {}
     if not isinstance(results, Results):
@@ -142,7 +183,22 @@ def run_study(name: str, out: Path, *, fast: bool = False) -> dict[str, float]:
             f"main() returned {type(results).__name__}, which has no property 'numbers'",
             next_step="return an object whose 'numbers' is a mapping of float by name, or None if skipped",
         )
-    return dict(results.numbers)
+    numbers = results.numbers
+    if not isinstance(numbers, Mapping):
+        raise NlsError(f"study '{name}'", f"its numbers are {brief(numbers)}, not a mapping of float by name")
+    for key, value in numbers.items():
+        if not isinstance(key, str) or isinstance(value, bool) or not isinstance(value, SupportsFloat):
+            raise NlsError(f"study '{name}'", f"its number {brief(key)} is {brief(value)}, not a float")
+    return {key: float(value) for key, value in numbers.items()}
+
+
+def _check_signature(name: str, study: ModuleType) -> None:
+    try:
+        inspect.signature(study.main).bind(Path(), fast=False)
+    except TypeError as error:
+        raise NlsError(
+            f"{name}: main", f"cannot be called so: {error}", next_step=f"write {_SIGNATURE}"
+        ) from None
 
 
 def not_as_claimed(results: Mapping[str, float], expected: Mapping[str, Claim]) -> dict[str, str]:
@@ -204,10 +260,13 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry
     target = out if out is not None else Path("out") / Path(name).stem
     if dry_run:
         list_files(listed_files(target), target, as_json=as_json)
+    report, own = target / "report.html", Path(name).suffix == ".py"
+    before = _time_of(report)
     with kept(target, listed_files(target), force=force):
         make_folder(target)
         results = run_study(name, target, fast=fast)
-    expected = claims(Path(name).stem)
+    # A study of one's own may be named as one that comes with the project, and claims nothing.
+    expected = {} if own else claims(name)
     wrong = not_as_claimed(results, expected)
     if as_json:
         show_json({"results": results, "not_as_claimed": list(wrong), "out": target})
@@ -217,10 +276,18 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry
             ("result", "value", "claimed"),
             [_row(k, v, expected.get(k)) for k, v in results.items()],
         )
-        click.echo(f"report: {target / 'report.html'}")
+        if not results:
+            click.echo("no numbers: the study was skipped, or its main returns None")
+        if _time_of(report) != before:
+            click.echo(f"report: {report}")
     for message in wrong.values():
         click.echo(f"not as claimed: {message}", err=True)
     sys.exit(1 if wrong and not fast else 0)
+
+
+def _time_of(file: Path) -> int | None:
+    """Return when a file was written, in ns; none where there is no such file."""
+    return file.stat().st_mtime_ns if file.is_file() else None
 
 
 def _row(key: str, value: float, claim: Claim | None) -> tuple[str, str, str]:

@@ -37,6 +37,8 @@ UNCHANGED = "refitted model"
 """What stands in place of ``before`` where nothing was added, so that there is no ``after``."""
 
 
+_MOST_LEVEL = 9
+"""Records up to which the numbers of bars have room side by side."""
 _GAP = 6.0
 """Usual steps between samples beyond which a line is interrupted."""
 
@@ -107,6 +109,7 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
             axes.annotate(
                 significant(height), (bar.get_x() + bar.get_width() / 2, top), (0, 2), color=INK.light,
                 fontsize=8, ha="center", va="bottom", textcoords="offset points",
+                rotation=90.0 if len(ordered) > _MOST_LEVEL else 0.0,
             )  # fmt: skip
     floors = [e.noise_floor for e in ordered]
     axes.hlines(
@@ -303,7 +306,7 @@ def candidate_shares(candidates: Sequence[CandidateShare]) -> Figure:
             color=HOLDS.light if each.chosen else MUTED.light,
             alpha=1 if each.chosen else 0.55,
         )
-        label = f"{100 * each.share:.0f} %{', added' if each.chosen else ''}".replace("-", "−")
+        label = f"{round(100 * each.share)} %{', added' if each.chosen else ''}".replace("-", "−")
         axes.text(max(share, 0.0) + 1.0, row, label, va="center", fontsize=8.5)
     axes.axvline(0.0, color=MUTED.light, linewidth=0.8)
     axes.set_yticks(range(len(ordered)), [each.name for each in ordered])

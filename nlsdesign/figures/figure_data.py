@@ -118,5 +118,5 @@ def _name(label: object) -> str:
 
 
 def _column(values: Any) -> list[float | None]:
-    numbers = np.ravel(np.ma.filled(np.ma.asarray(values, dtype=float), np.nan))
+    numbers: Any = np.ravel(np.ma.filled(np.ma.asarray(values, dtype=float), np.nan))
     return [float(f"{v:.{_DIGITS}g}") if math.isfinite(v) else None for v in numbers.tolist()]

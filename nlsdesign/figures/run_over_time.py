@@ -59,8 +59,8 @@ def run_over_time(run: Trace, names: Sequence[str]) -> Figure:
     figure, axes = panels(len(groups), height=1.0 + 1.5 * len(groups), sharex=True)
     sizes = []
     for panel, (unit, members) in zip(axes, groups, strict=True):
-        for number, name in enumerate(members):
-            tone, dash, _ = look(number)
+        for name in members:
+            tone, dash, _ = look(len(sizes))  # no two signals of the figure look alike
             panel.plot(*thinned(run.time, run[name]), color=tone, linestyle=dash, linewidth=1.3, label=name)
             low, high = (significant(float(end)) for end in (np.min(run[name]), np.max(run[name])))
             sizes.append(f"{name} from {low} to {high} {typeset_unit(unit)}".strip())

@@ -3,7 +3,6 @@
 from .calculation import OUTCOMES, CalculationSection, CalculationStep
 from .cam_section import CamSection
 from .command_pages import write_analysis_report, write_fit_report, write_observer_report
-from .comparison import ComparedResult, differing_numbers, key_figures, torque_at_rest, write_comparison
 from .design_sections import design_sections, tolerance_sections, write_design_report
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
@@ -19,6 +18,7 @@ from .sections import (
     TableSection,
     TextSection,
 )
+from .side_by_side import ComparedResult, differing_numbers, key_figures, torque_at_rest, write_comparison
 from .tables import PublishedNumber, comparison_table, numbers_table, range_table
 from .verdict_section import VerdictSection
 

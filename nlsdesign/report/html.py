@@ -53,7 +53,7 @@ def visible(page: str) -> str:
     >>> print(visible("a" + chr(27) + "[31m"))
     a\\x1b[31m
     """
-    return _HIDDEN.sub(lambda found: found[0].encode("unicode_escape").decode(), page)
+    return _HIDDEN.sub(lambda match: match[0].encode("unicode_escape").decode(), page)
 
 
 def breakable(text: Html) -> Html:

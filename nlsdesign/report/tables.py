@@ -46,7 +46,7 @@ def numbers_table(title: str, numbers: Mapping[str, Quantity], *, folded: bool =
 
 
 def value_in_words(q: Quantity) -> str:
-    """Return a value without its unit; of a long row its number and its ends.
+    """Return a value without its unit; of a long row how many, the least and the largest.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def value_in_words(q: Quantity) -> str:
         return compact(shown, 6)
     if len(shown) < _LONGEST_ROW:
         return ", ".join(compact(item, 6) for item in shown)
-    return f"{len(shown)} numbers from {compact(shown[0], 6)} to {compact(shown[-1], 6)}"
+    return f"{len(shown)} numbers from {compact(min(shown), 6)} to {compact(max(shown), 6)}"
 
 
 @dataclass(frozen=True)

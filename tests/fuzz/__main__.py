@@ -20,6 +20,9 @@ from . import family_names, family_of
 from .cases import Outcome
 from .running import made_by, outcomes, shrunk
 
+_SHORT = 20.0
+"""Cases that may take longer are not made smaller."""
+
 
 def main() -> int:
     """Run, and return 1 where a case ended as none may."""
@@ -52,7 +55,8 @@ def main() -> int:
             faults.setdefault(outcome, []).append(number)
     for order, (outcome, numbers) in enumerate(sorted(faults.items(), key=lambda pair: -len(pair[1]))):
         smallest = min(map(cases, numbers[:50]), key=lambda case: case.size)
-        smallest = shrunk(family, smallest, outcome)
+        if family.limit <= _SHORT:
+            smallest = shrunk(family, smallest, outcome)
         place = given.out / f"{given.family}-{given.seed}-fault-{order + 1}"
         smallest.written(place)
         words = f", words {smallest.words}" if smallest.words else ""

@@ -161,6 +161,16 @@ class Records:
             Case({"rig.toml": _RIG.encode(), "cam.csv": self._cam.encode()}, how="rig"),
         ]
 
+    def long_csv(self, rows: int = 3000) -> bytes:
+        """Return a record of some seconds, with noise, over which a diagnosis works for a while."""
+        noise = np.random.default_rng(1)
+        time = np.arange(rows) * 0.002
+        angle = 0.5 * np.sin(6.0 * time)
+        columns = (time, angle + 5e-4 * noise.standard_normal(rows), 3.0 * np.sin(6.0 * time + 0.3)
+                   + 0.04 * noise.standard_normal(rows), 60.0 * np.abs(angle) + 0.6 * noise.standard_normal(rows))  # fmt: skip
+        lines = (",".join(f"{v:.6g}" for v in row) for row in np.column_stack(columns))
+        return "\n".join([",".join(_HEADS), *lines, ""]).encode()
+
     def _text_case(
         self, chance: random.Random, name: str, text: str, other: Callable[[random.Random, str], bytes]
     ) -> Case:

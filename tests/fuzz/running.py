@@ -63,7 +63,8 @@ def _one_worker(
                 if done == len(numbers):
                     break
     except TimeoutError:
-        yield numbers[done], Outcome("too long", f"over {family.limit:g} s")
+        kind = "still at work" if getattr(family, "patient", False) else "too long"
+        yield numbers[done], Outcome(kind, f"over {family.limit:g} s")
         return
     finally:
         with contextlib.suppress(ProcessLookupError):

@@ -94,6 +94,9 @@ def test_a_design_that_misses_is_no_success(run: Run, tmp_path: Path) -> None:
     assert "what would help" in out
     assert "no drawings are written" in out
     assert not list((tmp_path / "o").glob("*.dxf"))
+    page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+    assert "misses its target" in page
+    assert "Torque against the target" in page
     assert json.loads((tmp_path / "o" / "design.json").read_text(encoding="utf-8"))["met"] is False
 
 
@@ -114,6 +117,8 @@ def test_a_design_file_is_followed_and_a_part_drawn(run: Run, tmp_path: Path) ->
     assert "meets its target" in out
     names = {path.name for path in (tmp_path / "o").iterdir()}
     assert {"model.toml", "cam.dxf", "drawing.pdf", "picture.svg", "margins.svg", "design.json"} <= names
+    page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+    assert all(part in page for part in ("Torque against the target", "Use of each limit", "drawing.pdf"))
     # Another design into the same folder: nothing of the first one stays beside it.
     words = ["--target", 'PowerTorque = {coefficient = 3.4, exponent = 1.0, angle = "50 deg"}']
     status, _, _ = run("design", "--deck", "austin2015_as_printed", *words, "--draws", "0", "--out", "o")
@@ -247,7 +252,10 @@ def test_analyse_without_a_command_goes_over_the_angle(run: Run, tmp_path: Path)
     assert {"condition", "frequency", "stiffness"} <= set(out.split())
     assert out.index("torque sensor") < out.index("present sensors")
     files = set(files_in(tmp_path / "o"))
-    assert files == {"over_angle.csv", "poles.svg", "observability.svg"}
+    assert files == {"over_angle.csv", "poles.svg", "observability.svg", "report.html"}
+    page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+    assert "decays with −70.4 1/s: detectable" in page
+    assert "Which sensor would help the torque most" in page
 
 
 def test_analyse_as_json_says_what_is_not_seen_and_of_which_mode_each_pole_is(run: Run) -> None:

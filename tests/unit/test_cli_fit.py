@@ -47,6 +47,9 @@ def test_the_numbers_of_the_rig_come_back_with_an_honest_error(run: Run, bench: 
     status, out, _ = run(*called, "--hold-out", "multi*", "--out", str(tmp_path / "out"), "--json")
     assert status == 0
     found = json.loads(out[out.index("{") :])
+    page = Path(found.pop("report")).read_text(encoding="utf8")
+    assert "Refitted numbers" in page
+    assert page.count('<span class="before">') == len(found["errors"])
     assert found == json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf8"))
     built, _ = truth(ACTUATORS["arm"], {}, SEED)
     expected = {

@@ -116,3 +116,4 @@ def test_errors_are_printed_and_written(run: Run, tmp_path: Path) -> None:
     assert len(table) == 1 + len(rows)
     assert float(table[1][3]) == pytest.approx(rows["cascade", 2.0]["median"], rel=1e-6)
     assert "<svg" in (tmp_path / "o" / "errors.svg").read_text("utf-8")
+    assert "Causes, cascade" in (tmp_path / "o" / "report.html").read_text("utf-8")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nlsdesign.cli.driving_signals import Step, read_driving_signal
+from nlsdesign.cli.driving_signals import StepAt, read_driving_signal
 from nlsdesign.errors import NlsError
 from nlsdesign.simulation import Sine
 from tests.command_line import Run, run
@@ -38,10 +38,10 @@ def columns(file: Path) -> dict[str, NDArray[np.float64]]:
         ("2 A @ 5 Hz", Sine(2.0, 5.0)),
         ("200 mA sine 5 kHz", Sine(0.2, 5000.0)),
         ("1 A + 2 A sine 5", Sine(2.0, 5.0, 1.0)),
-        ("2 A step 100 ms", Step(2.0, 0.1)),
+        ("2 A step 100 ms", StepAt(2.0, 0.1)),
     ],
 )
-def test_a_signal_is_read_as_it_is_typed(text: str, signal: Sine | Step) -> None:
+def test_a_signal_is_read_as_it_is_typed(text: str, signal: Sine | StepAt) -> None:
     read = read_driving_signal(text, "A")
     assert type(read) is type(signal)
     assert [read(t) for t in (0.0, 0.03, 0.2)] == pytest.approx([signal(t) for t in (0.0, 0.03, 0.2)])

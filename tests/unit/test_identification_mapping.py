@@ -82,7 +82,7 @@ def test_columns_are_tables(text: str, words: str, tmp_path: Path) -> None:
 
 def test_what_is_no_text_is_said_to_be_none(tmp_path: Path) -> None:
     (tmp_path / "records.toml").write_bytes(b"\xff\xfe\x00\x81" * 20)
-    with pytest.raises(MeasurementError, match=r"records\.toml: cannot be read as a mapping"):
+    with pytest.raises(MeasurementError, match=r"records\.toml: cannot be read: it is no text"):
         read_mapping(tmp_path / "records.toml")
 
 

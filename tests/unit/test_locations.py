@@ -29,7 +29,11 @@ def test_this_checkout(root: Path, name: str) -> None:
     assert any(locations.folder(name).glob("*.py"))
 
 
-@pytest.mark.parametrize("name", ["models", "studies"])
+def test_the_documentation_of_this_checkout(root: Path) -> None:
+    assert locations.folder("docs") == root / "docs"
+
+
+@pytest.mark.parametrize("name", ["models", "studies", "docs"])
 def test_wheel_before_a_stranger(package: Path, name: str) -> None:
     (package / "_bundled" / name).mkdir(parents=True)
     (package.parent / name).mkdir()

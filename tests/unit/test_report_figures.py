@@ -165,3 +165,12 @@ def test_control_characters_in_names_are_written_out(tmp_path: Path) -> None:
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", page)
     assert page.count(r"name\x1b]0;title\x07\x9b31m\u202egnp") >= 6
     assert visible("line\nand\ttab ± °") == "line\nand\ttab ± °"
+
+
+def test_numbers_of_many_bars_stand_upright_and_no_share_is_minus_zero() -> None:
+    many = [figures.RecordError(f"r{i}", 0.3, 0.02, 0.01, False) for i in range(12)]
+    for errors, angle in ((many, 90.0), (many[:9], 0.0)):
+        axes = figures.gap_bars(errors, unit="N").axes[0]
+        assert {text.get_rotation() for text in axes.texts if text.get_text() == "0.300"} == {angle}
+    shares = figures.candidate_shares([figures.CandidateShare("slack", -0.001, True)])
+    assert [text.get_text() for text in shares.axes[0].texts] == ["0 %, added"]

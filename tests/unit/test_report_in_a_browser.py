@@ -1,4 +1,4 @@
-"""Pages in a real browser: no wider than a small screen, nothing asked of a network, nothing on the console."""
+"""Pages in a browser: no wider than a small screen, nothing asked of a network, nothing on the console."""
 
 from __future__ import annotations
 

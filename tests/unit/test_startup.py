@@ -82,7 +82,7 @@ NOT_NEEDED = {
     ("deck", "show", DECK): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("parts",): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
     ("materials",): {"sympy", "control", "matplotlib", "fmpy", "jinja2"},
-    ("analyse", "--deck", DECK, "--count", "2", "--out", "out"): {"sympy", "control", "fmpy", "jinja2"},
+    ("analyse", "--deck", DECK, "--count", "2", "--out", "out"): {"sympy", "control", "fmpy"},
 }
 
 

@@ -12,6 +12,7 @@ from ...errors import DeckError, nearest, unknown_name
 from ...extensions import extension_files
 from ...locations import folder
 from ...quantity import Quantity, same_dimension, with_unit
+from ...reading import text_of
 
 EVIDENCE = ("measured curve", "data sheet", "range")
 """Grades of evidence, best first."""
@@ -163,13 +164,7 @@ def materials(path: Path | None = None) -> dict[str, Material]:
 
 
 def _library(chosen: Path) -> dict[str, Material]:
-    try:
-        text = chosen.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DeckError(
-            str(chosen), f"cannot be read: {error}", next_step="give a text file in UTF-8"
-        ) from None
-    deck = read_deck(text, chosen)
+    deck = read_deck(text_of(chosen, DeckError), chosen)
     return {name: _material(deck, name, table) for name, table in deck.tables.items()}
 
 

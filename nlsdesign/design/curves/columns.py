@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import MeasurementError, UnitError, nearest
 from ...quantity import parse_unit, same_dimension, typeset_unit
+from ...reading import text_of
 from ...written_numbers import name_and_unit
 
 Floats = NDArray[np.float64]
@@ -76,13 +77,7 @@ def read_columns(
         If a head has no unit, or one of another dimension.
     """
     file = Path(path)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or getattr(error, "reason", None) or error
-        raise MeasurementError(
-            str(path), f"cannot be read: {reason}", next_step="name a CSV file in UTF-8"
-        ) from None
+    text = text_of(file, MeasurementError, next_step="name a CSV file in UTF-8")
     rows = [
         (number, next(csv.reader([line], skipinitialspace=True)))
         for number, line in enumerate(text.splitlines(), start=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping
@@ -11,8 +12,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ...deck import Deck, read_deck
-from ...errors import DeckError, NlsError, UnitError, unknown_name
+from ...errors import DeckError, NlsError, UnitError, brief, unknown_name
 from ...quantity import Quantity, quantity
+from ...reading import text_of
 from ...written_numbers import split_number
 from ..curves.compliance import SpringSymmetry
 from ..curves.target import Target
@@ -86,13 +88,7 @@ def read_job(path: Path | str) -> DesignJob:
         As for :func:`job_of`.
     """
     file = Path(path)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DeckError(
-            str(file), f"cannot be read: {error}", next_step="give a design file in TOML, UTF-8"
-        ) from None
-    return job_of(text, file)
+    return job_of(text_of(file, DeckError, next_step="give a design file in TOML, UTF-8"), file)
 
 
 def job_of(text: str, file: Path) -> DesignJob:
@@ -254,7 +250,7 @@ def built(deck: Deck, kind: type, given: object, place: str) -> Any:
     """
     if not isinstance(given, Mapping):
         raise DeckError(
-            place, f"{given!r} is not a table", next_step='write it as {field = "number unit", ...}'
+            place, f"{brief(given)} is not a table", next_step='write it as {field = "number unit", ...}'
         )
     hints = typing.get_type_hints(kind)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
@@ -285,8 +281,10 @@ def _value(deck: Deck, hint: Any, raw: object, place: str) -> Any:
         return _number(raw, place)
     if isinstance(raw, int | float) and not isinstance(raw, bool) and Quantity in allowed:
         # A bare number is a pure one: a length without a unit is refused by what it is for.
-        return Quantity(float(raw), "1", "asked for in the design file")
-    return float(raw) if isinstance(raw, float) else raw
+        return Quantity(_plain(raw, place), "1", "asked for in the design file")
+    if isinstance(raw, bool) and bool not in allowed:
+        raise DeckError(place, f"is {str(raw).lower()} where a number or text is wanted")
+    return _plain(raw, place) if isinstance(raw, float) else raw
 
 
 def _of_table(deck: Deck, hint: Any, allowed: tuple[Any, ...], raw: Mapping[str, Any], place: str) -> Any:
@@ -306,6 +304,18 @@ def _of_table(deck: Deck, hint: Any, allowed: tuple[Any, ...], raw: Mapping[str,
     raise DeckError(place, "is a table where a number or text is wanted")
 
 
+def _plain(raw: object, place: str) -> float:
+    """Return a number that stands in the file without a unit."""
+    if isinstance(raw, int | float) and not isinstance(raw, bool):
+        try:
+            number = float(raw)
+        except OverflowError:  # a whole number of hundreds of digits
+            number = math.inf
+        if math.isfinite(number):
+            return number
+    raise DeckError(place, f"{brief(raw)} is not a finite number")
+
+
 def _number(text: str, place: str) -> Quantity:
     try:
         number, unit = split_number(text)
@@ -323,7 +333,7 @@ def _stock(deck: Deck) -> Iterator[StockChoice]:
         if name == "rubber":
             yield _placed(lambda given=given: RubberStock(tuple(str(each) for each in given)), place)  # type: ignore[misc]
             continue
-        values = tuple(_number(v, place) if isinstance(v, str) else float(v) for v in given)
+        values = tuple(_number(v, place) if isinstance(v, str) else _plain(v, place) for v in given)
         yield _placed(lambda name=name, values=values: Stock(name, values), place)  # type: ignore[misc]
 
 
@@ -334,7 +344,7 @@ def _settings(deck: Deck) -> DesignSettings:
         place = deck.place(f"search.{name}")
         if name not in _SEARCH:
             raise unknown_name(place, name, _SEARCH)
-        given = _number(raw, place).number if isinstance(raw, str) else raw
+        given = _number(raw, place).number if isinstance(raw, str) else _plain(raw, place)
         values[name] = float(given) if name == "largest_error" else int(given)
     values["draws"] = _draws(deck)
     return _placed(lambda: DesignSettings(**values), deck.place("search"))
@@ -348,7 +358,7 @@ def _draws(deck: Deck) -> int:
             raise unknown_name(deck.place(f"tolerance.{name}"), name, ["draws"])
     given = table.get("draws", _DRAWS)
     if not isinstance(given, int) or isinstance(given, bool):
-        raise DeckError(deck.place("tolerance.draws"), f"{given!r} is not a whole number")
+        raise DeckError(deck.place("tolerance.draws"), f"{brief(given)} is not a whole number")
     return given
 
 
@@ -377,3 +387,6 @@ def _placed(make: Callable[[], Made], place: str) -> Made:
         return make()
     except NlsError as error:
         raise error.at(place) from None
+    except (TypeError, OverflowError):
+        # A field has a value of a kind for which none of its checks was written, such as a date.
+        raise DeckError(place, "has a value of the wrong kind", next_step="write numbers and texts") from None

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import platform as machine
-import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -14,6 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ...errors import ExportError, unknown_name
+from ...interruption import usual_temporary_folder
+from ...processes import run_to_end
 from ..files import shell
 
 STRICT = (
@@ -137,7 +137,7 @@ def cache_folder() -> Path:
     except (OSError, RuntimeError):  # RuntimeError: there is no home folder
         pass
     owner = os.getuid() if hasattr(os, "getuid") else "user"
-    return Path(tempfile.gettempdir()) / f"nlsdesign-{owner}"
+    return usual_temporary_folder() / f"nlsdesign-{owner}"
 
 
 def _users_caches() -> Path:
@@ -166,7 +166,7 @@ def run_compiler(arguments: Sequence[str | Path], *, about: str) -> None:
     cache = str(cache_folder() / "zig")
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
     command = [*compiler(), *[str(each) for each in arguments]]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    done = run_to_end(command, environment=environment)
     if done.returncode != 0:
         first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
         raise ExportError(about, f"does not compile: {first}", next_step="report this as a bug of nlsdesign")

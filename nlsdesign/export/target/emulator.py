@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 from ...errors import ExportError
+from ...processes import run_to_end
 from .processors import Processor
 
 EMULATOR = "qemu-system-arm"
@@ -52,9 +53,7 @@ def emulated(image: Path, processor: Processor) -> list[list[int]]:
     ]
     command += ["-serial", "none", "-semihosting-config", "enable=on,target=native", "-kernel", str(image)]
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=_SECONDS, stdin=subprocess.DEVNULL
-        )
+        done = run_to_end(command, seconds=_SECONDS)
     except subprocess.TimeoutExpired as error:
         raise ExportError(
             f"{image.name} on {processor.name}", f"does not end within {_SECONDS} s", next_step="report it"

@@ -367,6 +367,12 @@ def _samples(shots: Shots, record: Record) -> int:
 
 def _phases(record: Record, shots: Shots) -> list[Record]:
     count = _samples(shots, record)
+    if count > len(record.trace):
+        raise ValueRangeError(
+            f"windows of {shots.length:g} s",
+            f"are longer than record '{record.name}', which lasts {record.step * len(record.trace):g} s",
+            next_step="give a shorter window",
+        )
     starts = [count * k // shots.phases for k in range(shots.phases)]
     return [record, *(from_sample(record, first) for first in starts[1:])]
 

@@ -11,6 +11,7 @@ from typing import Any
 from ...errors import MeasurementError, UnitError, nearest
 from ...model import FlatModel
 from ...quantity import parse_unit, same_dimension, typeset_unit
+from ...reading import text_of
 from .toml_fields import globs_at, number_at, table_at, text_at
 
 _FASTEST = 1e6
@@ -148,8 +149,8 @@ def read_mapping(path: Path) -> ColumnMap:
         If it is not valid or a column lacks signal or unit.
     """
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf8"))
-    except (OSError, ValueError, RecursionError) as error:  # ValueError: bad TOML, or no text in UTF-8
+        tables = tomllib.loads(text_of(path, MeasurementError, next_step="write it again as TOML"))
+    except (ValueError, RecursionError) as error:
         raise MeasurementError(
             path.name,
             f"cannot be read as a mapping: {error}",

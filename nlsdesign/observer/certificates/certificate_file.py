@@ -13,6 +13,7 @@ import numpy as np
 
 from ...errors import MeasurementError, NlsError
 from ...model.paper_form import PaperFormNames
+from ...reading import text_of
 from ...writing import write_text
 from ..scheduling.forms import Minimal, PaperForm
 from ..scheduling.gains import ConstantGain
@@ -82,9 +83,9 @@ def read_certificate(path: str | Path) -> tuple[Proof, bool]:
         If it cannot be read, or is no certificate of this format.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = text_of(Path(path), MeasurementError)
         content = json.loads(text, parse_constant=_refuse)
-    except (OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise MeasurementError(str(path), f"is no readable certificate ({error})") from None
     readers: dict[str, Callable[[dict[str, Any]], Proof]] = {
         FORMAT: _certificate,

@@ -63,8 +63,8 @@ def _widths(heads: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> 
     for number, head in enumerate(heads):
         cells = [row[number] for row in rows]
         natural.append(max((len(line) for text in (head, *cells) for line in text.split("\n")), default=1))
-        words = [word for text in (head, *cells) for word in _unbroken(text)]
-        longest = max((min(len(word), _LONGEST_WORD) for word in words), default=1)
+        pieces = [piece for text in (head, *cells) for piece in _unbroken(text)]
+        longest = max((min(len(piece), _LONGEST_WORD) for piece in pieces), default=1)
         wraps = any(" " in cell.strip() for cell in cells)
         least.append(min(natural[-1], max(longest, _NARROWEST_TEXT if wraps else 1)))
     if sum(natural) <= room:
