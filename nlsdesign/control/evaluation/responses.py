@@ -81,7 +81,8 @@ class SineResponse:
     @property
     def decibel(self) -> Array:
         """Magnitude in dB."""
-        magnitude: Array = 20.0 * np.log10(np.abs(self.response))
+        with np.errstate(divide="ignore"):  # no answer at all is minus infinity
+            magnitude: Array = 20.0 * np.log10(np.abs(self.response))
         return magnitude
 
     @property
