@@ -314,7 +314,7 @@ def _number(value: float) -> float | str | None:
     """Return a number that JSON can hold: nothing for what is none, a word for what is infinite."""
     if math.isnan(value):
         return None
-    return value if math.isfinite(value) else "infinite"
+    return value if math.isfinite(value) else "infinite" if value > 0.0 else "minus infinite"
 
 
 def _plain(values: Any) -> list[float | str | None]:

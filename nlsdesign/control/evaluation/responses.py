@@ -81,7 +81,8 @@ class SineResponse:
     @property
     def decibel(self) -> Array:
         """Magnitude in dB."""
-        magnitude: Array = 20.0 * np.log10(np.abs(self.response))
+        with np.errstate(divide="ignore"):  # no answer at all is minus infinity
+            magnitude: Array = 20.0 * np.log10(np.abs(self.response))
         return magnitude
 
     @property
@@ -398,6 +399,9 @@ def _distortion(run: PeriodicRun, torque: str) -> float:
     fundamental, values = run.fundamental(torque), run[torque]
     turn = np.exp(2j * math.pi * run.frequency * run.time)
     rest = values - np.mean(values) - np.real(fundamental * turn)
+    if fundamental == 0.0:
+        # A spring that pulls to one side only need not follow a swing about zero at all.
+        return math.inf
     return _rms(rest) / (abs(fundamental) / math.sqrt(2.0))
 
 
