@@ -15,7 +15,16 @@ from tests.import_graph import Import, cycles, imports, modules
 # Open to every room.
 BASE = {
     *("bibliography", "data_frames", "errors", "extensions", "interruption", "locations", "processes"),
-    *("progress", "quantity", "reading", "symbolic", "unit_slips", "writing", "written_files", "written_numbers"),
+    *(
+        "progress",
+        "quantity",
+        "reading",
+        "symbolic",
+        "unit_slips",
+        "writing",
+        "written_files",
+        "written_numbers",
+    ),
 }
 # What the floors above the waist stand on: they see the flat model and never the components it came from.
 WAIST = {"deck", "model"}
