@@ -395,7 +395,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "folder.toml").mkdir()
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     for name in ("folder.toml", "binary.toml"):
-        with pytest.raises(DeckError, match="cannot be read|is no file"):
+        with pytest.raises(DeckError, match=r"cannot be read|is no file"):
             load_deck(tmp_path / name)
     with pytest.raises(DeckError, match="no such file"):
         load_deck(tmp_path / "absent.toml")

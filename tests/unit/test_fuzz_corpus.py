@@ -44,7 +44,8 @@ DECKS = {
     "a power of a unit beyond reason": (number(unit="m^9999999"), "no power of a unit"),
     "a unit that vanishes in SI": (number(unit="nm^20*nm^20"), "too large or too small a multiple"),
     "a domain that is a list": (
-        '[motor]\ncomponent = "Fixed"\n[spring]\ncomponent = "Spring"\nbetween = ["motor"]\ndomain = ["rotation"]\n',
+        '[motor]\ncomponent = "Fixed"\n[spring]\ncomponent = "Spring"\n'
+        'between = ["motor"]\ndomain = ["rotation"]\n',
         "not a domain of Spring",
     ),
     "an escape in a name": ('["motor\\u001b[2J"]\ncomponent = "Fixed"\n', r"\\x1b"),

@@ -52,7 +52,8 @@ def test_an_interrupt_ends_the_program_and_leaves_nothing(
     temporary.mkdir()
     program = f"{HEAD}def run():\n    {PROGRAMS[name]}\n\nguarded(run)\n"
     process = subprocess.Popen(
-        [sys.executable, "-c", program], cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        [sys.executable, "-c", program],
+        cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True,
         env={**os.environ, "PYTHONPATH": str(root), "TMPDIR": str(temporary)},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
     )  # fmt: skip
