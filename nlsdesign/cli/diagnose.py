@@ -68,7 +68,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     """Refit, locate, name and add the effects that the deck lacks; judge them on held-out records."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
-    from ..discrepancy import DiagnosisRun, records_of_run, write_command, write_verdict
+    from ..discrepancy import DiagnosisRun, records_of_run, with_records_named, write_command, write_verdict
     from ..discrepancy import diagnose as find_what_is_missing
     from ..identification import load_records
     from ..locations import version
@@ -87,7 +87,9 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     with steps.step("diagnosis"):
         verdict = find_what_is_missing(actuator, measured, progress=steps.note)
     run = DiagnosisRun(deck_name, str(records), date, command, version(), records_of_run(measured))
-    verdict = replace(verdict, run=run)
+    fitted_to = [each.name for each in measured.of("fit")]
+    better = with_records_named(verdict.actuator, str(records), fitted_to, day=date[:10])
+    verdict = replace(verdict, run=run, actuator=better)
     make_folder(out)
     for left_over in _OF_THIS_RUN_ALONE:
         discard(out / left_over)

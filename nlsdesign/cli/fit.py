@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +58,7 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     """Refit the numbers that the deck declares with a spread; nothing is added to the model."""
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
-    from ..discrepancy import refit, write_refit
+    from ..discrepancy import refit, with_records_named, write_refit
     from ..identification import load_records
     from ..model import flatten
     from ..progress import Steps
@@ -68,6 +70,9 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     steps = Steps()
     with steps.step("fit"):
         result = refit(actuator, measured, window=options["window"], progress=steps.note)
+    fitted_to = [each.name for each in measured.of("fit")]
+    day = datetime.now().astimezone().date().isoformat()
+    result = replace(result, actuator=with_records_named(result.actuator, str(records), fitted_to, day=day))
     file, deck = write_refit(result, out)
     facts = {"deck": f"`{deck_name}`", "records": f"`{records}`"}
     page = write_fit_report(out / "report.html", result, facts=facts, files=(file, deck))

@@ -7,6 +7,7 @@ from .effects.unnamed_tables import unnamed_part
 from .planning.experiment import Experiment, Separation, next_experiment, write_command
 from .planning.machine_limits import MachineLimits
 from .reporting.circumstances import DiagnosisRun, records_of_run
+from .reporting.fitted_sources import with_records_named
 from .reporting.named_effect import EffectEvidence
 from .reporting.refit import BlockError, FittedNumber, Refit, refit
 from .reporting.verdict import Course, NamedEffect, RecordGap, Verdict
@@ -39,6 +40,7 @@ __all__ = [
     "refit",
     "unnamed_part",
     "verdict_frames",
+    "with_records_named",
     "write_command",
     "write_refit",
     "write_verdict",

@@ -45,6 +45,18 @@ def derived(made: Assembly, declared: Assembly, change: str) -> Assembly:
     return replace(made, name=f"{root}_{change}_{digest[:DIGITS]}", parent=parent)
 
 
+def named_by_content(made: Assembly) -> Assembly:
+    """Return a derived assembly under the name that its present numbers give it; itself where no name is derived.
+
+    Parameters
+    ----------
+    made
+        Changed, for instance in a source, after it got its name.
+    """
+    digits = digits_in_name(made)
+    return replace(made, name=made.name.removesuffix(digits) + deck_digest(made)[:DIGITS]) if digits else made
+
+
 def digits_in_name(assembly: Assembly) -> str:
     """Return the digits of a digest with which the name of a derived deck ends, empty where it has none.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -89,7 +90,12 @@ def test_the_deck_that_is_written_is_accepted_and_says_where_its_numbers_come_fr
     deck = tmp_path / "fitted" / "model.toml"
     assert run("deck", "check", str(deck))[0] == 0
     fitted, declared = assembly_of(deck).quantities(), assembly_of(bench / "deck.toml").quantities()
-    assert fitted["motor.inertia"].source.startswith("fitted to bench records; declared: ")
+    source, before = fitted["motor.inertia"].source, declared["motor.inertia"].source
+    records = f" in {bench / 'records'}, "
+    assert re.fullmatch(
+        rf"fitted to bench records \w.*{re.escape(records)}\d{{4}}-\d\d-\d\d; declared: {re.escape(before)}",
+        source,
+    )
     assert fitted["motor.inertia"].spread == declared["motor.inertia"].spread
     record = str(bench / "records" / "sine_15deg_5.0Hz.csv")
     errors = []
