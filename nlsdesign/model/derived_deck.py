@@ -46,12 +46,12 @@ def derived(made: Assembly, declared: Assembly, change: str) -> Assembly:
 
 
 def named_by_content(made: Assembly) -> Assembly:
-    """Return a derived assembly under the name that its present numbers give it; itself where no name is derived.
+    """Return a derived assembly under the name that its present numbers give it.
 
     Parameters
     ----------
     made
-        Changed, for instance in a source, after it got its name.
+        Changed, for instance in a source, after it got its name; one without a derived name comes back.
     """
     digits = digits_in_name(made)
     return replace(made, name=made.name.removesuffix(digits) + deck_digest(made)[:DIGITS]) if digits else made
