@@ -124,6 +124,7 @@ def test_the_fuzz_would_notice(tmp_path: Path) -> None:
     assert fuzzed(cascade(), tmp_path, wait=0.2)[2] > 0.01
 
 
+@pytest.mark.slow
 def test_the_default_observer_recovers_on_a_motion_that_its_current_makes(tmp_path: Path) -> None:
     """The adaptive observer has a memory of seconds; what it learns must not come from a named fault."""
     outputs = ["motor.angle", "motor_encoder.reading", "spring.torque"]

@@ -144,6 +144,7 @@ def designs() -> tuple[CamDesign, CamDesign]:
     )
 
 
+@pytest.mark.slow
 def test_the_robust_design_is_a_third_better_after_the_same_trim(
     designs: tuple[CamDesign, CamDesign],
 ) -> None:

@@ -113,6 +113,7 @@ def test_the_table_lies_where_the_cam_rubs_and_is_as_high() -> None:
     assert max(far) < 0.15 * max(row)
 
 
+@pytest.mark.slow
 def test_its_deck_is_read_by_every_command(tmp_path: Path) -> None:
     made = case("arm", "rubbing_spot")
     candidate = made.part("motor")

@@ -26,13 +26,14 @@ from tests.command_line import Run, run
 from tests.diagnosed import declared_rig
 from tests.renamed import SCHEMES, Renamed, Scheme, exchanged, in_words, nested, renamed
 from tests.rig import ACTUATORS, make_records, write_declaration, write_records
+from tests.selection import quick_only
 
 __all__ = ["run"]
 
 DECKS = ("austin2015_figure_consistent", "austin2015_soft_spring", "one_sided_cable_drive")
 UNSEEN = ("first", "last", "eigenvalues")
 EVERY = pytest.mark.parametrize("scheme", SCHEMES)
-ONE = pytest.mark.parametrize("scheme", [in_words, exchanged])
+ONE = pytest.mark.parametrize("scheme", quick_only([in_words, exchanged], [in_words]))
 CATALOGUE = tuple(each for each in ALL if each.__name__ == "coulomb_friction")
 
 

@@ -195,6 +195,7 @@ def gives(message: str) -> dict[str, float]:
     return found
 
 
+@pytest.mark.slow
 def test_conflict_of_strain_and_pretension_is_named_with_what_each_would_have_to_give() -> None:
     """3 mm of pretension on 12.5 mm are a strain of 0.24 before the cam has turned."""
     keep = [MinimumRadiusOfCurvature(1e-3), MaximumStrain(0.05), PretensionRange(3e-3, 5e-3)]

@@ -75,6 +75,7 @@ def test_every_point_meets_the_target_as_the_settings_ask() -> None:
     assert np.all(np.diff(values[:, 1]) < 0.0)
 
 
+@pytest.mark.slow
 def test_the_same_front_comes_again_and_progress_is_told() -> None:
     calls = []
     settings = replace(QUICK, progress=lambda: calls.append(1))

@@ -256,6 +256,7 @@ def _never(assembly: Assembly) -> list[object]:
     raise AssertionError("no effect should be tried on suspect data")
 
 
+@pytest.mark.slow
 def test_records_of_a_rig_with_other_numbers_are_said_to_be_that(tmp_path: Path, rig: Assembly) -> None:
     """Rubber of twice the stiffness: effects would explain a part, other numbers explain all of it.
 

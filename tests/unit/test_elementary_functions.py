@@ -15,6 +15,7 @@ import pytest
 from nlsdesign.export.c.c_text import DOUBLE, FLOAT, Real
 from nlsdesign.export.c.elementary import elementary_functions, portable
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library, compile_program
+from tests.selection import quick_only
 
 REALS = (FLOAT, DOUBLE)
 OF_TWO = ("pow", "atan2", "hypot")
@@ -66,7 +67,7 @@ def errors(program: Path, stride: int, *names: str) -> dict[str, float]:
     return {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()}
 
 
-@pytest.mark.parametrize("real", REALS, ids=lambda real: real.name)
+@pytest.mark.parametrize("real", quick_only(REALS, [DOUBLE]), ids=lambda real: real.name)
 def test_no_error_is_larger_than_its_comment_says_and_none_is_far_smaller(real, tmp_path):
     if real is DOUBLE and np.finfo(np.longdouble).nmant < 63:
         pytest.skip("long double has no more digits here than double: nothing to compare with")

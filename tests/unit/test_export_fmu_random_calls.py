@@ -13,6 +13,7 @@ from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.export.fmi.fmu import fmi_headers, fmu_texts
 from nlsdesign.model import FlatModel, flatten
 from tests.hand_built import controller, plant
+from tests.selection import quick_only
 
 DRIVER = Path(__file__).with_name("fmu_driver.c")
 PURPOSES = {"co-simulation": 0, "model exchange": 1, "event mode": 2}
@@ -36,7 +37,7 @@ MODELS = {"plant": plant, "struck": struck, "controller": controller}
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="the sanitizers are those of gcc")
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", quick_only(MODELS, ["struck"]))
 def test_no_call_is_beyond_bounds_undefined_or_silently_not_finite(name, tmp_path):
     for path, content in fmu_texts(MODELS[name](), version="3.0", step=1e-3).items():
         if path.startswith("sources/"):

@@ -91,6 +91,7 @@ def test_the_canonical_order_is_that_of_content() -> None:
     assert [called[name] for name in places] == [f.place.partition(".")[0] for f in two.findings]
 
 
+@pytest.mark.slow
 def test_permuted_file_names_leave_the_verdict_as_it_is_to_the_byte(tmp_path: Path) -> None:
     """Three records, roles kept: the last becomes the first, and the held-out one the last."""
     arm, names = ACTUATORS["arm"], ("sine_15deg_5.0Hz", "sine_25deg_2.0Hz")

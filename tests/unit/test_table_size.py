@@ -30,6 +30,7 @@ from nlsdesign.observer.scheduling.table import Entry
 from nlsdesign.quantity import Quantity, quantity
 from nlsdesign.simulation import simulate
 from studies._published import declared_actuator, with_bench_sensors
+from tests.selection import quick_only
 
 END = np.radians(65.0)
 
@@ -64,16 +65,23 @@ MACHINES = {
 }  # fmt: skip
 
 
+class Designs(dict[str, ObserverDesign]):
+    """Each designed when it is first asked for."""
+
+    def __missing__(self, name: str) -> ObserverDesign:
+        return self.setdefault(name, design_observer_with_details(MACHINES[name]()))
+
+
 @pytest.fixture(scope="module")
 def designs() -> dict[str, ObserverDesign]:
-    return {name: design_observer_with_details(machine()) for name, machine in MACHINES.items()}
+    return Designs()
 
 
 def numbers(model: FlatModel) -> int:
     return sum(t.values.size + (0 if t.breakpoints is None else len(t.breakpoints)) for t in model.tables)
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", quick_only(MACHINES, ["diagnosed"]))
 def test_the_default_observer_fits_16_kb_with_its_torque_error_stated(name, designs, tmp_path):
     """The table of the diagnosed deck had 2049 × 7 numbers, 57 kB in float."""
     design = designs[name]
