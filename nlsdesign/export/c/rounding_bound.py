@@ -5,8 +5,8 @@ each operation gives its result with a relative error of at most the unit roundo
 through the operations of a step, for all samples at once, gives how much each error moves each result; the
 Jacobians of the steps carry it on. Errors are taken as independent with mean zero, after Higham and Mary, A
 New Approach to Probabilistic Rounding Error Analysis, SIAM J. Sci. Comput. 41 (2019): then the sum of
-c·δ with abs(δ) <= u exceeds λ·u·sqrt(sum of c²) with a probability of at most 2·exp(-λ²/2) (Hoeffding). Numbers that
-are stored (constants, parameters, tables) have one and the same error at all samples and are carried as such.
+c·δ with abs(δ) <= u exceeds λ·u·sqrt(sum of c²) with a probability of at most 2·exp(-λ²/2) (Hoeffding).
+Stored numbers (constants, parameters, tables) have the same error at all samples and are carried as such.
 """
 
 from __future__ import annotations
