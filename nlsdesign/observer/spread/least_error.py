@@ -11,7 +11,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior
 from ...simulation.sampled_batch import PLANT, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
-from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
+from ..adaptive.estimator_bound import SensedTorque, driven_alone, estimator_bound, rms_over
 from .observer_bench import ObserverBench
 
 
@@ -35,12 +35,13 @@ def least_torque_error(bench: ObserverBench, *, translate: Translate = as_it_is)
     system = bench.system({})
     driven = f"{PLANT}.{system.driven}"
     batch = run_batch(system, bench.stop, inputs=bench.inputs, keep=[driven], translate=translate)
+    inputs = driven_alone(bench.model, system.driven, batch[driven])
     sensed = SensedTorque(
         bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured), system.sample_time
     )
 
     def least(prior: Prior) -> float:
-        bound = estimator_bound(bench.model, prior, batch[driven], sensed)
+        bound = estimator_bound(bench.model, prior, inputs, sensed)
         squares = [rms_over([bound], first, last) ** 2 for _, first, last in bench.stretches]
         return math.sqrt(float(np.mean(squares)))
 
