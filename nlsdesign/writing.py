@@ -81,9 +81,9 @@ def make_folder(folder: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all, with line ends as they stand.
+    r"""Write a text file whole or not at all, with line ends as they stand.
 
-    What is no character, as in the name of a file that is no UTF-8, is written as in JSON: ``\\udcff``.
+    What is no character, as in the name of a file that is no UTF-8, is written as in JSON: ``\udcff``.
 
     Parameters
     ----------

@@ -119,23 +119,6 @@ def estimator_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: Sense
     return EstimatorBound(time, np.sqrt(np.maximum(variance, 0.0)), np.sqrt(before))
 
 
-def driven_alone(model: FlatModel, driven: str, values: Array) -> Array:
-    """Return all inputs of a model where one is driven and the others are zero, shape (inputs, T).
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    driven
-        Input that is driven.
-    values
-        Of that input, shape (T,).
-    """
-    rows = np.zeros((len(model.inputs), values.size))
-    rows[[v.name for v in model.inputs].index(driven)] = values.ravel()
-    return rows
-
-
 def _variational(model: FlatModel, prior: Prior, sensed: SensedTorque) -> tuple[ca.Function, ca.Function]:
     """Return one sample of states and their slopes, and the slopes of reading and estimate."""
     s = model.symbols()

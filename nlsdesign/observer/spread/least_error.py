@@ -11,7 +11,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior
 from ...simulation.sampled_batch import PLANT, run_batch
 from ..adaptive.adaptive_observer import encoder_quantum
-from ..adaptive.estimator_bound import SensedTorque, driven_alone, estimator_bound, rms_over
+from ..adaptive.estimator_bound import SensedTorque, estimator_bound, rms_over
 from .observer_bench import ObserverBench
 
 
@@ -33,9 +33,9 @@ def least_torque_error(bench: ObserverBench, *, translate: Translate = as_it_is)
         If no encoder of the measured motion is declared.
     """
     system = bench.system({})
-    driven = f"{PLANT}.{system.driven}"
-    batch = run_batch(system, bench.stop, inputs=bench.inputs, keep=[driven], translate=translate)
-    inputs = driven_alone(bench.model, system.driven, batch[driven])
+    names = [f"{PLANT}.{v.name}" for v in bench.model.inputs]
+    batch = run_batch(system, bench.stop, inputs=bench.inputs, keep=names, translate=translate)
+    inputs = np.vstack([batch[name] for name in names])
     sensed = SensedTorque(
         bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured), system.sample_time
     )
