@@ -55,7 +55,7 @@ class Authorship:
             text = getattr(self, name)
             if text != text.encode("utf-8", "replace").decode("utf-8"):
                 raise ValueRangeError(
-                    f"{name} {ascii(text)}", "holds what is no character", next_step="give it in UTF-8"
+                    f"{name} {text!a}", "holds what is no character", next_step="give it in UTF-8"
                 )
 
     def dated(self) -> Authorship:
