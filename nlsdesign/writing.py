@@ -81,7 +81,9 @@ def make_folder(folder: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all, with line ends as they stand.
+    r"""Write a text file whole or not at all, with line ends as they stand.
+
+    What is no character, as in the name of a file that is no UTF-8, is written as in JSON: ``\udcff``.
 
     Parameters
     ----------
@@ -96,7 +98,7 @@ def write_text(path: Path, text: str) -> None:
         If the folder or file cannot be written.
     """
     with draft(path) as name:
-        name.write_text(text, encoding="utf-8", newline="\n")
+        name.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def write_bytes(path: Path, content: bytes) -> None:

@@ -71,7 +71,7 @@ def certify_continuous_gain(
     _, text, plant = _plant(deck_name)
     proved = certify_continuous(
         plant, **_roles(plant, options), form=PaperForm() if published else Minimal(),
-        decay=options["decay"], condition=options["condition"], angles=options["angles"],
+        decay=options["decay"], condition=options["condition"], angles=angles,
     )  # fmt: skip
     proved = replace(proved, deck=text)
     path = write_certificate(proved, out / CERTIFICATE)
@@ -113,7 +113,6 @@ def certify_adaptive_estimate(
     from ..observer.certificates.held_estimate import held_assumptions
 
     _, text, plant = _plant(deck_name)
-    limit = options["limit"]
     trust = Trust() if limit is None else Trust(limit=limit)
     roles = _roles(plant, options)
     design = design_adaptive_observer(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
 import os
 import shlex
 import shutil
 import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -197,3 +200,22 @@ def test_bash_completes_commands_decks_and_studies(run: Run, root: Path, tmp_pat
     assert offered("study", "run", "") >= set(study_names())
     assert offered("materials", "PM") == {"PMC-770"}
     assert "--friction" in offered("simulate", "--fr")
+
+
+@pytest.mark.parametrize("path", WORKING, ids=" ".join)
+def test_a_command_reads_each_option_where_it_is(path: Path_) -> None:
+    """An argument that is named does not stand among the others too."""
+    callback = inspect.unwrap(WORKING[path].callback)  # type: ignore[arg-type]
+    (function,) = ast.parse(textwrap.dedent(inspect.getsource(callback))).body
+    assert isinstance(function, ast.FunctionDef)
+    named = {each.arg for each in (*function.args.args, *function.args.kwonlyargs)}
+    others = function.args.kwarg.arg if function.args.kwarg else None
+    read = {
+        node.slice.value
+        for node in ast.walk(function)
+        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name)
+        and node.value.id == others and isinstance(node.slice, ast.Constant)
+    }  # fmt: skip
+    given = {parameter.name for parameter in WORKING[path].params}
+    assert not read & named
+    assert read <= given

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nlsdesign.calibration import read_joint_numbers
@@ -12,9 +14,12 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import read_deck
 from nlsdesign.design.jobs.job_file import job_of
 from nlsdesign.errors import MeasurementError, NlsError
+from nlsdesign.export.fmi.authorship import Authorship
+from nlsdesign.identification.records.table_files import read_table
 from nlsdesign.locations import bundled
 from nlsdesign.quantity import parse_unit
 from nlsdesign.reading import text_of
+from nlsdesign.writing import write_text
 from tests.command_line import Run, run
 from tests.fuzz.commands import STUDIES
 from tests.fuzz.records import _RIG
@@ -201,3 +206,23 @@ def test_what_no_command_expected_is_one_message_and_a_file(
     written.unlink()
     assert "Traceback" in text
     assert "nlsdesign study run hello" in text
+
+
+def test_a_column_of_no_type_in_a_mat_file(tmp_path: Path) -> None:
+    """The library looks such a type up outside its table and may end the whole process."""
+    pytest.importorskip("scipy.io").savemat(tmp_path / "a.mat", {"t_s": np.arange(60.0)})
+    content = (tmp_path / "a.mat").read_bytes()
+    head = struct.pack("<II", 9, 480)
+    assert content.count(head) == 1
+    for code in (0, 14, 15, 3081):
+        (tmp_path / "b.mat").write_bytes(content.replace(head, struct.pack("<II", code, 480)))
+        with pytest.raises(MeasurementError, match=rf"b\.mat: cannot be read: {code} is the code of no type"):
+            read_table(tmp_path / "b.mat")
+    assert read_table(tmp_path / "a.mat").heads == ("t_s",)
+
+
+def test_what_is_no_character_is_written_as_in_json_or_refused(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.json", '"\udcff.toml"')
+    assert json.loads((tmp_path / "a.json").read_text(encoding="utf8")) == "\udcff.toml"
+    with pytest.raises(NlsError, match=r"licence .*udcff.*: holds what is no character"):
+        Authorship(licence="\udcff")

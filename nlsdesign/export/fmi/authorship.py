@@ -36,7 +36,7 @@ class Authorship:
     Raises
     ------
     ValueRangeError
-        If the date has no time zone.
+        If the date has no time zone, or a text holds what is no character.
     """
 
     author: str = ""
@@ -50,6 +50,13 @@ class Authorship:
             raise ValueRangeError(
                 f"date {self.date}", "has no time zone", next_step="give datetime(..., tzinfo=timezone.utc)"
             )
+
+        for name in ("author", "copyright", "licence", "version"):
+            text = getattr(self, name)
+            if text != text.encode("utf-8", "replace").decode("utf-8"):
+                raise ValueRangeError(
+                    f"{name} {text!a}", "holds what is no character", next_step="give it in UTF-8"
+                )
 
     def dated(self) -> Authorship:
         """Return the same with a date.

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...errors import MeasurementError, missing_library, nearest
 from ...reading import is_there
 from .csv_files import read_csv
+from .mat_elements import check_mat
 
 Array = NDArray[np.float64]
 
@@ -215,6 +216,7 @@ def _mat(file: Path) -> RecordTable:
     arrays: dict[str, Any] = {}
     library = _library("scipy.io", file)
     with _damage_named(file):
+        check_mat(file)
         _gather(library.loadmat(file, squeeze_me=True), "", arrays)
         return RecordTable(file.name, _numeric(arrays))
 

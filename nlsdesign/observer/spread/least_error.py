@@ -33,14 +33,15 @@ def least_torque_error(bench: ObserverBench, *, translate: Translate = as_it_is)
         If no encoder of the measured motion is declared.
     """
     system = bench.system({})
-    driven = f"{PLANT}.{system.driven}"
-    batch = run_batch(system, bench.stop, inputs=bench.inputs, keep=[driven], translate=translate)
+    names = [f"{PLANT}.{v.name}" for v in bench.model.inputs]
+    batch = run_batch(system, bench.stop, inputs=bench.inputs, keep=names, translate=translate)
+    inputs = np.vstack([batch[name] for name in names])
     sensed = SensedTorque(
         bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured), system.sample_time
     )
 
     def least(prior: Prior) -> float:
-        bound = estimator_bound(bench.model, prior, batch[driven], sensed)
+        bound = estimator_bound(bench.model, prior, inputs, sensed)
         squares = [rms_over([bound], first, last) ** 2 for _, first, last in bench.stretches]
         return math.sqrt(float(np.mean(squares)))
 
