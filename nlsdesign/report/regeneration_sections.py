@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..figures import HeldOut, held_out_series
 from ..quantity import three_digits, typeset_unit
-from ..regeneration import Regeneration
 from .sections import Chapter, FigureSection, FileSection, KeyNumber, NumbersSection, Section, TableSection
+
+if TYPE_CHECKING:
+    # Only its type is wanted here: the module brings the compiler and fmpy along.
+    from ..regeneration import Regeneration
 
 
 def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> list[Section]:

@@ -126,7 +126,7 @@ def test_rows_are_what_the_plan_holds() -> None:
 
 def test_the_table_of_the_command_has_the_column(tmp_path: Path) -> None:
     arguments = ["--deck", LINEAR, "--plan", "--kind", "hung_weight", "--out", str(tmp_path)]
-    done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False)
+    done = CliRunner().invoke(calibrate, arguments, catch_exceptions=False, env={"COLUMNS": "400"})
     assert done.exit_code == 0, done.output
     assert RUNNING in " ".join(done.output.split())
     written = json.loads((tmp_path / "plan.json").read_text(encoding="utf8"))

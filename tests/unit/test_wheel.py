@@ -86,8 +86,8 @@ def test_the_metadata_say_what_is_so(metadata: Message, root: Path) -> None:
     heads = [each.rpartition(" ")[2] for each in metadata.get_all("Classifier", []) if "Python :: 3." in each]
     assert heads == list(wheels.VERSIONS) == list(wheels.supported())
     known = set(metadata.get_all("Provides-Extra", []))
-    readme = (root / "README.md").read_text(encoding="utf-8")
-    table = readme.partition("| extra |")[2].partition("\n\n")[0]
+    install = (root / "docs" / "install.md").read_text(encoding="utf-8")
+    table = install.partition("| extra |")[2].partition("\n\n")[0]
     listed = set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE))
     assert listed == known - {"mutation"}
 
