@@ -475,13 +475,7 @@ def test_files_are_written_whole_or_not_at_all(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "soft_spring",
-        *(
-            pytest.param(n, marks=pytest.mark.slow)
-            for n in ("figure_consistent", "as_printed", "stiff_spring")
-        ),
-    ],
+    ["figure_consistent", *(pytest.param(n, marks=pytest.mark.slow) for n in ("as_printed", "stiff_spring"))],
 )
 def test_the_default_observer_in_float_passes_its_own_self_test(name, tmp_path):
     """Its covariance once began at the square of the range, which cost single precision its digits."""

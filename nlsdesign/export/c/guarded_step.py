@@ -65,7 +65,6 @@ class GuardedModel:
             numbers = reading_numbers(v, float(model.sample_time or 0.0), self.real)
             if numbers is not None:
                 self._guards[i] = ReadingGuard(numbers, self.real, self._inputs[i])
-        self.used: tuple[list[float], list[float], list[float]] | None = None
         self._movers = {i: mover(model, model.inputs[i]) for i in self._guards}
 
     def step(self, inputs: Sequence[float]) -> tuple[list[float], int]:
@@ -127,7 +126,6 @@ class GuardedModel:
             expected = np.array(model.expected(self.state, self._inputs, self._parameters, w)).ravel()
             for i, guard in self._guards.items():
                 used[i] = float(expected[i]) if guard.missed else used[i]
-        self.used = (self.state.tolist(), used, list(w))
         at = {v.name: float(x) for v, x in zip(model.states, self.state, strict=True)}
         at |= {v.name: u for v, u in zip(model.inputs, self._inputs, strict=True)}
         if any(not table.ends[0] <= at[table.argument] <= table.ends[1] for table in model.tables):

@@ -12,7 +12,6 @@ from ...model.flat import FlatModel, Variable
 from ..files import filled
 from .c_text import Real
 from .guarded_step import GuardedModel
-from .rounding_bound import StepRounding
 from .structures import member_paths
 
 SAMPLES = 120
@@ -20,10 +19,7 @@ DOUBLE_TOLERANCE = 1e-12
 """Largest difference relative to the largest size of each output, for double."""
 FLOAT_TOLERANCE = 2e-4
 """The same for float: some 3000 times its rounding error of 6e-8. This covers the rounding of a few
-hundred operations, accumulated by stable poles over some ten samples, and still reveals a wrong term. Where
-the rounding of the very step adds up to more, that is taken, see :func:`float_tolerance`."""
-SURE = 6.0
-"""Factor on the root of the summed squares of all roundings: exceeded with a probability below 4e-8."""
+hundred operations, accumulated by stable poles over some ten samples, and still reveals a wrong term."""
 
 
 def sample_inputs(model: FlatModel, real: Real) -> NDArray[np.float64]:
@@ -90,16 +86,11 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
     """
     inputs = sample_inputs(model, real)
     run = GuardedModel(model, real)
-    results, used = [], []
-    for row in inputs.tolist():
-        results.append(run.step(row))
-        used += [run.used] if run.used else []
+    results = [run.step(row) for row in inputs.tolist()]
     outputs = np.array([y for y, _ in results]).reshape(len(results), len(model.outputs))
     size = np.abs(outputs).max(axis=0, initial=0.0)
     relative = DOUBLE_TOLERANCE if real.name == "double" else FLOAT_TOLERANCE
     tolerance = [relative * float(v) + real.epsilon**2 for v in size]
-    if real.name == "float" and used:
-        tolerance = np.maximum(tolerance, float_tolerance(model, used, real)).tolist()
     u, y = member_paths(model.inputs).values(), member_paths(model.outputs).values()
     values = {
         "name": name,
@@ -112,34 +103,6 @@ def selftest_source(model: FlatModel, name: str, real: Real) -> str:
         "comparisons": [_comparison(real, path, i) for i, path in enumerate(y)],
     }
     return filled("controller_selftest.c", values)
-
-
-def float_tolerance(
-    model: FlatModel, used: Sequence[tuple[list[float], list[float], list[float]]], real: Real
-) -> NDArray[np.float64]:
-    """Return what rounding may do to each output over a run, shape (outputs,).
-
-    A filter subtracts a predicted reading from a reading, divides by a count and multiplies by a gain from
-    its covariance: what is learned has the rounding of the angle, magnified, not a share of its own size.
-    It is taken at the worst sample, as limits and choices switch a sample earlier or later.
-
-    Parameters
-    ----------
-    model
-        Discrete model.
-    used
-        States, inputs and looked-up numbers of each sample.
-    real
-        Number type.
-    """
-    states, inputs, looked_up = (
-        np.array(group, dtype=float).reshape(len(used), -1).T for group in zip(*used, strict=True)
-    )
-    parameters = np.repeat(model.start(model.parameters)[:, None], len(used), axis=1)
-    moved = StepRounding(model).deviations([states, inputs, parameters, looked_up], real.epsilon / 2.0)
-    worst = SURE * np.max(moved, axis=0)
-    # Beside a slope that is not finite there is no bound of first order: the share of the size stays.
-    return np.where(np.isfinite(worst), worst, 0.0)
 
 
 def _comparison(real: Real, path: str, i: int) -> str:
