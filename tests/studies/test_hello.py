@@ -56,12 +56,12 @@ def test_a_number_that_is_off_or_absent_is_not_as_claimed() -> None:
 def test_a_wrong_number_ends_with_status_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = {"length_m": runner.Claim(2.0, 0.1, "m", "")}
     monkeypatch.setattr(runner, "claims", lambda _: other)
-    file = study(tmp_path, "SimpleNamespace(numbers={'length_m': 1.0})")
-    run = CliRunner().invoke(runner.study, ["run", str(file), "--out", str(tmp_path / "out")])
+    monkeypatch.setattr(runner, "run_study", lambda *_, **__: {"length_m": 1.0})
+    run = CliRunner().invoke(runner.study, ["run", "hello", "--out", str(tmp_path / "out")])
     assert run.exit_code == 1
     assert "not as claimed: length_m = 1, expected 2 ± 0.1" in run.stderr
     other["length_m"] = runner.Claim(1.0, 0.1, "m", "")
-    run = CliRunner().invoke(runner.study, ["run", str(file), "--out", str(tmp_path / "out"), "--json"])
+    run = CliRunner().invoke(runner.study, ["run", "hello", "--out", str(tmp_path / "out"), "--json"])
     assert run.exit_code == 0
     assert json.loads(run.stdout)["results"] == {"length_m": 1.0}
 

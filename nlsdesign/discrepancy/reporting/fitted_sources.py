@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...components import Assembly
+from ...components.assembly.named_parts import Assembly
 from ...model.derived_deck import named_by_content
 from ..effects.candidate import SOURCE
 
