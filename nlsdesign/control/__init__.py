@@ -21,7 +21,7 @@ from .evaluation.responses import (
 from .evaluation.saturation import SaturationLine, saturation_line
 from .evaluation.steps import StepResponse, step_response, torque_resolution
 from .laws.disturbance import DisturbanceObserver
-from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, torque_limit
+from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, only_side, torque_limit
 from .laws.outer_laws import PidTorque, TorqueLaw
 from .laws.scheduled_torque import DesiredRate, FilteredDifference, GivenRate, ScheduledTorque
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
@@ -80,6 +80,7 @@ __all__ = [
     "joined",
     "largest_gain",
     "largest_torque",
+    "only_side",
     "linear_loop",
     "linear_onset",
     "loop_margins",
