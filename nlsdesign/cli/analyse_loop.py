@@ -121,9 +121,10 @@ def loop(
     """Evaluate the closed torque loop: responses, margins, impedance, coupled stability, limit cycles.
 
     The load is fixed for responses, moved for the impedance. Where the spring gives torque of one sign only,
-    each sine of the torque swings about 1.25 amplitudes, and 2.25 are held. Exit status 1 if the loop limit-cycles or is
-    unstable anywhere in the range that is looked at; the gain where that begins is printed. The observer is
-    the cascade, with the numbers of the deck for the machine as well.
+    each sine of the torque swings about 1.25 amplitudes, and 2.25 are held. Exit status 1 if the loop
+    limit-cycles or is unstable anywhere in the range that is looked at, with the gain where that begins, or
+    if a sine moves no torque. The observer is the cascade, with the numbers of the deck for the machine
+    as well.
     """
     from ..progress import Steps
 
@@ -274,8 +275,8 @@ def _written(result: _Evaluation, out: Path) -> list[Path]:
             r.frequency, r.decibel, r.phase_degrees, r.distortion, r.verdicts, strict=True
         )
     ]
-    units = {"amplitude": "N*m", "offset": "N*m", "frequency": "Hz", "magnitude": "dB", "phase": "deg", "distortion": "1",
-             "saturated": "1"}  # fmt: skip
+    units = {"amplitude": "N*m", "offset": "N*m", "frequency": "Hz", "magnitude": "dB", "phase": "deg",
+             "distortion": "1", "saturated": "1"}  # fmt: skip
     heads = [*(f"{name} [{unit}]" for name, unit in units.items()), "verdict"]
     write_table(out / "responses.csv", [heads, *rows])
     return [*figures.write_figures(out, drawn), out / "responses.csv"]

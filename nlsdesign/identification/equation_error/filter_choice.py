@@ -13,8 +13,9 @@ that makes the noise of the next one small, and never so quick that the filter o
 very small share of noise through. A motion that reverses sharply has a quick acceleration although
 its rate hardly changes most of the time, and fine counts show that while coarse ones do not.
 
-Where the supply of a motor is at its limit, the current follows the speed with a steep slope, and the speed bends
-where that begins. There the span of the rate is as short as the noise of the measured current allows.
+Where the supply of a motor is at its limit, the current follows the speed with a steep slope, and the
+speed bends where that begins. There the span of the rate is as short as the noise of the measured current
+allows.
 
 Source: Fuller 1987 (attenuation by errors in variables); Savitzky and Golay 1964 (quartics); Ruppert et al.
 1995 (widths from estimated derivatives).
@@ -268,7 +269,7 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
 
 
 def _span_behind_limit(block: Block, records: Sequence[Record], noise: Noise, longest: float) -> float:
-    """Return the span of the rates of a block, shorter where a limit of a motor switches their effect on and off.
+    """Return the span of the rates of a block, shorter where a limit of a motor switches their effect.
 
     A rate taken over a long span is blurred where the motion bends, and it bends where a limit sets in.
     """
