@@ -26,6 +26,8 @@ GAINS = {"pid": "controller.proportional", "scheduled": "controller.bandwidth"}
 _GAINS = ("proportional", "integral", "derivative")
 _FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "coupled_stability.svg")
 _FREQUENCIES = (0.1, 11.0, 20)
+_BIAS = 1.25
+"""Offset of a sine of torque over its amplitude, where the spring gives one sign only."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class _Evaluation:
         for response in self.responses:
             for f, verdict in zip(response.frequency, response.verdicts, strict=True):
                 if not verdict.holds:
-                    result.append(f"sine of ±{response.amplitude:g} N·m at {f:.3g} Hz: {verdict}")
+                    result.append(f"sine of {_sine(response)} at {f:.3g} Hz: {verdict}")
         for torque, verdict in zip(self.held.torque, self.held.verdicts, strict=True):
             if not verdict.holds:
                 result.append(f"{torque:g} N·m held: {verdict}")
@@ -96,7 +98,7 @@ class _Evaluation:
 @click.option("--derivative", type=Number("rad/N/m"), default=None, help="Gain Kd of the torque loop.")
 @click.option("--amplitude", "amplitudes", type=Number("N*m"), multiple=True,
               help="Of the desired torque; several times for several. By default a fifth and three fifths of "
-              "what the current limit can hold.")  # fmt: skip
+              "the largest torque, half of that for a spring of one sign.")  # fmt: skip
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
 @click.option("--load-inertia", "inertias", type=Number("kg*m^2"), multiple=True,
               help="Of a free load; several times for several. By default from a tenth of the motor's to a "
@@ -118,9 +120,11 @@ def loop(
 ) -> None:
     """Evaluate the closed torque loop: responses, margins, impedance, coupled stability, limit cycles.
 
-    The load is fixed for responses, moved for the impedance. Exit status 1 if the loop limit-cycles or is
-    unstable anywhere in the range that is looked at; the gain where that begins is printed. The observer is
-    the cascade, with the numbers of the deck for the machine as well.
+    The load is fixed for responses, moved for the impedance. Where the spring gives torque of one sign only,
+    each sine of the torque swings about 1.25 amplitudes, and 2.25 are held. Exit status 1 if the loop
+    limit-cycles or is unstable anywhere in the range that is looked at, with the gain where that begins, or
+    if a sine moves no torque. The observer is the cascade, with the numbers of the deck for the machine
+    as well.
     """
     from ..progress import Steps
 
@@ -200,22 +204,27 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
 
     translate = compiled()
     reach = ctl.largest_torque(fixed.plant)
-    amplitudes = asked.amplitudes or tuple(float(f"{share * reach:.2g}") for share in (0.2, 0.6))
+    side = ctl.only_side(fixed.plant)
+    shares = (0.1, 0.3) if side else (0.2, 0.6)
+    amplitudes = asked.amplitudes or tuple(float(f"{share * reach:.2g}") for share in shares)
+    largest = [a * (side * (1.0 + _BIAS) or 1.0) for a in amplitudes]
     inertia = fixed.plant.values[motor_of(fixed.plant)[1].inertia]
     inertias = np.array(asked.inertias) if asked.inertias else inertia * np.geomspace(0.1, 1e3, 13)
     frequencies = np.geomspace(*_FREQUENCIES)
     angles = np.linspace(0.0, asked.last, 41)
     responses = tuple(
-        ctl.sine_response(fixed, amplitude=a, frequencies=frequencies, translate=translate)
+        ctl.sine_response(
+            fixed, amplitude=a, frequencies=frequencies, offset=side * _BIAS * a, translate=translate
+        )
         for a in amplitudes
     )
-    held = ctl.held_torque(fixed, amplitudes, translate=translate)
+    held = ctl.held_torque(fixed, largest, translate=translate)
     gain = fixed.controller.values[asked.gain]
     onsets = tuple(
         ctl.onset_of_limit_cycling(
             fixed, asked.gain, between=(0.1 * gain, 5.0 * gain), amplitude=a, translate=translate
         )
-        for a in (amplitudes if gain > 0.0 else ())
+        for a in (largest if gain > 0.0 else ())
     )
     speed = fixed.controller.values["controller.speed_limit"]
     line = ctl.saturation_line(fixed, frequencies, largest_angle=asked.last, speed_limit=speed)
@@ -260,14 +269,14 @@ def _written(result: _Evaluation, out: Path) -> list[Path]:
         "coupled_stability": figures.coupled_stability_map(result.coupled),
     }
     rows = [
-        [*(f"{x:.9g}" for x in (r.amplitude, f, db, phase, d, v.saturated)), str(v)]
+        [*(f"{x + 0.0:.9g}" for x in (r.amplitude, r.offset, f, db, phase, d, v.saturated)), str(v)]
         for r in result.responses
         for f, db, phase, d, v in zip(
             r.frequency, r.decibel, r.phase_degrees, r.distortion, r.verdicts, strict=True
         )
     ]
-    units = {"amplitude": "N*m", "frequency": "Hz", "magnitude": "dB", "phase": "deg", "distortion": "1",
-             "saturated": "1"}  # fmt: skip
+    units = {"amplitude": "N*m", "offset": "N*m", "frequency": "Hz", "magnitude": "dB", "phase": "deg",
+             "distortion": "1", "saturated": "1"}  # fmt: skip
     heads = [*(f"{name} [{unit}]" for name, unit in units.items()), "verdict"]
     write_table(out / "responses.csv", [heads, *rows])
     return [*figures.write_figures(out, drawn), out / "responses.csv"]
@@ -280,7 +289,7 @@ def _content(result: _Evaluation, files: list[Path]) -> dict[str, Any]:
         "findings": result.findings,
         "responses": [
             {
-                "amplitude_Nm": r.amplitude, "frequency_Hz": _plain(r.frequency),
+                "amplitude_Nm": r.amplitude, "offset_Nm": r.offset, "frequency_Hz": _plain(r.frequency),
                 "magnitude_dB": _plain(r.decibel), "phase_deg": _plain(r.phase_degrees),
                 "saturated": _plain(r.saturated), "verdicts": [str(v) for v in r.verdicts],
             }
@@ -314,7 +323,7 @@ def _number(value: float) -> float | str | None:
     """Return a number that JSON can hold: nothing for what is none, a word for what is infinite."""
     if math.isnan(value):
         return None
-    return value if math.isfinite(value) else "infinite" if value > 0.0 else "minus infinite"
+    return value + 0.0 if math.isfinite(value) else "infinite" if value > 0.0 else "minus infinite"
 
 
 def _plain(values: Any) -> list[float | str | None]:
@@ -325,12 +334,22 @@ def _shown(result: _Evaluation) -> None:
     import numpy as np
 
     rows = [
-        [f"{r.amplitude:g}", f"{f:.3g}", _text(db), _text(phase), f"{100 * v.saturated:.0f}", str(v)]
+        [
+            f"{r.amplitude:g}",
+            f"{r.offset:g}",
+            f"{f:.3g}",
+            _text(db),
+            _text(phase),
+            f"{100 * v.saturated:.0f}",
+            str(v),
+        ]
         for r in result.responses
         for f, db, phase, v in zip(r.frequency, r.decibel, r.phase_degrees, r.verdicts, strict=True)
     ]
-    heads = ("N·m", "Hz", "dB", "degrees", "% at limit", "verdict")
+    heads = ("± N·m", "about N·m", "Hz", "dB", "degrees", "% at limit", "verdict")
     show_table("Desired to actual torque, simulated with counts", heads, rows)
+    if any(r.offset for r in result.responses):
+        click.echo(f"the spring gives torque of one sign only: each sine swings about {_BIAS:g} amplitudes")
     linear, torque = result.margins[0].linear, result.margins[0].linear.torque
     table = []
     for k in range(0, len(linear.angles), 5):
@@ -364,5 +383,12 @@ def _shown(result: _Evaluation) -> None:
             click.echo(str(onset))
 
 
+def _sine(response: SineResponse) -> str:
+    about = f" about {response.offset:g} N·m" if response.offset else ""
+    return f"±{response.amplitude:g} N·m{about}"
+
+
 def _text(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else ("–" if math.isnan(value) else "∞")
+    if math.isfinite(value):
+        return f"{value + 0.0:.3g}"  # minus zero is zero
+    return "–" if math.isnan(value) else "∞" if value > 0.0 else "−∞"

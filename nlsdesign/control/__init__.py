@@ -21,7 +21,7 @@ from .evaluation.responses import (
 from .evaluation.saturation import SaturationLine, saturation_line
 from .evaluation.steps import StepResponse, step_response, torque_resolution
 from .laws.disturbance import DisturbanceObserver
-from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, torque_limit
+from .laws.largest_torque import TorqueLimit, check_torque, largest_torque, only_side, torque_limit
 from .laws.outer_laws import PidTorque, TorqueLaw
 from .laws.scheduled_torque import DesiredRate, FilteredDifference, GivenRate, ScheduledTorque
 from .laws.torque_loop import LoopNames, TorqueGains, loop_names, torque_controller
@@ -85,6 +85,7 @@ __all__ = [
     "loop_margins",
     "loop_names",
     "loop_over_spread",
+    "only_side",
     "onset_of_limit_cycling",
     "output_impedance",
     "saturation_line",

@@ -16,10 +16,12 @@ from .trace import Trace
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-9
+_AT = 1e-6
+"""Share of the supply below its limit at which it counts as held there."""
 
 
 class LimitReached(NamedTuple):
-    """A signal that goes beyond a declared number.
+    """A signal that goes beyond a declared number, or is held at it.
 
     Parameters
     ----------
@@ -44,7 +46,10 @@ class LimitReached(NamedTuple):
 
     def __str__(self) -> str:
         reached, limit = (with_unit(f"{each:.4g}", self.unit) for each in (self.furthest, self.limit))
-        return f"{self.name} reaches {reached}, beyond {limit} from t = {self.time:.4g} s: {self.meaning}"
+        way = f"reaches {reached}, beyond {limit}"
+        if abs(self.furthest) <= abs(self.limit) * (1.0 + _ROUNDING):
+            way = f"is at its limit of {limit}"
+        return f"{self.name} {way} from t = {self.time:.4g} s: {self.meaning}"
 
 
 def limits_reached(model: FlatModel, run: Trace) -> tuple[LimitReached, ...]:
@@ -69,6 +74,23 @@ def _drive(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
         limit = model.values[motor.current_limit]
         meaning = f"{motor.current_limit}, the drive gives no more"
         yield from _beyond(run, motor.command or "", run[motor.command or ""], (-limit, limit), meaning)
+    for body in model.bodies:
+        if body.motor is not None:
+            yield from _supply(model, run, body.motor.current_limit.rpartition(".")[0])
+
+
+def _supply(model: FlatModel, run: Trace, motor: str) -> Iterator[LimitReached]:
+    """Return where the voltage at a motor is held at the limit of the supply."""
+    name, declared = f"{motor}.voltage", f"{motor}.voltage_limit"
+    if name not in run or declared not in model.values:
+        return
+    limit, values = model.values[declared], run[name]
+    for side in (-1.0, 1.0):
+        held = np.flatnonzero(side * values >= limit * (1.0 - _AT))
+        if len(held):
+            meaning = f"{declared}, the supply gives no more and the current is less than wanted"
+            time = float(run.time[held[0]])
+            yield LimitReached(name, run.units[name], time, side * limit, side * limit, meaning)
 
 
 def _sensors(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
@@ -84,10 +106,13 @@ def _cams(model: FlatModel, run: Trace) -> Iterator[LimitReached]:
         if cam.last_angle is None or cam.angle not in run:
             continue
         last, angle = model.values[cam.last_angle], run[cam.angle]
-        # A cam that acts on one side has no lever arm on the other, where nothing ends.
-        acts = cam.lever_arm in run and bool(np.any(run[cam.lever_arm][angle < -last] != 0.0))
-        meaning = f"the contour of {cam.name} ends, its lever arm is held"
-        yield from _beyond(run, cam.angle, angle, (-last if acts else -math.inf, last), meaning)
+        ends = f"the contour of {cam.name} ends, its lever arm is held"
+        slack = f"{cam.name} has no lever arm on this side, nothing pulls back"
+        for side in (-1.0, 1.0):
+            outside = side * angle > last
+            acts = cam.lever_arm not in run or bool(np.any(run[cam.lever_arm][outside] != 0.0))
+            limits = (-last, math.inf) if side < 0.0 else (-math.inf, last)
+            yield from _beyond(run, cam.angle, angle, limits, ends if acts else slack)
 
 
 def _strength(model: FlatModel, run: Trace) -> Iterator[LimitReached]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from nlsdesign.cli.analyse_loop import loop
+from nlsdesign.cli.analyse_loop import _loops, loop
+from nlsdesign.control import only_side, sine_response
+
+FINGER = str(Path(__file__).parents[2] / "models" / "templates" / "one-sided-finger.toml")
 
 
 def run(out: Path, *options: str) -> tuple[int, dict]:
@@ -56,3 +60,34 @@ def test_bad_input_writes_nothing(tmp_path: Path) -> None:
     result = CliRunner().invoke(loop, ["--deck", "vhb4910_specimen", "--out", str(out)])
     assert "needs" in str(result.exception)
     assert not out.exists()
+
+
+def test_a_spring_of_one_sign_is_swung_about_a_bias_and_silence_is_no_answer() -> None:
+    fixed, _ = _loops(FINGER, {"gains": None}, 1, 1e-3)
+    side = only_side(fixed.plant)
+    assert abs(side) == 1.0
+    size, at = 0.02, [5.0]
+    silent = sine_response(fixed, amplitude=size, frequencies=at, offset=-1.5 * side * size)
+    assert [str(v) for v in silent.verdicts] == ["no answer"]
+    assert np.all(np.isnan(silent.decibel))
+    biased = sine_response(fixed, amplitude=size, frequencies=at, offset=1.25 * side * size)
+    assert [v.state for v in biased.verdicts] == ["settled"]
+    assert np.all(np.isfinite(biased.decibel))
+
+
+def test_a_spring_of_both_signs_needs_no_bias() -> None:
+    fixed, _ = _loops("austin2015_soft_spring", {"gains": None}, 1, 1e-3)
+    assert only_side(fixed.plant) == 0.0
+
+
+@pytest.mark.slow
+def test_the_loop_of_a_finger_is_judged_on_the_side_that_pulls(tmp_path: Path) -> None:
+    status, found = run(tmp_path, "--deck", FINGER)
+    assert status in (0, 1)
+    for response in found["responses"]:
+        assert abs(response["offset_Nm"]) == pytest.approx(1.25 * response["amplitude_Nm"])
+        for value, text in zip(response["magnitude_dB"], response["verdicts"], strict=True):
+            assert isinstance(value, float) == text.startswith("settled")
+    table = (tmp_path / "responses.csv").read_text("utf-8")
+    assert "inf" not in table
+    assert ",-0," not in table

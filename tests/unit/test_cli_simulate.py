@@ -168,6 +168,28 @@ def test_limits_that_are_reached_are_warned_of(run: Run) -> None:
     assert quiet["signals"]["motor.angle"]["rms"] == 0.0
 
 
+def test_a_supply_at_its_limit_is_warned_of_and_its_current_predicted(run: Run) -> None:
+    """The speed bends sharply where the supply sets in; over a long span of the rate it is blurred."""
+    assert run("deck", "new", "joint.toml", "--template", "geared-joint", "--yes")[0] == 0
+    words = ("--deck", "joint.toml", "--input", "motor.current=1.2 A sine 0.2 Hz", "--stop", "5 s")
+    status, out, _ = run("simulate", *words, "--readings", "2", "--table-only", "--out", "r.csv")
+    assert status == 0
+    assert "warning: motor.voltage is at its limit of 24 V from t = " in out
+    _, out, _ = run("simulate", "--deck", "joint.toml", "--record", "r.csv", "--out", "y.csv", "--json")
+    current = json.loads(out)["in_band"]["current_sensor.reading"]
+    assert current["error"] < 1.5 * current["noise_floor"]
+
+
+def test_a_cable_that_is_left_is_warned_of_on_both_sides(run: Run) -> None:
+    assert run("deck", "new", "finger.toml", "--template", "one-sided-finger", "--yes")[0] == 0
+    words = ("--input", "motor.current=1 A sine 1 Hz", "--stop", "1 s")
+    status, out, _ = run("simulate", "--deck", "finger.toml", *words, "--table-only", "--out", "f.csv")
+    assert status == 0
+    assert "beyond 1.047 rad from t = 0.117 s: the contour of spring.cam ends" in out
+    assert "beyond -1.047 rad" in out
+    assert "spring.cam has no lever arm on this side, nothing pulls back" in out
+
+
 @pytest.mark.parametrize(
     ("words", "rule"),
     [

@@ -36,6 +36,7 @@ from ..loop.closed_loop import ClosedLoop
 Array = NDArray[np.float64]
 
 SETTLED, LIMIT_CYCLE, UNSETTLED, DIVERGED = "settled", "limit cycle", "not settled", "diverged"
+NO_ANSWER = "no answer"
 HARMONICS = 10
 """Multiples of the drive's frequency that count as answer to the drive; up to twice as many count in part."""
 COUNTS = 2.0
@@ -67,7 +68,7 @@ class LoopVerdict:
     ----------
     state
         ``"settled"``, ``"limit cycle"``, ``"not settled"`` (still changing from window to window after the
-        longest time that was allowed) or ``"diverged"``.
+        longest time that was allowed), ``"diverged"`` or ``"no answer"`` (a sine that moves no torque).
     amplitude
         Of the torque that the drive does not explain, in N·m: of the limit cycle where there is one, else
         the largest value of the rest, which is chatter.

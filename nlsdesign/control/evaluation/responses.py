@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,15 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.sampled_batch import PLANT
 from ..laws.largest_torque import check_torque
 from ..loop.closed_loop import ClosedLoop
-from .loop_verdict import LoopJudge, LoopVerdict
+from .loop_verdict import NO_ANSWER, LoopJudge, LoopVerdict
 from .periodic_runs import PeriodicDrive, PeriodicRun, run_periodic
 
 Array = NDArray[np.float64]
 
 _APPROACH = 0.3
 """Time in s in which a held torque is approached."""
+_SILENT = 1e-6
+"""Share of the desired torque below which a torque has not answered."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,8 @@ class SineResponse:
         What is not fundamental, root mean square over that of the fundamental, shape (n,).
     verdicts
         On each run.
+    offset
+        Of the desired torque in N·m.
     """
 
     amplitude: float
@@ -77,12 +81,12 @@ class SineResponse:
     response: NDArray[np.complex128]
     distortion: Array
     verdicts: tuple[LoopVerdict, ...]
+    offset: float = 0.0
 
     @property
     def decibel(self) -> Array:
         """Magnitude in dB."""
-        with np.errstate(divide="ignore"):  # no answer at all is minus infinity
-            magnitude: Array = 20.0 * np.log10(np.abs(self.response))
+        magnitude: Array = 20.0 * np.log10(np.abs(self.response))
         return magnitude
 
     @property
@@ -199,6 +203,9 @@ def sine_response(
 ) -> SineResponse:
     """Run the loop on sines of the desired torque, one run per frequency, until the answer repeats itself.
 
+    A run whose torque does not follow at all has the verdict ``"no answer"``: a spring that pulls to one side
+    only need not follow a sine about zero.
+
     Parameters
     ----------
     loop
@@ -225,7 +232,9 @@ def sine_response(
     check_torque(loop.plant, abs(offset) + amplitude)
     wanted = np.asarray(frequencies, dtype=float)
     drive = sine_drive(loop, amplitude=amplitude, frequencies=wanted, offset=offset, cycles=cycles)
-    runs = run_periodic(loop, drive, translate=translate)
+    runs = [
+        _unless_silent(run, loop.torque, amplitude) for run in run_periodic(loop, drive, translate=translate)
+    ]
     response = [_answer(run, loop.torque, amplitude) for run in runs]
     return SineResponse(
         amplitude,
@@ -233,6 +242,7 @@ def sine_response(
         np.array(response),
         np.array([_distortion(run, loop.torque) for run in runs]),
         tuple(run.verdict for run in runs),
+        offset,
     )
 
 
@@ -388,6 +398,13 @@ def zero_torque(
     )
 
 
+def _unless_silent(run: PeriodicRun, torque: str, amplitude: float) -> PeriodicRun:
+    """Return a run, with another verdict where the torque did not answer."""
+    if not run.verdict.holds or abs(run.fundamental(torque)) > _SILENT * amplitude:
+        return run
+    return replace(run, verdict=replace(run.verdict, state=NO_ANSWER))
+
+
 def _answer(run: PeriodicRun, torque: str, amplitude: float) -> complex:
     # sin(ωt) = Im e^(iωt): its fundamental is −i times the amplitude.
     return run.fundamental(torque) / (-1j * amplitude) if run.verdict.holds else complex(math.nan, math.nan)
@@ -399,9 +416,6 @@ def _distortion(run: PeriodicRun, torque: str) -> float:
     fundamental, values = run.fundamental(torque), run[torque]
     turn = np.exp(2j * math.pi * run.frequency * run.time)
     rest = values - np.mean(values) - np.real(fundamental * turn)
-    if fundamental == 0.0:
-        # A spring that pulls to one side only need not follow a swing about zero at all.
-        return math.inf
     return _rms(rest) / (abs(fundamental) / math.sqrt(2.0))
 
 

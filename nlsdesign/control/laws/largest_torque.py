@@ -16,6 +16,10 @@ SLOW = 1.0
 """Speed of the motor in rad/s at which friction is counted: what is dry slides, what is viscous is small."""
 
 
+_SMALL_TURN, _NOTHING = 0.1, 1e-6
+"""Angle in rad at which a spring without a cam is looked at, and share of a torque that is none."""
+
+
 class TorqueLimit(NamedTuple):
     """The largest torque of the series spring in both directions, and what limits it.
 
@@ -74,6 +78,30 @@ def largest_torque(plant: FlatModel) -> float:
         Continuous, load fixed or prescribed.
     """
     return torque_limit(plant).torque
+
+
+def only_side(plant: FlatModel) -> float:
+    """Return the sign of the only torque that a series spring can give, 0 where it can give both.
+
+    A cable that pulls to one side gives no torque at rest at the other end of its travel.
+
+    Parameters
+    ----------
+    plant
+        Continuous, load fixed or prescribed; friction in its smooth form.
+    """
+    drive = KnownDrive(plant)
+    spring = series_spring(plant)
+    ends = [plant.values[cam.last_angle] for cam in spring.cams if cam.last_angle]
+    angle = (min(ends) if ends else _SMALL_TURN) / abs(drive.spring_turns_value)
+    torques = []
+    for way in (1.0, -1.0):
+        state = rest_state(plant, {drive.body.motion: way * angle, drive.body.rate: 0.0})
+        torques.append(plant.evaluate(list(state))[spring.effort])
+    strongest = max(torques, key=abs)
+    if min(map(abs, torques)) > _NOTHING * abs(strongest) or strongest == 0.0:
+        return 0.0
+    return math.copysign(1.0, strongest)
 
 
 def check_torque(plant: FlatModel, torque: float) -> None:

@@ -13,6 +13,10 @@ that makes the noise of the next one small, and never so quick that the filter o
 very small share of noise through. A motion that reverses sharply has a quick acceleration although
 its rate hardly changes most of the time, and fine counts show that while coarse ones do not.
 
+Where the supply of a motor is at its limit, the current follows the speed with a steep slope, and the
+speed bends where that begins. There the span of the rate is as short as the noise of the measured current
+allows.
+
 Source: Fuller 1987 (attenuation by errors in variables); Savitzky and Golay 1964 (quartics); Ruppert et al.
 1995 (widths from estimated derivatives).
 """
@@ -54,6 +58,11 @@ _QUIET = 0.005
 _CLEAR = 3.0
 """Samples in the width of a filter that leaves a hundredth of what has six samples a period: derivatives of
 what is quicker are not true."""
+_LIMITS = (".voltage_limit", ".current_limit")
+_LIMIT_NOISE = 0.3
+"""Noise of a rate behind a limit, in that of the target itself, up to which the span is shortened."""
+_LEAST_SPAN = 8.0
+"""Samples in such a span, at least."""
 _STEP = 2.0**0.25
 _WIDTHS = 60
 """Widths of a filter in the usual record, at least: its reach is five to each side, that of rates is more."""
@@ -208,6 +217,7 @@ def chosen_filters(
     widest = usual / _WIDTHS
     least = min((READING if block.target else BALANCE) / pace, widest)
     span = min(SPAN / pace, SPAN / BALANCE * widest)
+    span = _span_behind_limit(block, records, noise, span)
     spacing = SPACING * BALANCE / pace
     width = min(_unbiased_width(block, records, noise, (least, span)), widest) if moving else least
     # A record shorter than a few radians of its motion keeps rows that overlap.
@@ -256,6 +266,41 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
             drive = block.drives[variable.name]
             inputs[i] = derivative(record.trace[drive.signal], record.step, order=drive.order, span=span)
     return inputs
+
+
+def _span_behind_limit(block: Block, records: Sequence[Record], noise: Noise, longest: float) -> float:
+    """Return the span of the rates of a block, shorter where a limit of a motor switches their effect.
+
+    A rate taken over a long span is blurred where the motion bends, and it bends where a limit sets in.
+    """
+    limits = [v.name for v in block.model.parameters if v.name.endswith(_LIMITS)]
+    rates = {n: d.signal for n, d in block.drives.items() if d.order == 1}
+    step = max(r.step for r in records)
+    span = _LEAST_SPAN * step
+    if not (limits and rates and block.target) or span >= longest:
+        return longest
+    own = _LIMIT_NOISE * noise.deviation(block.target)
+    places = [v.name for v in block.model.inputs]
+    for name, signal in rates.items():
+        slopes = [_slopes_of(block, record, span, places.index(name)) for record in records]
+        size = np.abs(np.concatenate(slopes))
+        if np.all(size > 0.0) or not np.any(size > 0.0):
+            continue  # no limit, or one that does not set in
+        steepest = float(np.max(size))
+        while span < longest:
+            weights = filter_weights(0.0, 1, step, span)
+            if steepest * noise.behind(signal, weights, step) <= own:
+                break
+            span *= _STEP
+        longest = min(longest, span)
+    return longest
+
+
+def _slopes_of(block: Block, record: Record, span: float, place: int) -> Array:
+    """Return the slope of the output with respect to one input on some samples of a record."""
+    stride = max(1, len(record.trace) // _PROBES)
+    slopes: Array = output_slopes(block, measured_inputs(block, record, span), stride)[place]
+    return slopes
 
 
 def _unbiased_width(
