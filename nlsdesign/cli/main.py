@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import click
 
-from ..errors import NlsError
+from ..errors import NlsError, nearest
 from ..locations import version
 from .analyse import analyse
 from .analyse_angle import analyse_angle
@@ -71,6 +72,15 @@ for analysis in (analyse_angle, loop):  # the first is the default
 complete_names(program)
 
 
+def _with_nearest(error: click.ClickException) -> None:
+    """Add the nearest valid name to the message of an option that takes one of some names."""
+    kind = error.param.type if isinstance(error, click.BadParameter) and error.param else None
+    given = re.match(r"'(.*)' is not one of", error.message, re.DOTALL)
+    if isinstance(kind, click.Choice) and given:
+        near = nearest(given[1], map(str, kind.choices))
+        error.message += f" Did you mean '{near}'?" if near else ""
+
+
 def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
     try:
@@ -81,6 +91,7 @@ def main() -> None:
     except click.exceptions.Exit as exit_:
         sys.exit(exit_.exit_code)
     except click.ClickException as error:
+        _with_nearest(error)
         error.show()
         sys.exit(2)
     except (click.exceptions.Abort, KeyboardInterrupt):
