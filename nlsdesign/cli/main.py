@@ -72,13 +72,17 @@ for analysis in (analyse_angle, loop):  # the first is the default
 complete_names(program)
 
 
-def _with_nearest(error: click.ClickException) -> None:
-    """Add the nearest valid name to the message of an option that takes one of some names."""
-    kind = error.param.type if isinstance(error, click.BadParameter) and error.param else None
+def _with_nearest(error: click.ClickException) -> click.ClickException:
+    """Return an error that names the nearest valid name, where an option takes one of some names."""
+    if not isinstance(error, click.BadParameter) or error.param is None:
+        return error
+    kind = error.param.type
     given = re.match(r"'(.*)' is not one of", error.message, re.DOTALL)
     if isinstance(kind, click.Choice) and given:
         near = nearest(given[1], map(str, kind.choices))
-        error.message += f" Did you mean '{near}'?" if near else ""
+        words = error.message + (f" Did you mean '{near}'?" if near else "")
+        return click.BadParameter(words, error.ctx, error.param, error.param_hint)
+    return error
 
 
 def main() -> None:
@@ -91,8 +95,7 @@ def main() -> None:
     except click.exceptions.Exit as exit_:
         sys.exit(exit_.exit_code)
     except click.ClickException as error:
-        _with_nearest(error)
-        error.show()
+        _with_nearest(error).show()
         sys.exit(2)
     except (click.exceptions.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)

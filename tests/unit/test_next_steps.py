@@ -84,9 +84,7 @@ def test_a_folder_for_a_deck_names_the_deck_in_it(run: Run) -> None:
 
 def test_a_study_that_does_not_run_leaves_no_empty_folder(run: Run) -> None:
     assert run("study", "run", "helo", "--out", "a/b")[0] == 2
-    Path("stops.py").write_text(
-        "def main(out, fast=False):\n    raise KeyboardInterrupt\n", encoding="utf-8"
-    )
+    Path("stops.py").write_text("def main(out, fast=False):\n    raise KeyboardInterrupt\n", encoding="utf-8")
     assert run("study", "run", "stops.py", "--out", "a/b")[0] == 130
     assert not Path("a").exists()
 
