@@ -246,6 +246,9 @@ def load_deck(name: str | Path) -> Deck:
     path = Path(name)
     if path.suffix != ".toml":
         if str(name) not in deck_names():
+            inside = path / "model.toml"
+            if is_there(inside):
+                raise DeckError(f"deck '{name}'", "is a folder", next_step=f"name the deck in it: {inside}")
             raise unknown_name("deck", str(name), deck_names())
         path = folder("models") / "decks" / f"{name}.toml"
     if not is_there(path):

@@ -23,12 +23,13 @@ LIST_NAME: Final = ".nlsdesign.json"
 """Name of the list in each folder."""
 _FORMAT = "nlsdesign written files 1"
 _LARGEST = 1 << 24
-FileState = Literal["new", "as written", "changed", "foreign"]
+FileState = Literal["new", "as written", "changed", "foreign", "of another command"]
 WORDS: Final[dict[FileState, str]] = {
     "new": "is new",
     "as written": "is as nlsdesign wrote it",
     "changed": "was changed since nlsdesign wrote it",
     "foreign": "was not written by nlsdesign",
+    "of another command": "was written by another command",
 }
 
 
@@ -42,12 +43,15 @@ class Keeping:
         Where it writes; other places are not looked at.
     force
         Whether everything may be replaced.
+    command
+        Name of the command, which the list holds beside the files that it wrote.
     beside
         Where the new file stands, by the file that was kept.
     """
 
     folder: Path
     force: bool = False
+    command: str = ""
     beside: dict[Path, Path] = field(default_factory=dict)
 
     def covers(self, path: Path) -> bool:
@@ -65,7 +69,7 @@ _now: ContextVar[Keeping | None] = ContextVar("keeping", default=None)
 
 
 @contextmanager
-def keeping(folder: Path, *, force: bool = False) -> Iterator[Keeping]:
+def keeping(folder: Path, *, force: bool = False, command: str = "") -> Iterator[Keeping]:
     """Keep what is not as it was written in a folder and below, and list what is written.
 
     Parameters
@@ -74,8 +78,10 @@ def keeping(folder: Path, *, force: bool = False) -> Iterator[Keeping]:
         Where a command writes.
     force
         Whether everything may be replaced; what is written is listed all the same.
+    command
+        Name of the command.
     """
-    kept = Keeping(folder, force)
+    kept = Keeping(folder, force, command)
     token = _now.set(kept)
     try:
         yield kept
@@ -83,13 +89,15 @@ def keeping(folder: Path, *, force: bool = False) -> Iterator[Keeping]:
         _now.reset(token)
 
 
-def file_state(path: Path) -> FileState:
+def file_state(path: Path, *, command: str = "") -> FileState:
     """Return whether a file is new, as it was written, changed since, or was never written here.
 
     Parameters
     ----------
     path
         Of the file.
+    command
+        Where it is given, what is listed as written by another one is told apart.
     """
     # What stands in the way as a folder is refused by whoever writes.
     if not os.path.lexists(path) or path.is_dir():
@@ -97,7 +105,10 @@ def file_state(path: Path) -> FileState:
     stated = _listed(path.parent).get(path.name)
     if stated is None:
         return "foreign"
-    return "as written" if stated == _digest(path) else "changed"
+    if stated != _digest(path):
+        return "changed"
+    other = command and _writers(path.parent).get(path.name, command) != command
+    return "of another command" if other else "as written"
 
 
 def listed_files(folder: Path) -> list[Path]:
@@ -113,20 +124,23 @@ def listed_files(folder: Path) -> list[Path]:
                   if (place := each.parent / name).exists())  # fmt: skip
 
 
-def refuse_to_lose(paths: Iterable[Path]) -> None:
+def refuse_to_lose(paths: Iterable[Path], *, command: str = "") -> None:
     """Refuse to begin where a file that would be replaced was changed or brought by somebody.
 
     Parameters
     ----------
     paths
         Of the files that will be written.
+    command
+        Where it is given, files of other commands are refused too.
 
     Raises
     ------
     ExportError
         Naming the files.
     """
-    lost = {path: state for path in paths if (state := file_state(path)) in ("changed", "foreign")}
+    states = {path: file_state(path, command=command) for path in paths}
+    lost = {path: state for path, state in states.items() if state not in ("new", "as written")}
     if not lost:
         return
     first, *others = lost
@@ -176,7 +190,8 @@ def note_written(path: Path) -> None:
     """
     kept = _now.get()
     if kept is not None and kept.covers(path):
-        _write_list(path.parent, {**_listed(path.parent), path.name: _digest(path)})
+        writers = {**_writers(path.parent), path.name: kept.command}
+        _write_list(path.parent, {**_listed(path.parent), path.name: _digest(path)}, writers)
 
 
 def discard(path: Path) -> None:
@@ -194,7 +209,7 @@ def discard(path: Path) -> None:
     path.unlink(missing_ok=True)
     names = _listed(path.parent) if guarded else {}
     if names.pop(path.name, None) is not None:
-        _write_list(path.parent, names)
+        _write_list(path.parent, names, _writers(path.parent))
 
 
 def _digest(path: Path) -> str:
@@ -207,6 +222,15 @@ def _digest(path: Path) -> str:
 
 def _listed(folder: Path) -> dict[str, str]:
     """Return the list of a folder; a damaged one counts as none, so that nothing is replaced unasked."""
+    return _texts(folder, "files")
+
+
+def _writers(folder: Path) -> dict[str, str]:
+    """Return the commands that wrote the files of a folder, where they are known."""
+    return _texts(folder, "commands")
+
+
+def _texts(folder: Path, key: str) -> dict[str, str]:
     path = folder / LIST_NAME
     try:
         if path.stat().st_size > _LARGEST:
@@ -216,15 +240,17 @@ def _listed(folder: Path) -> dict[str, str]:
         return {}
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         return {}
-    files = content.get("files")
+    files = content.get(key)
     if not isinstance(files, dict):
         return {}
     return {n: d for n, d in files.items() if isinstance(d, str) and d and Path(n).name == n}
 
 
-def _write_list(folder: Path, names: dict[str, str]) -> None:
+def _write_list(folder: Path, names: dict[str, str], writers: dict[str, str]) -> None:
     """Write the list whole or not at all; without it the next run asks, so its failure loses nothing."""
-    text = json.dumps({"format": _FORMAT, "files": dict(sorted(names.items()))}, indent=1) + "\n"
+    known = {name: command for name, command in sorted(writers.items()) if command and name in names}
+    content = {"format": _FORMAT, "files": dict(sorted(names.items())), "commands": known}
+    text = json.dumps(content, indent=1) + "\n"
     try:
         handle, name = tempfile.mkstemp(prefix=f"{LIST_NAME}.", dir=folder)
     except OSError:

@@ -67,7 +67,7 @@ WIRE_HELP = (
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,
               help="Also halve the step so often and print how the signals converge.")  # fmt: skip
-@out_file_option(None, "CSV to write.")
+@out_file_option(None, "CSV to write.", ending=".csv")
 @json_option
 def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **given: Any) -> None:
     """Run FMUs together; numbers are in the units that the FMUs state for their variables.

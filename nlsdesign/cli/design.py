@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
     from ..design import CamDesign, DesignJob, Target
 
 _LINE = "repeatable; a line as in a design file, for instance"
+_ENTRY = re.compile(r"""\s*([\w.-]+|"[^"]*"|'[^']*')\s*=""")
+_FORMS = {
+    "target": 'ExponentialTorque = {maximum = "0.3 N*m", angle = "60 deg", shape = 1.0}',
+    "limit": 'MaximumCamRadius = {radius = "20 mm"}',
+    "goal": "TorqueError = {}",
+    "stock": '"spring.cam.elements" = [1, 2, 4]',
+}
+"""How an entry of each option is written."""
 _FILES = (
     "report.html",
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
@@ -135,6 +144,12 @@ def _job(**given: Any) -> DesignJob:
 
 def _as_text(given: dict[str, Any]) -> str:
     """Return the options as the text of a design file."""
+    for option, form in _FORMS.items():
+        for text in [given[option]] if isinstance(given[option], str) else given[option] or ():
+            if not _ENTRY.match(text):
+                raise ValueRangeError(
+                    f"--{option} '{text}'", "is not NAME = {...}", next_step=f"write {form}"
+                )
     quoted = ", ".join(f'"{name}"' for name in given["free"])
     lines = [f"free = [{quoted}]"] if quoted else []
     targets = []

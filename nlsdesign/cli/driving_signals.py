@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..model import FlatModel
     from ..simulation import Sine
 
+_WAVE = re.compile(r"\s(?:sine|step)\s|@")
 FORMS = "'2 A', '2 A sine 5 Hz', '2@5', '1 A + 2 A sine 5 Hz' or '2 A step 0.1 s'"
 
 
@@ -69,6 +70,11 @@ def read_driving_signal(text: str, unit: str) -> Sine | StepAt:
     """
     from ..simulation import Sine
 
+    if len(_WAVE.findall(text)) > 1:
+        raise ValueRangeError(
+            f"'{text}'", "has more than one sine or step; one beside a constant is possible",
+            next_step="give the sum over time by --input-file, a CSV with time and input",
+        )  # fmt: skip
     first, plus, rest = (part.strip() for part in text.partition(" + "))
     offset, wave = (size_in(first, unit), rest) if plus else (0.0, text)
     sine = re.split(r"\s+sine\s+|\s*@\s*", wave.strip())
@@ -106,8 +112,9 @@ def size_in(text: str, unit: str) -> float:
     if not same_dimension(given or unit, unit):
         shown = typeset_unit(unit) or "a plain number"
         raise UnitError(
-            f"'{text}'", f"is not in a unit like {shown}", next_step=f"write '{with_unit('1', unit)}'"
-        )
+            f"'{text}'", f"is not in a unit like {shown}",
+            next_step=f"write '{with_unit(f'{number:.12g}', unit)}'",
+        )  # fmt: skip
     value = number * parse_unit(given or unit).factor
     if not math.isfinite(value):
         raise ValueRangeError(f"'{text}'", "is not finite", next_step="give a finite number")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import click
 
-from ..errors import NlsError
+from ..errors import NlsError, nearest
 from ..locations import version
 from .analyse import analyse
 from .analyse_angle import analyse_angle
@@ -71,6 +72,19 @@ for analysis in (analyse_angle, loop):  # the first is the default
 complete_names(program)
 
 
+def _with_nearest(error: click.ClickException) -> click.ClickException:
+    """Return an error that names the nearest valid name, where an option takes one of some names."""
+    if not isinstance(error, click.BadParameter) or error.param is None:
+        return error
+    kind = error.param.type
+    given = re.match(r"'(.*)' is not one of", error.message, re.DOTALL)
+    if isinstance(kind, click.Choice) and given:
+        near = nearest(given[1], map(str, kind.choices))
+        words = error.message + (f" Did you mean '{near}'?" if near else "")
+        return click.BadParameter(words, error.ctx, error.param, error.param_hint)
+    return error
+
+
 def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
     try:
@@ -81,7 +95,7 @@ def main() -> None:
     except click.exceptions.Exit as exit_:
         sys.exit(exit_.exit_code)
     except click.ClickException as error:
-        error.show()
+        _with_nearest(error).show()
         sys.exit(2)
     except (click.exceptions.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import click
 
+from ..errors import ValueRangeError
 from ..written_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
 from .output import show_json
 
@@ -53,8 +54,12 @@ def out_option(default: str = "out", *, writes: Names = ()) -> Callable[[F], F]:
     return _guarded(option, below)
 
 
-def out_file_option(default: str | None, text: str, *, beside: Names = ()) -> Callable[[F], F]:
+def out_file_option(
+    default: str | None, text: str, *, beside: Names = (), ending: str = ""
+) -> Callable[[F], F]:
     """Return the option ``--out`` for a file, with ``--force`` and ``--dry-run``.
+
+    A file of that name that another command has written is not replaced without ``--force``.
 
     Parameters
     ----------
@@ -64,21 +69,27 @@ def out_file_option(default: str | None, text: str, *, beside: Names = ()) -> Ca
         Help.
     beside
         Suffixes of further files of the same stem, or what gives them from the options.
+    ending
+        Such as ``.csv``, which the name must have.
     """
     kind = click.Path(path_type=Path, dir_okay=False)
     shown = {"default": default, "show_default": True} if default else {"required": True}
-    option = click.option("--out", type=kind, help=text, callback=_file_can_be_made, **shown)
+    check = functools.partial(_file_can_be_made, ending=ending)
+    option = click.option("--out", type=kind, help=text, callback=check, **shown)
 
     def files(given: Mapping[str, Any]) -> tuple[Path, list[Path]]:
         out: Path = given["out"]
         suffixes = beside(given) if callable(beside) else beside
         return out.parent, [out, *(out.with_suffix(each) for each in suffixes)]
 
-    return _guarded(option, files)
+    return _guarded(option, files, only_own=True)
 
 
 def _guarded(
-    option: Callable[[Any], Any], files: Callable[[Mapping[str, Any]], tuple[Path, list[Path]]]
+    option: Callable[[Any], Any],
+    files: Callable[[Mapping[str, Any]], tuple[Path, list[Path]]],
+    *,
+    only_own: bool = False,
 ) -> Callable[[F], F]:
     def decorate(command: F) -> F:
         @functools.wraps(command)
@@ -89,8 +100,9 @@ def _guarded(
                 return command(*words, **given)
             folder, paths = files(given)
             if dry_run:
-                return list_files(paths, folder, as_json=given.get("as_json", False))
-            with kept(folder, paths, force=force):
+                as_json = given.get("as_json", False)
+                return list_files(paths, folder, as_json=as_json, only_own=only_own)
+            with kept(folder, paths, force=force, only_own=only_own):
                 return command(*words, **given)
 
         result: F = option(force_option(dry_run_option(guarded)))
@@ -111,7 +123,9 @@ def c_names(name: str) -> tuple[str, str, str]:
 
 
 @contextmanager
-def kept(folder: Path, paths: Iterable[Path], *, force: bool = False) -> Iterator[None]:
+def kept(
+    folder: Path, paths: Iterable[Path], *, force: bool = False, only_own: bool = False
+) -> Iterator[None]:
     """Refuse at once what would be lost, and say at the end what was written beside.
 
     Parameters
@@ -122,15 +136,18 @@ def kept(folder: Path, paths: Iterable[Path], *, force: bool = False) -> Iterato
         Files whose names are known beforehand.
     force
         Whether everything may be replaced.
+    only_own
+        Whether files of other commands are refused too.
 
     Raises
     ------
     ExportError
         If a file was changed, or not written by this package.
     """
+    command = _command()
     if not force:
-        refuse_to_lose(paths)
-    with keeping(folder, force=force) as done:
+        refuse_to_lose(paths, command=command if only_own else "")
+    with keeping(folder, force=force, command=command) as done:
         try:
             yield
         finally:
@@ -139,7 +156,13 @@ def kept(folder: Path, paths: Iterable[Path], *, force: bool = False) -> Iterato
                 click.echo(f"warning: {words}", err=True)
 
 
-def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool) -> None:
+def _command() -> str:
+    """Return the name of the command that runs, none outside of commands."""
+    context = click.get_current_context(silent=True)
+    return "" if context is None else context.info_name or ""
+
+
+def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool, only_own: bool = False) -> None:
     """Print what would be written or replaced, and end with status 1 if a file would be refused.
 
     Parameters
@@ -150,9 +173,12 @@ def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool) -> None:
         Where the command writes.
     as_json
         Whether JSON is printed.
+    only_own
+        Whether files of other commands would be refused.
     """
-    states = {path: file_state(path) for path in paths}
-    refused = [path for path, state in states.items() if state in ("changed", "foreign")]
+    command = _command() if only_own else ""
+    states = {path: file_state(path, command=command) for path in paths}
+    refused = [path for path, state in states.items() if state not in ("new", "as written")]
     if as_json:
         show_json({"folder": folder, "files": {str(p): s for p, s in states.items()}, "refused": refused})
     else:
@@ -177,8 +203,13 @@ def _can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
     return folder
 
 
-def _file_can_be_made(context: click.Context, parameter: click.Parameter, file: Path | None) -> Path | None:
-    """Refuse, before any work, a file whose folder could not be written into."""
+def _file_can_be_made(
+    context: click.Context, parameter: click.Parameter, file: Path | None, *, ending: str = ""
+) -> Path | None:
+    """Refuse, before any work, a file whose folder could not be written into, or of another ending."""
     if file is not None:
+        if ending and file.suffix.lower() != ending:
+            step = f"name it {file.with_suffix(ending).name}"
+            raise ValueRangeError(f"--out {file}", f"must end in {ending}", next_step=step)
         _can_be_made(context, parameter, file.parent)
     return file

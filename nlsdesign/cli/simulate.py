@@ -80,7 +80,8 @@ def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
               help="CSV with measured signals, which drive the model instead.")  # fmt: skip
 @click.option("--mapping", type=_file, default=None,
               help="Of --record: TOML that maps columns to signals.")  # fmt: skip
-@out_file_option("out/simulation/run.csv", "CSV to write; picture and page stand beside it.", beside=_further)
+@out_file_option("out/simulation/run.csv", "CSV to write; picture and page stand beside it.",
+                 beside=_further, ending=".csv")  # fmt: skip
 @json_option
 @click.pass_context
 def simulate(

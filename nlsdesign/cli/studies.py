@@ -262,7 +262,8 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry
         list_files(listed_files(target), target, as_json=as_json)
     report, own = target / "report.html", Path(name).suffix == ".py"
     before = _time_of(report)
-    with kept(target, listed_files(target), force=force):
+    load_study(name)  # a name that does not exist leaves no folder
+    with kept(target, listed_files(target), force=force), _no_empty_folder(target):
         make_folder(target)
         results = run_study(name, target, fast=fast)
     # A study of one's own may be named as one that comes with the project, and claims nothing.
@@ -283,6 +284,19 @@ def run(name: str, out: Path | None, fast: bool, as_json: bool, force: bool, dry
     for message in wrong.values():
         click.echo(f"not as claimed: {message}", err=True)
     sys.exit(1 if wrong and not fast else 0)
+
+
+@contextlib.contextmanager
+def _no_empty_folder(target: Path) -> Iterator[None]:
+    """Take a folder away again that a run has made and left without a file, when it fails."""
+    absent = [each for each in (target, *target.parents) if not each.exists()]
+    try:
+        yield
+    except BaseException:
+        for each in absent:
+            with contextlib.suppress(OSError):  # it holds something
+                each.rmdir()
+        raise
 
 
 def _time_of(file: Path) -> int | None:

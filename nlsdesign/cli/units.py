@@ -98,6 +98,6 @@ def parse_number(text: str, unit: str) -> Quantity:
         raise UnitError(
             f"'{text}'",
             f"'{given}' is not a unit like '{typeset_unit(unit)}'",
-            next_step=f"write '{with_unit('1', unit)}'",
+            next_step=f"write '{with_unit(f'{number:.12g}', unit)}'",
         )
     return quantity(number, given or "1", source="given on the command line")

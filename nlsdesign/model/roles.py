@@ -79,7 +79,7 @@ def series_cam(model: FlatModel, name: str | None = None) -> CamNames:
         _listed("cam spring", list(cams)),
         _choice(
             [f"spring='{name}' (--spring {name})" for name in cams],
-            "declare the spring with through(cam, ...)",
+            "let a spring of the deck hold a cam and the element behind it; in Python through(cam, ...)",
         ),
     )
 

@@ -6,8 +6,8 @@ import re
 from html import escape
 
 _CODE = re.compile(r"`([^`\n]+)`")
-_DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])")
-"""Dots within a hierarchical name, behind which a line may break."""
+_DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])|(?<=\w)(_)(?=\w)")
+"""Dots within a hierarchical name and underscores, behind which a line may break."""
 
 
 _HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
@@ -57,7 +57,7 @@ def visible(page: str) -> str:
 
 
 def breakable(text: Html) -> Html:
-    """Return HTML in which a line may break behind the dots of hierarchical names.
+    """Return HTML in which a line may break behind the dots and underscores of names.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def breakable(text: Html) -> Html:
     >>> breakable(words("`a.b` of 1.5"))
     '<code>a.<wbr>b</code> of 1.5'
     """
-    return Html(_DOTS.sub(r"\1<wbr>", text))
+    return Html(_DOTS.sub(r"\g<0><wbr>", text))
 
 
 def prose(text: str) -> Html:

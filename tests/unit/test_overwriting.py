@@ -175,7 +175,7 @@ def test_what_a_command_lists_beforehand_is_what_it_writes(run: Run, tmp_path: P
 def test_a_file_of_somebody_that_turns_up_during_the_work_is_kept(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def too_late(_: object) -> None:
+    def too_late(_: object, **__: object) -> None:
         (tmp_path / "o").mkdir()
         (tmp_path / "o" / "run.svg").write_text("own", encoding="utf-8")
 
@@ -185,3 +185,28 @@ def test_a_file_of_somebody_that_turns_up_during_the_work_is_kept(
     assert "run.svg was not written by nlsdesign and was kept; the new one is o/run.new.svg" in err
     assert (tmp_path / "o" / "run.svg").read_text(encoding="utf-8") == "own"
     assert "<svg" in (tmp_path / "o" / "run.new.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["report.html", "report.svg", "run", "model.toml"])
+def test_a_table_is_named_as_one(run: Run, name: str) -> None:
+    status, _, err = run("simulate", "--deck", DECK, "--stop", "20 ms", "--out", f"o/{name}")
+    assert status == 2
+    assert "must end in .csv" in err
+    assert f"name it {Path(name).stem}.csv" in err
+    assert not Path("o").exists()
+
+
+def test_page_and_picture_of_a_simulation_replace_no_file_of_another_command(run: Run) -> None:
+    with keeping(Path("o"), command="design"):
+        write_text(Path("o/run.html"), "the page of a design")
+    status, _, err = run(*CALL)
+    assert status == 2
+    assert "run.html: was written by another command" in err
+    assert Path("o/run.html").read_text(encoding="utf-8") == "the page of a design"
+    status, out, _ = run(*CALL, "--dry-run")
+    assert status == 1
+    assert "refuse to replace: " in out
+    assert not Path("o/run.csv").exists()
+    assert run(*CALL, "--force")[0] == 0
+    assert run(*CALL)[0] == 0
+    assert "the page of a design" not in Path("o/run.html").read_text(encoding="utf-8")

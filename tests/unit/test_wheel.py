@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import posixpath
 import re
 import subprocess
 import sys
 import zipfile
 from email import message_from_bytes
 from email.message import Message
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from types import ModuleType
 
 import pytest
@@ -103,6 +104,23 @@ def test_no_link_of_the_long_description_is_dead(metadata: Message, root: Path) 
     readme = (root / "README.md").read_text(encoding="utf-8")
     assert len(text) > 0.8 * len(readme)
     assert re.search(r"\]\(docs/", readme), "the README has links that would be dead"
+
+
+def test_no_relative_link_of_a_page_that_travels_is_dead(built: zipfile.ZipFile, wheel: set[str]) -> None:
+    assert len(built.namelist()) == len(wheel), "a file travels twice"
+    pages = [name for name in wheel if name.startswith("nlsdesign/_bundled/docs/") and name.endswith(".md")]
+    folders = {parent.as_posix() for name in wheel for parent in PurePosixPath(name).parents}
+    dead, alive = [], 0
+    for name in pages:
+        prose = re.sub(r"^```.*?^```$", "", built.read(name).decode("utf-8"), flags=re.MULTILINE | re.DOTALL)
+        for target in re.findall(r"\[[^\]]+\]\(([^)\s]+)\)", prose):
+            if re.match(r"[a-z][a-z0-9+.-]*:|#", target):
+                continue
+            place = posixpath.normpath(posixpath.join(posixpath.dirname(name), target.partition("#")[0]))
+            alive += place in wheel or place in folders
+            dead += [] if place in wheel or place in folders else [(name, target)]
+    assert not dead
+    assert alive > 50
 
 
 def hook(root: Path) -> ModuleType:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...deck import Deck, read_deck
-from ...errors import DeckError, unknown_name
+from ...errors import DeckError, NlsError, unknown_name
 from ...locations import folder
 from ...quantity import Quantity
 from ..mechanics.bodies import GearedMotor
@@ -150,8 +150,17 @@ class DeckTemplate:
                 lines[deck.places[field][0] - 1] = f"material = {text_of(material)}"
         lines = [f"# {line.removeprefix(_ASKED)}." if line.startswith(_ASKED) else line for line in lines]
         text = "\n".join(lines) + "\n"
-        declare(read_deck(text, Path(f"{name}.toml")))
+        try:
+            declare(read_deck(text, Path(f"{name}.toml")))
+        except NlsError as error:
+            raise self._unwritten(error, name) from None
         return text
+
+    def _unwritten(self, error: NlsError, name: str) -> NlsError:
+        """Return an error without the line of a file that is not there yet."""
+        thing = re.sub(rf"^{re.escape(name)}\.toml(:\d+)*: ", "", error.thing)
+        words = {"did_you_mean": error.did_you_mean, "next_step": error.next_step}
+        return type(error)(f"template {self.name}: {thing}", error.rule, **words)
 
 
 def template_names() -> list[str]:

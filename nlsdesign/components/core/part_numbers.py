@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self, TypeAlias
@@ -98,7 +99,9 @@ class ParameterInfo:
 
     def _slip(self, given: Quantity, value: float) -> str | None:
         number = value / parse_unit(given.unit).factor
-        for unit in [prefix + given.unit for prefix in ("m", "k", "M", "c")] + ["%"]:
+        # An angle in degrees that is written as radians is likelier than a prefix left out.
+        degrees = [f"deg{given.unit[3:]}"] if re.match(r"rad\b", given.unit) else []
+        for unit in [*degrees, *(prefix + given.unit for prefix in ("m", "k", "M", "c")), "%"]:
             try:
                 factor = parse_unit(unit).factor
             except UnitError:

@@ -103,6 +103,12 @@ def read_columns(
 def _heads(file: str, row: tuple[int, list[str]], columns: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
     """Return the unit of each column by its name, in the order of the file."""
     line, given = row
+    for mark, called in ((";", "semicolons"), ("\t", "tabs")):
+        if any(mark in head for head in given):
+            raise MeasurementError(
+                f"{file}, line {line}", f"separates its columns by {called}",
+                next_step="separate the cells by commas, with a point in the numbers",
+            )  # fmt: skip
     heads: dict[str, str] = {}
     for head in (each.strip() for each in given):
         name, unit = (head, None) if head in columns else name_and_unit(head)

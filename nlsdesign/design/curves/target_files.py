@@ -121,6 +121,11 @@ def _require(table: ReadColumns, name: str) -> None:
 
 def _ascending_from_zero(table: ReadColumns) -> None:
     angles = table.values["angle"]
+    if angles[0] < 0.0:
+        raise ValueRangeError(
+            f"{table.cell(0, 'angle')}", "rows begin at angle zero, a curve holds no negative angles",
+            next_step="take the rows of negative angles out, and begin with angle zero",
+        )  # fmt: skip
     if angles[0] != 0.0:
         raise ValueRangeError(
             f"{table.cell(0, 'angle')}", "the first angle must be zero",

@@ -251,7 +251,7 @@ def declared_cam(
         return _Anchored(part)
     raise ArrangementError(
         f"a {type(part).__name__}", "has no contour",
-        next_step="declare the spring with a TwoSidedCam, a OneSidedCam or an AnchoredCam",
+        next_step="give the spring of the deck a cam of type TwoSidedCam, OneSidedCam or AnchoredCam",
     )  # fmt: skip
 
 

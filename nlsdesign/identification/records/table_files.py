@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import importlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import MeasurementError, missing_library, nearest
+from ...errors import MeasurementError, missing_library
 from ...reading import is_there
 from .csv_files import read_csv
 from .mat_elements import check_mat
@@ -97,11 +98,12 @@ def table_files(folder: Path) -> list[Path]:
         If there is none, or two files differ only in the ending.
     """
     if not is_there(folder):
-        near = nearest(folder.name, [f.name for f in folder.parent.glob("*") if f.is_dir()])
+        # A folder without records is no advice, and neither is one whose name is hardly alike.
+        near = difflib.get_close_matches(folder.name, _folders_of_records(folder.parent), n=1, cutoff=0.7)
         raise MeasurementError(
             str(folder),
             "there is no such folder",
-            did_you_mean=near,
+            did_you_mean=next(iter(near), None),
             next_step="name the folder of the records",
         )
     files = sorted(f for f in folder.glob("[!.]*") if f.suffix.lower() in _ENDINGS)
@@ -119,6 +121,14 @@ def table_files(folder: Path) -> list[Path]:
                 next_step="rename or remove one",
             )
     return files
+
+
+def _folders_of_records(parent: Path) -> list[str]:
+    return [
+        folder.name
+        for folder in parent.glob("*")
+        if folder.is_dir() and any(f.suffix.lower() in _ENDINGS for f in folder.glob("[!.]*"))
+    ]
 
 
 def unread_tables(folder: Path) -> list[Path]:
