@@ -238,7 +238,10 @@ def test_the_observer_asks_for_a_deck_or_a_command_that_exists(
     assert said in err
 
 
-def test_analyse_without_a_command_goes_over_the_angle(run: Run, tmp_path: Path) -> None:
+def test_analyse_without_a_command_goes_over_the_angle(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")  # no cell is wrapped
     words = ("--deck", DECK, "--from", "-10 deg", "--to", "45 deg", "--count", "5", "--out", "o")
     short, named = (run("analyse", *more, *words) for more in ((), ("angle",)))
     assert short == named

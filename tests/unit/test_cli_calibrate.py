@@ -18,7 +18,8 @@ TRUE = Machine(stiffness=3.3, torque_constant=0.053)
 
 
 def run(*arguments: str) -> str:
-    done = CliRunner().invoke(calibrate, list(arguments), catch_exceptions=False)
+    # Wide enough that no cell is wrapped.
+    done = CliRunner().invoke(calibrate, list(arguments), catch_exceptions=False, env={"COLUMNS": "400"})
     assert done.exit_code == 0, done.output
     return done.output
 

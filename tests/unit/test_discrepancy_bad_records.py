@@ -77,7 +77,7 @@ def test_what_cannot_be_read_is_named_and_nothing_is_written(
     write_records(records, {"a": change(clean.copy())})
     write_deck(rig, tmp_path / "deck.toml")
     called = ["nlsdesign", command, "--deck", str(tmp_path / "deck.toml"), "--records", str(records)]
-    monkeypatch.setattr(sys, "argv", [*called, "--out", str(out)])
+    monkeypatch.setattr(sys, "argv", [*called, "--out", str(out), "--force"])
     with pytest.raises(SystemExit) as leaving:
         main()
     assert leaving.value.code == 2
@@ -106,7 +106,7 @@ def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
     for name in ("next_record.csv", "regeneration.json", "notes.txt"):
         (out / name).write_text("earlier", encoding="utf8")
     called = ["nlsdesign", "diagnose", "--deck", str(tmp_path / "deck.toml"), "--records", str(records)]
-    monkeypatch.setattr(sys, "argv", [*called, "--out", str(out)])
+    monkeypatch.setattr(sys, "argv", [*called, "--out", str(out), "--force"])
     main()
     assert (out / "verdict.json").exists()
     assert not (out / "next_record.csv").exists()
