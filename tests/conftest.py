@@ -23,6 +23,16 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("quick" if config.option.markexpr == "not slow" else "thorough")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as slow what ``long_cases.txt`` lists."""
+    lines = Path(__file__).with_name("long_cases.txt").read_text(encoding="utf8").splitlines()
+    long = {line for line in lines if line and not line.startswith("#")}
+    for item in items:
+        if item.nodeid in long or item.nodeid.partition("[")[0] in long:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """Folder of the checkout."""
