@@ -98,9 +98,9 @@ def test_a_mistake_is_named_and_nothing_is_written(
 
 
 def test_an_fmu_that_is_read_is_not_written_over(run: Run, fmus: dict[str, Path], tmp_path: Path) -> None:
-    copy = tmp_path / "plant.fmu"
+    copy = tmp_path / "plant.csv"
     copy.write_bytes(fmus["plant"].read_bytes())
-    call = ("cosimulate", "--fmu", f"plant={copy}", "--stop", "0.1 s", "--out", "plant.fmu")
+    call = ("cosimulate", "--fmu", f"plant={copy}", "--stop", "0.1 s", "--out", "plant.csv")
     assert run(*call)[0] == 2
     status, _, err = run(*call, "--force")
     assert status == 2
