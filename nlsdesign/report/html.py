@@ -41,7 +41,7 @@ def words(text: str) -> Html:
 
 
 def visible(page: str) -> str:
-    r"""Return a text in which control characters and marks of direction are written out, as ``\\x1b``.
+    r"""Return a text in which control characters and marks of direction are written out, as ``\x1b``.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def visible(page: str) -> str:
     Examples
     --------
     >>> print(visible("a" + chr(27) + "[31m"))
-    a\\x1b[31m
+    a\x1b[31m
     """
     return _HIDDEN.sub(lambda match: match[0].encode("unicode_escape").decode(), page)
 

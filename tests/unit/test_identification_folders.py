@@ -69,6 +69,7 @@ def test_a_table_that_is_not_read_is_told(folder: Path, model: FlatModel) -> Non
 
 def test_a_folder_that_does_not_exist_is_said_so(folder: Path, model: FlatModel) -> None:
     (folder / "bench").mkdir()
+    (folder / "bench" / "one.csv").write_text("t_s\n0\n", encoding="utf8")
     with pytest.raises(MeasurementError, match=r"there is no such folder; did you mean 'bench'"):
         load_records(folder / "bnch", model)
 

@@ -153,7 +153,7 @@ def test_a_unit_that_does_not_exist_and_a_missing_file_are_named(tmp_path: Path)
 
 
 def test_the_tables_say_value_condition_and_evidence() -> None:
-    everything = CliRunner().invoke(program, ["materials"])
+    everything = CliRunner().invoke(program, ["materials"], env={"COLUMNS": "400"})
     assert everything.exit_code == 0
     assert "butyl_rubber" in everything.output
     assert "0.2 to 0.5 (range)" in everything.output

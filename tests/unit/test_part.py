@@ -143,7 +143,8 @@ def test_numbers_that_cannot_be(values: dict[str, float | Quantity], kind: type[
         (Spring, {"stiffness": quantity(1e-8, "N/m")}, "kN/m"),
         (Pulley, {"radius": quantity(12.0, "m")}, "mm"),
         (Mass, {"mass": quantity(-1.0, "kg")}, None),
-        (Encoder, {"of": "x", "quantum": quantity(44.0, "rad")}, "mrad"),
+        (Encoder, {"of": "x", "quantum": quantity(44.0, "rad")}, "deg"),
+        (Encoder, {"of": "x", "quantum": quantity(440.0, "rad")}, "mrad"),
     ],
 )
 def test_a_slip_of_units_is_recognised_only_where_it_fits(

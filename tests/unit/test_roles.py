@@ -133,7 +133,11 @@ CASES: list[tuple[Callable[[], Assembly], Callable[[FlatModel], object], str]] =
     (two_motors, torque_controller, r"needs the driven body"),
     (two_inertias, driven_body, r"2 bodies free to move: 'rotor', 'arm'"),
     (two_inertias, torque_controller, r"needs the driven body"),
-    (two_inertias, elastic_law, r"needs the cam spring .* there is no cam spring -> declare the spring"),
+    (
+        two_inertias,
+        elastic_law,
+        r"needs the cam spring .* there is no cam spring -> let a spring of the deck hold",
+    ),
     (two_inertias, moved_load, r"no body with a prescribed motion -> declare the load as Driven"),
 ]
 
