@@ -37,8 +37,10 @@ def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp
     assert lost == [not text.startswith("settled") for text in response["verdicts"]]
     for name in ("responses", "impedance", "margins", "coupled_stability"):
         assert "<svg" in (tmp_path / f"{name}.svg").read_text("utf-8")
-    assert (tmp_path / "responses.csv").read_text("utf-8").startswith(
-        "amplitude [N*m],offset [N*m],frequency [Hz],"
+    assert (
+        (tmp_path / "responses.csv")
+        .read_text("utf-8")
+        .startswith("amplitude [N*m],offset [N*m],frequency [Hz],")
     )
 
 
