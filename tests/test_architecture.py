@@ -21,6 +21,7 @@ BASE = {
         "reading",
         "symbolic",
         "unit_slips",
+        "work_sharing",
         "writing",
         "written_files",
         "written_numbers",
@@ -52,9 +53,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "calibration": SIMULATED | {"identification", "discrepancy"},
     "figures": SIMULATED | MIDDLE,
     "report": SIMULATED | MIDDLE | {"figures"},
-    "cli": SIMULATED | MIDDLE | {"components", "figures", "report"},
+    "sweeps": SIMULATED | MIDDLE | {"components"},
+    "sweep_report": SIMULATED | {"sweeps", "figures", "report"},
+    "live": SIMULATED | MIDDLE | {"components", "figures", "report"},
+    "cli": SIMULATED | MIDDLE | {"components", "figures", "report", "sweeps", "sweep_report", "live"},
     "__main__": {"cli"},
-    "__init__": SIMULATED | MIDDLE | {"components", "figures", "report", "cli"},
+    "__init__": SIMULATED | MIDDLE | {"components", "figures", "report", "sweeps", "sweep_report", "cli"},
 }
 
 # Above the waist a flat model is enough, but for these: a design and a diagnosis give back a changed copy of
@@ -99,6 +103,12 @@ HOMES: dict[str, tuple[str, ...]] = {
     "fmpy": ("export",),
     "ezdxf": ("design.drawing",),
     "OCP": ("design.drawing",),
+    "distributed": ("work_sharing",),
+    "dask": ("work_sharing",),
+    "mpi4py": ("work_sharing",),
+    "SALib": ("sweeps",),
+    "starlette": ("live",),
+    "uvicorn": ("live",),
     "control": ("model.linear", "analysis", "observer", "control"),
     # In a wheel these are not at the top level: nlsdesign.locations.folder finds them.
     "models": (),
