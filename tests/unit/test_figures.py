@@ -22,6 +22,7 @@ from nlsdesign.figures.cam_frames import MARKER, cam_picture
 from nlsdesign.figures.lines import thinned
 from nlsdesign.figures.style import SERIES, TONES, look
 from tests import figure_samples as samples
+from tests.selection import quick_only
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -43,7 +44,7 @@ def drawn(name: str) -> figures.Figure:
 # --- every figure ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", samples.FIGURES)
+@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::4]))
 def test_a_figure_is_drawn_the_same_whatever_the_user_has_set(name: str) -> None:
     first = figures.svg_text(drawn(name))
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 20.0, "axes.facecolor": "red"}):
