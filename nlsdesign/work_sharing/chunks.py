@@ -1,4 +1,4 @@
-"""Chunks of points, and what a worker does with one: it answers each point, and a failure is an answer too."""
+"""Chunks of points, and what a worker does with one: each point is answered, and a failure is an answer."""
 
 from __future__ import annotations
 

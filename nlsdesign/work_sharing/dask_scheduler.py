@@ -121,7 +121,8 @@ class DaskScheduler:
         for name in ("distributed.client", "distributed.core", "distributed.comm"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
-            return distributed.Client(**where, timeout=seconds, set_as_default=False)
+            make: Any = distributed.Client
+            return make(**where, timeout=seconds, set_as_default=False)
         except Exception as error:  # of sockets, of TLS, of a damaged file
             raise WorkSharingError(
                 f"Dask scheduler {self.named}", f"does not answer within {seconds:g} s ({reason_of(error)})",

@@ -18,7 +18,7 @@ from .refusals import refused, sendable
 
 @dataclass(frozen=True)
 class MpiRanks:
-    """The ranks of ``mpiexec -n RANKS python -m mpi4py.futures -m nlsdesign sweep ... --mpi``; one of them drives.
+    """Ranks of ``mpiexec -n RANKS python -m mpi4py.futures -m nlsdesign sweep ... --mpi``; one drives.
 
     MPI ends all ranks when one dies, so a death ends the run; the next one resumes.
     """

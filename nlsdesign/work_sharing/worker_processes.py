@@ -71,7 +71,7 @@ class _Worker:
     def __init__(self, work: Callable[[Any], Any], others: list[_Worker]) -> None:
         forks = "fork" in multiprocessing.get_all_start_methods()
         context = multiprocessing.get_context("fork" if forks else "spawn")
-        # An interrupt between fork and the first line of a worker would end it with a picture of this program.
+        # An interrupt between fork and the first line of a worker would be handled as in this program.
         with signals_held():
             self.connection, theirs = context.Pipe()
             inherited = [each.connection for each in (*others, self)] if forks else []
