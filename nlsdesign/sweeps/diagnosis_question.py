@@ -13,6 +13,7 @@ from ..discrepancy import diagnose
 from ..discrepancy.effects import catalogue
 from ..errors import MeasurementError
 from ..identification import load_records
+from ..model import flatten
 from .columns import Column
 from .question import SweepQuestion, answer
 
@@ -55,7 +56,7 @@ class DiagnosisQuestion(SweepQuestion):
 
     def ask(self, assembly: Assembly) -> Mapping[str, float]:
         """Return the verdict in numbers."""
-        verdict = diagnose(assembly, load_records(Path(self.records)))
+        verdict = diagnose(assembly, load_records(Path(self.records), flatten(assembly)))
         named = {each.name: each.probability for each in verdict.effects}
         held_out = any(gap.role == "held_out" for gap in verdict.gaps)
         values = {f"verdict.{name}": float(verdict.verdict == name) for name in _VERDICTS}

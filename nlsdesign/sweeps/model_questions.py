@@ -115,8 +115,8 @@ class SpreadQuestion(SweepQuestion):
                 f"model '{model.name}'", "declares no spread, so there are no errors over it",
                 next_step="give numbers a spread",
             )  # fmt: skip
-        gain = {} if self.adaptive else {"gain": CascadeGain()}
-        observer = design_observer(model, sample_time=self.sample_time, **gain)
+        gain = None if self.adaptive else CascadeGain()
+        observer = design_observer(model, sample_time=self.sample_time, gain=gain)
         bench = observer_bench(model, estimate=torque, measured=angle, sample_time=self.sample_time)
         errors = observer_errors({"observer": observer}, bench, draws=self.draws, seed=self.seed, bounded=0)
         return {
@@ -149,7 +149,7 @@ class LoopQuestion(SweepQuestion):
 
     sample_time: float = 1e-3
     delay: int = 1
-    first: float = 0.0
+    first: float = 0.1
     last: float = 0.8
     count: int = 9
     amplitude: float = 0.0
@@ -161,7 +161,9 @@ class LoopQuestion(SweepQuestion):
         del assembly
         run = (
             answer("sine.holds", "", "1 where the run on the sine settles"),
-            answer("sine.decibel", "", "torque over desired torque, in dB; not a number where it does not hold"),
+            answer(
+                "sine.decibel", "", "torque over desired torque, in dB; not a number where it does not hold"
+            ),
             answer("sine.saturated", "", "share of the time at the limit of the current"),
         )
         return (

@@ -21,7 +21,7 @@ from ..errors import ExportError, MeasurementError
 from ..work_sharing import CodeIdentity, code_identity
 from ..writing import make_folder, write_text
 from .columns import RESULTS_FILE, Column
-from .parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files
+from .parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
 from .plan import Plan
 from .sweep_table import ABOUT_FILE, DECK_FILE, DECKS_FOLDER, about_text, read_about
 
@@ -268,3 +268,29 @@ def _place(values: tuple[Any, ...], plan: Plan, ranked: Any, order: Any) -> int:
             return int(order[place])
         place += 1
     return -1
+
+
+def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...]) -> int:
+    """Return how many points of a sweep stand in a folder; nothing is written.
+
+    Parameters
+    ----------
+    folder
+        That may not exist.
+    about, columns
+        Of the sweep.
+
+    Raises
+    ------
+    ExportError
+        If the folder holds another sweep.
+    """
+    if not (folder / ABOUT_FILE).exists():
+        return 0
+    old = _standing(folder)
+    _require_same(folder, old[0], about)
+    if _names(old[1]) != _names(columns):
+        raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
+    if old[0].get("plan") != about["plan"]:
+        return 0
+    return len(rows_in_order(folder, columns)["point"])
