@@ -41,7 +41,9 @@ def square(number: int) -> int:
     return number * number
 
 
-def outcomes(work: Callable[[int], Any], executor: Executor, points: Iterator[int]) -> dict[int, PointOutcome]:
+def outcomes(
+    work: Callable[[int], Any], executor: Executor, points: Iterator[int]
+) -> dict[int, PointOutcome]:
     collected: dict[int, PointOutcome] = {}
     for batch in shared_map(work, ((k, k) for k in points), executor):
         for each in batch:
