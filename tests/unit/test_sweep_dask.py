@@ -17,6 +17,7 @@ from nlsdesign.errors import WorkSharingError
 from nlsdesign.work_sharing import CodeIdentity, DaskScheduler, Processes, shared_map
 from nlsdesign.work_sharing.chunks import Chunk
 from tests import sweeping
+from tests.light_work import square
 
 distributed = pytest.importorskip("distributed")
 
@@ -75,17 +76,9 @@ def numbers_of_workers(address: str) -> list[int]:
         return list(client.run(os.getpid).values())
 
 
-def answered(number: int) -> int:
-    """The square of a number, after a hundredth of a second."""
-    time.sleep(0.01)
-    if number == 55:
-        raise ValueError("no")
-    return number * number
-
-
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(cluster: str) -> None:
     first, killed, got = numbers_of_workers(cluster)[0], False, []
-    for batch in shared_map(answered, ((k, k) for k in range(200)), DaskScheduler(cluster), count=200):
+    for batch in shared_map(square, ((k, k) for k in range(200)), DaskScheduler(cluster), count=200):
         got += batch
         if len(got) > 20 and not killed:
             os.kill(first, signal.SIGKILL)
@@ -100,12 +93,11 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(cluster: str) -> Non
 def test_workers_of_another_version_are_refused(cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
     ours = CodeIdentity("9.9.9", "a" * 64)
     real = DaskScheduler(cluster)
-    with real.crew(answered) as crew:
+    with real.crew(square) as crew:
         monkeypatch.setattr(crew, "_expected", ours)
         crew.submit(Chunk(((1, 1),)))
         with pytest.raises(WorkSharingError, match=r"runs nlsdesign .* and this program nlsdesign"):
-            while not crew.finished(1.0):
-                pass
+            next(each for _ in range(60) for each in crew.finished(1.0))
         # At the beginning all that are there are asked; later ones answer with their first chunk.
         with pytest.raises(WorkSharingError, match=r"worker tcp://.*: their answers must not be mixed"):
             crew._checked(5.0)  # type: ignore[attr-defined]
