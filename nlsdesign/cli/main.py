@@ -31,6 +31,7 @@ from .output import examples
 from .parts import parts
 from .simulate import simulate
 from .studies import study
+from .sweep import sweep
 
 
 @click.group(
@@ -64,7 +65,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, compare, study, completion, docs),
+    *(sweep, cosimulation, simulate, fit, diagnose, compare, study, completion, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default
