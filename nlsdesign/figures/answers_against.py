@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import ValueRangeError
 from .style import HOLDS, INK, described, legend, panels, styled
-from .sweep_points import PointKinds, ShownColumn, scatter_points
+from .sweep_points import Floats, PointKinds, ShownColumn, scatter_points
 
 MOST_PANELS = 4
 
@@ -62,6 +63,6 @@ def answers_against(
     return described(figure, words)
 
 
-def _joined(panel, across, up) -> None:  # type: ignore[no-untyped-def]
+def _joined(panel: Axes, across: Floats, up: Floats) -> None:
     order = np.argsort(across, kind="stable")
     panel.plot(across[order], up[order], color=HOLDS.light, linewidth=1.0, alpha=0.6, zorder=1)

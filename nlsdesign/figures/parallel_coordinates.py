@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from ..errors import ValueRangeError
 from ..quantity import typeset_unit
 from .number_text import compact
-from .style import INK, MUTED, described, legend, panels, styled
+from .style import INK, MUTED, SURFACE, described, legend, panels, styled
 from .sweep_points import Floats, PointKinds, ShownColumn, in_lines, links, shortened
 
 MOST_COORDINATES = 12
@@ -24,7 +24,7 @@ _MOST_NAMES = 8
 def parallel_coordinates(
     columns: Sequence[ShownColumn], kinds: PointKinds, *, axis_count: int, words: str
 ) -> Figure:
-    """Draw each point as a line across the columns, every column on its own scale from its least to its largest.
+    """Draw each point as a line across the columns, each on its own scale, from least to largest.
 
     A line stops where a point has no finite number: a point that failed ends with the last axis.
 
@@ -97,6 +97,7 @@ def _scaled(axes: Axes, number: int, column: ShownColumn) -> Floats:
             text, (number, place), xytext=(0 if shift else 4, shift), textcoords="offset points",
             ha="center" if shift else "left", va="top" if below else "bottom" if shift else "center",
             fontsize=7.5, color=INK.light, zorder=5,
+            bbox={"facecolor": SURFACE.light, "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
         )  # fmt: skip
     return places
 
@@ -122,5 +123,5 @@ def _segment(places: Floats) -> Floats:
     count = int(missing[0]) if len(missing) else len(places)
     line = np.column_stack([np.arange(count, dtype=float), places[:count]])
     if count == 1:  # a short stroke, so that it is seen
-        return np.vstack([line, line + [0.12, 0.0]])
+        return np.vstack([line, line + np.array([0.12, 0.0])])
     return line

@@ -68,7 +68,7 @@ def response_surfaces(surfaces: Sequence[SurfacePanel], *, words: str) -> Figure
     for surface, panel in zip(surfaces, axes, strict=False):
         if surface.nodes is not None and surface.values is not None:
             _contours(panel, *surface.nodes, surface.values)
-        scatter_points(panel, surface.across.numbers(), surface.up.numbers(), kinds=surface.kinds)
+        scatter_points(panel, surface.across.numbers(), surface.up.numbers(), kinds=surface.kinds, small=True)
         panel.set_title(surface.title)
         panel.set_xlabel(surface.across.label)
         panel.set_ylabel(surface.up.label)
@@ -91,5 +91,5 @@ def _contours(panel: Axes, across: Floats, up: Floats, values: Floats) -> None:
             across, up, held, levels=[levels[number], levels[number + 1]], colors=[AFTER.light],
             alpha=0.07 + 0.68 * number / (_STEPS - 1), extend="neither", antialiased=False,
         )  # fmt: skip
-    lines = panel.contour(across, up, held, levels=levels[1:-1], colors=[INK.light], linewidths=0.5)
-    panel.clabel(lines, fmt=lambda value: compact(float(value), 3), fontsize=7.5, colors=INK.light)
+    lines = panel.contour(across, up, held, levels=levels[1:-1], colors=[INK.light], linewidths=0.6, zorder=4)
+    panel.clabel(lines, fmt=lambda value: compact(float(value), 3), fontsize=7.5, colors=INK.light, zorder=5)

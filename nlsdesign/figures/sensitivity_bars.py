@@ -59,7 +59,7 @@ def sensitivity_bars(shares: Mapping[str, Sequence[VarianceShare]], *, words: st
     for number, ((answer, each), panel) in enumerate(zip(shares.items(), axes, strict=False)):
         _draw(panel, each)
         panel.set_title(shortened(answer, 50))
-        panel.set_xlabel("share of the variance in parts of one")
+        panel.set_xlabel("share of the variance in %")
         if number == 0:
             legend(panel)
     for unused in axes[len(shares) :]:
@@ -69,7 +69,9 @@ def sensitivity_bars(shares: Mapping[str, Sequence[VarianceShare]], *, words: st
 
 def _draw(panel: Axes, shares: Sequence[VarianceShare]) -> None:
     places = -np.arange(len(shares), dtype=float)
-    first, first_error, total, total_error = np.array([list(each[1:]) for each in shares], dtype=float).T
+    first, first_error, total, total_error = (
+        100.0 * np.array([list(each[1:]) for each in shares], dtype=float).T
+    )
     both = bool(np.any(np.isfinite(total)))
     height = 0.36 if both else 0.55
     shift = 0.19 if both else 0.0
@@ -84,6 +86,6 @@ def _draw(panel: Axes, shares: Sequence[VarianceShare]) -> None:
         panel.hlines(places + moved, values - errors, values + errors, color=INK.light, linewidth=1.4)
     panel.set_yticks(places, [shortened(each.axis, 34) for each in shares])
     panel.set_ylim(places[-1] - 0.6, 0.6)
-    panel.set_xlim(min(0.0, float(np.nanmin(first - first_error))) - 0.01, None)
+    panel.set_xlim(min(0.0, float(np.nanmin(first - first_error))) - 1.0, None)
     panel.axvline(0.0, color=INK.light, linewidth=0.8)
     panel.grid(visible=False, axis="y")

@@ -64,7 +64,8 @@ class PointKinds:
     points
         Numbers of the points, shape (n,).
     front, missed, failed
-        Which no other betters, which keep not all requirements, which have no answer; no point is two of them.
+        Which no other betters, which keep not all requirements, which have no answer; no point is two of
+        them.
     """
 
     points: NDArray[np.int64]
@@ -120,7 +121,7 @@ def links(points: NDArray[np.int64]) -> list[str]:
     return [f"#point-{number}" for number in points.tolist()]
 
 
-def scatter_points(axes: Axes, across: Floats, up: Floats, *, kinds: PointKinds) -> None:
+def scatter_points(axes: Axes, across: Floats, up: Floats, *, kinds: PointKinds, small: bool = False) -> None:
     """Draw points in their kinds, each a link; those without a finite place are left out.
 
     Parameters
@@ -131,20 +132,32 @@ def scatter_points(axes: Axes, across: Floats, up: Floats, *, kinds: PointKinds)
         Places, shape (n,).
     kinds
         What the points are.
+    small
+        Whether points that do not stand out are small, where something else is to be seen below them.
     """
+    size = 0.4 if small else 1.0
     for group in kinds.groups():
         rows = group.rows[np.isfinite(across[group.rows]) & np.isfinite(up[group.rows])]
         if not len(rows):
             continue
-        filled = group.strong or group.marker == "o"
         drawn = axes.scatter(
-            across[rows], up[rows], s=22.0 if group.strong else 9.0, marker=group.marker, label=group.label,
-            facecolors=group.color if filled else "none", edgecolors="none" if filled else group.color,
-            linewidths=0.0 if filled else 0.9, alpha=1.0 if group.strong else 0.7, zorder=3 if group.strong else 2,
-        ) if group.marker != "x" else axes.scatter(
-            across[rows], up[rows], s=14.0, marker="x", label=group.label, color=group.color, linewidths=0.9
+            across[rows], up[rows], marker=group.marker, label=group.label, zorder=3 if group.strong else 2,
+            **_mark_look(group, size),
         )  # fmt: skip
         drawn.set_urls(links(kinds.points[rows]))
+
+
+def _mark_look(group: PointGroup, size: float) -> dict[str, Any]:
+    """Return size and colours of the marks of a group: outlines only where they are no results to choose."""
+    if group.strong:
+        return {"s": 22.0, "facecolors": group.color, "linewidths": 0.0}
+    if group.marker == "o":
+        return {"s": 9.0 * size, "facecolors": group.color, "linewidths": 0.0, "alpha": 0.7}
+    if group.marker == "x":
+        return {"s": 14.0 * size, "color": group.color, "linewidths": 0.9}
+    return {
+        "s": 9.0 * size, "facecolors": "none", "edgecolors": group.color, "linewidths": 0.9, "alpha": 0.7,
+    }  # fmt: skip
 
 
 def shortened(text: str, most: int) -> str:

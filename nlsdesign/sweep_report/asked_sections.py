@@ -85,7 +85,8 @@ def _range(table: SweepTable, axis: Column) -> tuple[str, str]:
     if axis.lower is not None and axis.upper is not None:
         factor = shown_unit(axis.unit)[1]
         asked = " to ".join(three_digits(end * factor) for end in (axis.lower, axis.upper))
-        if asked != " to ".join(ends):
+        width = abs(axis.upper - axis.lower) * factor
+        if abs(axis.lower * factor - distinct[0]) + abs(axis.upper * factor - distinct[-1]) > 0.02 * width:
             text += f" (asked: {with_unit(asked, column.unit or '1')})"
     return str(len(distinct)), text
 
@@ -104,8 +105,8 @@ def _directions(table: SweepTable, ranked: RankedPoints) -> list[Section]:
         return []
     caption = (
         "A point is on the front where no other point that was compared is at least as good in all of these "
-        "answers and better in one. Points that failed, that miss a requirement, or whose answer is no finite "
-        "number are not compared."
+        "answers and better in one. Points that failed, that miss a requirement, or whose answer is no "
+        "finite number are not compared."
     )
     return [
         TableSection(

@@ -1,4 +1,4 @@
-"""Which points of a sweep a page shows, by a rule that keeps what matters; columns in units that people read."""
+"""Which points of a sweep a page shows, by a rule that keeps what matters; columns in readable units."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def shown_column(
 
 
 def shown_points(table: SweepTable, ranked: RankedPoints) -> Shown:
-    """Return the points that are shown: failures, the front and the ends of each column always, others by lot.
+    """Return the points that are shown: failures, the front, the ends of columns, and others by lot.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ def shown_points(table: SweepTable, ranked: RankedPoints) -> Shown:
         chosen[others] = False
         chosen[random.permutation(others)[:MOST_OTHERS]] = True
         rule = (
-            f"Of the {len(others)} points that are neither failed nor on the front nor the least or largest of a "
-            f"column, {MOST_OTHERS} are drawn, taken by lot, the same in each run; all others of the "
-            f"{count} points are drawn."
+            f"Of {count} points {count - len(others) + MOST_OTHERS} are drawn: all that failed, all on the front, "
+            f"the least and the largest of each column, and {MOST_OTHERS} of the rest, taken by lot, the same in "
+            "each run."
         )
     kept = np.flatnonzero(always)
     if len(kept) > MOST_KEPT:
@@ -114,7 +114,9 @@ def _ends(table: SweepTable) -> NDArray[np.bool_]:
     mask = np.zeros(len(table), dtype=bool)
     for column in (*table.axes, *table.answers):
         values = np.asarray(table.values[column.name])
-        finite = np.flatnonzero(np.isfinite(values)) if values.dtype.kind == "f" else []
+        if values.dtype.kind != "f":
+            continue
+        finite = np.flatnonzero(np.isfinite(values))
         if len(finite):
             mask[finite[[np.argmin(values[finite]), np.argmax(values[finite])]]] = True
     return mask

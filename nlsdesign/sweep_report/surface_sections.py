@@ -9,7 +9,7 @@ from ..quantity import three_digits, with_unit
 from ..report import FigureSection, Section
 from ..sweeps import Column
 from ..sweeps.answer_surface import AnswerSurface, answer_surface
-from .figure_sections import PageContent
+from .page_content import PageContent
 from .shown_points import shown_column
 
 MOST_SURFACES = 4
@@ -27,12 +27,13 @@ def surface_sections(content: PageContent) -> list[Section]:
     numbers = [axis for axis in axes if not shown_column(content.table, axis).words]
     if len(numbers) < 2:
         return []
-    panels, sentences = [], []
+    panels: list[SurfacePanel] = []
+    sentences: list[str] = []
     for name in content.answers:
         if len(panels) == MOST_SURFACES:
             break
         answer = content.table.column(name)
-        if not content.varies(answer):
+        if content.distinct(answer) < 3:  # yes or no is no surface
             continue
         across, up, why = _axes_for(content, name, numbers)
         columns = [shown_column(content.table, each) for each in (across, up, answer)]
@@ -52,8 +53,8 @@ def surface_sections(content: PageContent) -> list[Section]:
         *sentences, *([content.shown.rule] if content.shown.rule else []),
     ])  # fmt: skip
     means = (
-        "The error is that on points which were left out when the surface was made; where it is no smaller than the "
-        "deviation of the answers themselves, only the points are drawn."
+        "The error is that on points which were left out when the surface was made; where it is no smaller than "
+        "the deviation of the answers themselves, only the points are drawn."
     )
     return [
         FigureSection(
@@ -100,13 +101,21 @@ def _sentence(surface: AnswerSurface | str, answer: ShownColumn, why: str) -> st
         if surface.unpredicted else ""
     )  # fmt: skip
     if np.isnan(surface.error):
-        return f"{head}{surface.method}; no point could be left out, so nothing is known of its error and it is not drawn."
+        return (
+            f"{head}{surface.method}; no point could be left out, so nothing is known of its error and it is "
+            "not drawn."
+        )
     if not surface.predicts:
         return (
-            f"{head}{surface.method}; its error on left-out points is {error} rms and the deviation of the answers {deviation}, "
-            f"so it predicts no better than their mean and is not drawn.{outside}"
+            f"{head}{surface.method}; its error on left-out points is {error} rms and the deviation of the "
+            f"answers {deviation}, so it predicts no better than their mean and is not drawn.{outside}"
         )  # fmt: skip
     return (
-        f"{head}{surface.method}; error on left-out points {error} rms, with a deviation of the answers of {deviation} "
-        f"({100 * surface.explained:.0f} % of the variance is predicted).{outside}"
+        f"{head}{surface.method}; error on left-out points {error} rms, with a deviation of the answers of "
+        f"{deviation} ({_share(surface.explained)} of the variance is predicted).{outside}"
     )  # fmt: skip
+
+
+def _share(value: float) -> str:
+    """Return a share as text that is never rounded up to all of it."""
+    return "more than 99.9 %" if value > 0.999 else f"{100.0 * value:.1f} %"

@@ -14,7 +14,8 @@ from ..sweeps.point_deck import point_deck_text
 from ..writing import write_table, write_text
 
 POINTS_FILE = "points.csv"
-DECKS_FOLDER = "decks"
+DECKS_FOLDER = "point_decks"
+"""Not that of the decks that were swept, so that the page may stand in the folder of the sweep."""
 
 
 def write_points(table: SweepTable, folder: Path) -> Path:

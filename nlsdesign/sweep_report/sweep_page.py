@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,14 +15,10 @@ from ..sweeps import SweepTable
 from ..sweeps.preferences import NotBelow, Preference, Requirement
 from ..sweeps.ranked_points import RankedPoints, rank_points
 from ..sweeps.sensitivity import AnswerSensitivity, sensitivity
+from .answer_sections import histogram_sections, sensitivity_sections
 from .asked_sections import asked_sections, unit_of
-from .figure_sections import (
-    PageContent,
-    coordinate_sections,
-    front_sections,
-    histogram_sections,
-    sensitivity_sections,
-)
+from .figure_sections import coordinate_sections, front_sections
+from .page_content import PageContent
 from .point_rows import named_columns, point_rows
 from .shown_points import shown_column, shown_points
 from .surface_sections import surface_sections
@@ -63,7 +60,7 @@ def write_sweep_report(
     *,
     preferences: Sequence[Preference] = (),
     requirements: Sequence[Requirement] | None = None,
-    decks_of: Sequence[int] = (),
+    source: Path | str = "FOLDER",
 ) -> SweepPage:
     """Write the page of a sweep, finished or not: what was asked, failures, best points, figures, decks.
 
@@ -72,19 +69,21 @@ def write_sweep_report(
     table
         Of the sweep.
     out
-        Folder for ``sweep.html``, ``points.csv`` and ``decks``.
+        Folder for ``sweep.html``, ``points.csv`` and the decks of the points in its table.
     preferences
         Which values of which answers are better. Without them no point is called better than another.
     requirements
-        What an answer must keep, so that a point is no miss; by default that ``met`` is one, where there is such an
-        answer.
-    decks_of
-        Points whose decks are written too, besides those in the table of the page.
+        What an answer must keep, so that a point is no miss; by default that ``met`` is one, where there is
+        such an answer.
+    source
+        Folder of the sweep, for the command that the page names.
 
     Raises
     ------
     UnknownNameError
-        If a preference or requirement names no answer, or a point does not exist.
+        If a preference or requirement names no answer.
+    ValueRangeError
+        If one answer has two directions.
     ExportError
         If a file cannot be written.
     """
@@ -93,12 +92,11 @@ def write_sweep_report(
         requirements = [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
     answers = {column.name: np.asarray(table.values[column.name], dtype=float) for column in table.answers}
     ranked = rank_points(answers, table.done, preferences=preferences, requirements=requirements)
-    rows_of_decks = [table.row_of(point) for point in decks_of]
     listed, notes = _listed_rows(table, ranked)
     remarks: list[str] = []
     points_file = write_points(table, folder)
-    wanted = dict.fromkeys([*listed[:MOST_DECKS], *rows_of_decks])
-    decks, missing = write_decks(table, (int(table.values["point"][row]) for row in wanted), folder)
+    numbers = [int(table.values["point"][row]) for row in listed[:MOST_DECKS]]
+    decks, missing = write_decks(table, numbers, folder)
     remarks += missing
     names = _answer_order(table, ranked)
     sensitivities, refusal = _sensitivities(table, answers, names)
@@ -106,7 +104,7 @@ def write_sweep_report(
     content = PageContent(table, ranked, shown_points(table, ranked), names, sensitivities, points_file)
     sections: list[Section] = [
         *asked_sections(table, ranked),
-        _best(content, listed, notes, decks=decks),
+        _best(content, listed, notes, decks=decks, source=str(source)),
         *front_sections(content),
         *coordinate_sections(content),
         *sensitivity_sections(content),
@@ -117,8 +115,8 @@ def write_sweep_report(
     ]
     deck = str(table.about.get("deck", "")) or "a deck"
     abstract = (
-        "What was asked, which points failed, which are best where it is stated what is better, and how the answers depend "
-        "on the axes. Figures are in units that people read, the table of all points in SI."
+        "What was asked, which points failed, which are best where it is stated what is better, and how the "
+        "answers depend on the axes. Figures are in units that people read, the table of all points in SI."
     )
     facts = {name: visible(text) for name, text in about_of(table).items()}
     page = write_report(
@@ -135,8 +133,7 @@ def write_sweep_report(
 
 
 def _answer_order(table: SweepTable, ranked: RankedPoints) -> tuple[str, ...]:
-    first = [each.answer for each in (*ranked.preferences, *ranked.requirements)]
-    return tuple(dict.fromkeys([*first, *(column.name for column in table.answers)]))
+    return tuple(dict.fromkeys([*ranked.judged, *(column.name for column in table.answers)]))
 
 
 def _sensitivities(
@@ -173,13 +170,12 @@ def _listed_rows(table: SweepTable, ranked: RankedPoints) -> tuple[list[int], di
 
 
 def _best(
-    content: PageContent, listed: list[int], notes: dict[int, str], *, decks: dict[int, str]
+    content: PageContent, listed: list[int], notes: dict[int, str], *, decks: dict[int, str], source: str
 ) -> PointTableSection:
     """Return the table of the best points, with the rows of all that figures show."""
     table, ranked = content.table, content.ranked
     rows = np.array(listed[:MOST_DECKS], dtype=np.intp)
-    compared = [each.answer for each in (*ranked.preferences, *ranked.requirements)]
-    names = list(dict.fromkeys(compared or content.answers[:_MOST_AXES]))
+    names = ranked.judged or content.answers[:_MOST_AXES]
     columns = [table.column(name) for name in names] + content.varying_axes()[:_MOST_AXES]
     shown = [shown_column(table, column, rows) for column in columns]
     cells = tuple(
@@ -191,22 +187,11 @@ def _best(
     inner = TableSection(title, heads, cells, caption=_caption(content, len(listed)))
     points = [int(table.values["point"][row]) for row in rows]
     folder = content.points_file.parent
-    command = f"nlsdesign report {table_folder(table)} --deck-of POINT --out {folder}"
+    command = f"nlsdesign report {shlex.quote(source)} --deck-of POINT --out {shlex.quote(str(folder))}"
     return PointTableSection(
-        title, inner, points, decks=decks, rows=point_rows(table, ranked, content.shown), columns=named_columns(table),
-        command=command, elsewhere=f"All rows stand in {content.points_file.name}.",
+        title, inner, points, decks=decks, rows=point_rows(table, ranked, content.shown),
+        columns=named_columns(table), command=command, elsewhere=f"All rows stand in {content.points_file.name}.",
     )  # fmt: skip
-
-
-def table_folder(table: SweepTable) -> str:
-    """Return the folder of a sweep as a command names it, or a word that stands for it.
-
-    Parameters
-    ----------
-    table
-        Of the sweep.
-    """
-    return str(table.about.get("folder", "FOLDER"))
 
 
 def _cell(value: Any) -> str | float:
@@ -219,8 +204,8 @@ def _caption(content: PageContent, count: int) -> str:
         return "No point has answers that can be compared."
     if not ranked.preferences:
         return (
-            "No direction was stated, so no point is called better than another: these have the least and the "
-            "largest of each answer. `--smaller`, `--larger` and `--near` state what is better."
+            "No direction was stated, so no point is called better than another: these have the least and "
+            "the largest of each answer. `--smaller`, `--larger` and `--near` state what is better."
         )
     if len(ranked.preferences) == 1:
         return "The best in the one direction that was stated; several where they are equal."

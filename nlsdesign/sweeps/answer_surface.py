@@ -1,4 +1,4 @@
-"""An answer over two axes: a grid, an interpolation between points, or a polynomial where further axes vary."""
+"""An answer over two axes: a grid, an interpolation, or a polynomial where further axes vary."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ class AnswerSurface:
 def answer_surface(across: Floats, up: Floats, answer: Floats, *, others_vary: bool) -> AnswerSurface | str:
     """Return an answer over two axes, or why there is none, as text.
 
-    Where nothing else varies, it is linear between neighbouring points. Where further axes vary, points beside
-    one another differ for other reasons, and a polynomial of the two axes is fitted, of the degree up to four
+    Where nothing else varies, it is linear between neighbouring points. Where further axes vary, points
+    beside one another differ for other reasons, and a polynomial of the two axes is fitted, of the degree up to four
     that predicts left-out points best.
 
     Parameters

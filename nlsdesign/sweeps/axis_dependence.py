@@ -31,8 +31,8 @@ def codes(values: NDArray[Any]) -> NDArray[np.float64]:
 def dependent_axes(axes: Mapping[str, NDArray[Any]]) -> str:
     """Return which two axes depend most on each other, as text; empty where none do.
 
-    The ranks of the values are compared, and their distances from the middle rank, which shows two axes that lie
-    on a circle or a wedge. What does not show in either is not seen.
+    The ranks of the values are compared, and their distances from the middle rank, which shows two axes that
+    lie on a circle or a wedge. What does not show in either is not seen.
 
     Parameters
     ----------

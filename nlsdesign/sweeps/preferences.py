@@ -1,4 +1,4 @@
-"""What is better in an answer of a sweep, and what a point must keep to count: objects that the user chooses."""
+"""What is better in an answer of a sweep, and what a point must keep: objects that the user chooses."""
 
 from __future__ import annotations
 

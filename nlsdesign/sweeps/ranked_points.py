@@ -46,6 +46,12 @@ class RankedPoints:
     misses: tuple[int, ...]
 
     @property
+    def judged(self) -> tuple[str, ...]:
+        """Names of the answers with a direction or a requirement, each once."""
+        names = [each.answer for each in self.preferences] + [each.answer for each in self.requirements]
+        return tuple(dict.fromkeys(names))
+
+    @property
     def compared(self) -> Mask:
         """Points that were compared with one another."""
         return ~(self.failed | self.missed | self.incomplete)
@@ -78,10 +84,10 @@ def rank_points(
     ValueRangeError
         If one answer has two preferences.
     """
-    for each in (*preferences, *requirements):
-        if each.answer not in answers:
-            raise unknown_name("answer", each.answer, answers)
     named = [each.answer for each in preferences]
+    for name in (*named, *(each.answer for each in requirements)):
+        if name not in answers:
+            raise unknown_name("answer", name, answers)
     for name in named:
         if named.count(name) > 1:
             raise ValueRangeError(f"answer '{name}'", "has two directions", next_step="state one of them")

@@ -16,8 +16,8 @@ class Plan(NamedTuple):
     blocks
         Whole blocks.
     rows
-        Points of a block: one of the first sample, one per axis with that axis from the second sample, with second order also
-        the reverse, and one of the second sample.
+        Points of a block: one of the first sample, one per axis with that axis from the second sample, with
+        second order also the reverse, and one of the second sample.
     second_order
         Whether blocks hold the reverse exchanges.
     """
@@ -28,7 +28,7 @@ class Plan(NamedTuple):
 
 
 def saltelli_plan(points: NDArray[np.float64]) -> Plan | None:
-    """Return the form of the plan, none where the points are not one; a block that is not whole at the end counts not.
+    """Return the form of the plan, none where the points are not one; a last block that is cut is left out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How much of the variance of an answer each axis causes, by a method that the points allow, or why none does.
+"""How much of the variance of an answer each axis causes, by a method that the points allow.
 
 Three ways, in this order: the whole table of a full grid, exactly; a Saltelli plan, by SALib's Sobol
 indices, with totals; any other independent sample, by first-order indices from the data as they are
@@ -186,8 +186,8 @@ def _by_plan(
         )
     if lost > MOST_FAILED * plan.blocks:
         return AnswerSensitivity(
-            name, "", points, refusal=f"{lost} of {plan.blocks} blocks of the Saltelli plan have a point without "
-            f"a finite answer, more than {MOST_FAILED:.0%}",
+            name, "", points, refusal=f"{lost} of {plan.blocks} blocks of the Saltelli plan have a point "
+            f"without a finite answer, more than {MOST_FAILED:.0%}",
         )  # fmt: skip
     answers = values[: plan.blocks * plan.rows].reshape(plan.blocks, plan.rows)[whole].ravel()
     if np.ptp(answers) <= 1e-12 * np.max(np.abs(answers)):
@@ -247,7 +247,7 @@ def _from_data(
 
 
 def _correlation_ratio(column: NDArray[Any], values: Floats) -> tuple[float, float]:
-    """Return the share of the variance between the groups, corrected for their number, and half its interval."""
+    """Return the share of the variance between groups, corrected for their number, and half its interval."""
     groups = np.unique(codes(column), return_inverse=True)[1].ravel()
     random = np.random.default_rng(_SEED)
     drawn = []

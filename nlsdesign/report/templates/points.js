@@ -43,7 +43,8 @@
         const value = row.values[k];
         if (value === null) return;
         const line = document.createElement("tr");
-        line.append(element("td", name), element("td", String(value).replace("-", "−"), "number"), element("td", unit));
+        const text = typeof value === "number" ? String(value).replaceAll("-", "−") : value;
+        line.append(element("td", name), element("td", unit ? `${text} ${unit}` : text, "number"));
         body.append(line);
       });
     }
