@@ -32,6 +32,7 @@ from .parts import parts
 from .report import report
 from .simulate import simulate
 from .studies import study
+from .sweep import sweep
 
 
 @click.group(
@@ -65,7 +66,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, compare, report, study, completion, docs),
+    *(sweep, report, cosimulation, simulate, fit, diagnose, compare, study, completion, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default

@@ -3,6 +3,40 @@
 The report of a sweep and the command import it. It decides no physics: questions ask the rooms below.
 """
 
+from .axes import AxisSet, BoundAxes, Grid, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axis_values import Subject
+from .design_question import DesignQuestion
+from .diagnosis_question import DiagnosisQuestion
+from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
+from .plan import Plan
+from .question import FunctionQuestion, SweepQuestion
+from .run_sweep import SweepSettings, SweepTask, sweep, sweep_task
+from .sweep_file import read_sweep_file
 from .sweep_table import Column, SweepTable, read_sweep
 
-__all__ = ["Column", "SweepTable", "read_sweep"]
+__all__ = [
+    "AngleQuestion",
+    "AxisSet",
+    "BoundAxes",
+    "Column",
+    "DesignQuestion",
+    "DiagnosisQuestion",
+    "FunctionQuestion",
+    "Grid",
+    "LatinHypercube",
+    "Listed",
+    "LoopQuestion",
+    "Plan",
+    "RandomDraws",
+    "SobolSample",
+    "SpreadQuestion",
+    "Subject",
+    "SweepQuestion",
+    "SweepSettings",
+    "SweepTable",
+    "SweepTask",
+    "read_sweep",
+    "read_sweep_file",
+    "sweep",
+    "sweep_task",
+]
