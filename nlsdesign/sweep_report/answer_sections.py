@@ -31,8 +31,8 @@ _DRAWS = (
     "distribution that the axes were drawn from, not of machines that are built."
 )
 _NO_DRAWS = (
-    "Points of a grid, a list or a Saltelli plan are no independent draws: there is no probability behind these "
-    "shares, so no interval is given."
+    "Points of a grid, a list or a Saltelli plan are no independent draws: there is no probability behind "
+    "these shares, so no interval is given."
 )
 _SHARES = (
     "The share of the variance of an answer that an axis causes over the range that was swept; another range "

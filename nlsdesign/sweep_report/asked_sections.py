@@ -46,7 +46,7 @@ def asked_sections(table: SweepTable, ranked: RankedPoints) -> list[Section]:
 def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
     done, failed = int(np.sum(table.done)), int(np.sum(ranked.failed))
     numbers = [
-        KeyNumber("points with answers", str(done), f"of {len(table)} in the table"),
+        KeyNumber("points with answers", str(done), _of_asked(table)),
         KeyNumber("points that failed", str(failed), "their reasons stand below" if failed else ""),
     ]
     if ranked.requirements:
@@ -60,6 +60,14 @@ def _numbers(table: SweepTable, ranked: RankedPoints) -> Section:
             KeyNumber("points on the front", str(len(ranked.front)), f"of {among} that were compared")
         )
     return NumbersSection("In short", tuple(numbers))
+
+
+def _of_asked(table: SweepTable) -> str:
+    """Return how far the sweep is: a page of one that is not finished must say so."""
+    asked = table.about.get("points")
+    if isinstance(asked, int) and asked > len(table):
+        return f"of {len(table)} so far; {asked} are asked for, so all that follows is of a part of them"
+    return f"of {len(table)}"
 
 
 def _axes(table: SweepTable) -> Section:

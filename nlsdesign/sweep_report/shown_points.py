@@ -88,9 +88,9 @@ def shown_points(table: SweepTable, ranked: RankedPoints) -> Shown:
         chosen[others] = False
         chosen[random.permutation(others)[:MOST_OTHERS]] = True
         rule = (
-            f"Of {count} points {count - len(others) + MOST_OTHERS} are drawn: all that failed, all on the front, "
-            f"the least and the largest of each column, and {MOST_OTHERS} of the rest, taken by lot, the same in "
-            "each run."
+            f"Of {count} points {count - len(others) + MOST_OTHERS} are drawn: all that failed, all on the "
+            f"front, the least and the largest of each column, and {MOST_OTHERS} of the rest, taken by "
+            "lot, the same in each run."
         )
     kept = np.flatnonzero(always)
     if len(kept) > MOST_KEPT:

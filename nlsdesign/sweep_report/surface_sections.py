@@ -53,8 +53,8 @@ def surface_sections(content: PageContent) -> list[Section]:
         *sentences, *([content.shown.rule] if content.shown.rule else []),
     ])  # fmt: skip
     means = (
-        "The error is that on points which were left out when the surface was made; where it is no smaller than "
-        "the deviation of the answers themselves, only the points are drawn."
+        "The error is that on points which were left out when the surface was made; where it is no smaller "
+        "than the deviation of the answers themselves, only the points are drawn."
     )
     return [
         FigureSection(

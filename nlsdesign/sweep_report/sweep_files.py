@@ -13,6 +13,12 @@ from ..sweeps import SweepTable
 from ..sweeps.point_deck import point_deck_text
 from ..writing import write_table, write_text
 
+_NAMES = {
+    "points": "points asked",
+    "asked": "question, digest",
+    "digest": "deck, digest",
+    "plan": "points, digest",
+}
 POINTS_FILE = "points.csv"
 DECKS_FOLDER = "point_decks"
 """Not that of the decks that were swept, so that the page may stand in the folder of the sweep."""
@@ -88,7 +94,7 @@ def _numbers(points: Sequence[int]) -> str:
 
 
 def about_of(table: SweepTable) -> dict[str, str]:
-    """Return what was asked, in short texts by name.
+    """Return what the sweep says of itself, in texts by name.
 
     Parameters
     ----------
@@ -100,5 +106,5 @@ def about_of(table: SweepTable) -> dict[str, str]:
         if name in ("format", "columns") or value in (None, "", [], {}):
             continue
         text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-        result[name.replace("_", " ")] = text if len(text) <= 200 else text[:197] + "..."
+        result[_NAMES.get(name, name.replace("_", " "))] = text if len(text) <= 200 else text[:197] + "..."
     return result

@@ -28,6 +28,7 @@ PAGE_FILE = "sweep.html"
 MOST_DECKS = 50
 _MOST_SENSITIVITIES, _MOST_AXES = 6, 8
 _MET = "met"
+_FACTS = ("deck", "deck, digest", "question", "version", "seed", "points asked")
 
 
 class SweepPage(NamedTuple):
@@ -112,13 +113,18 @@ def write_sweep_report(
         *histogram_sections(content),
         *([TextSection("Remarks", "\n\n".join(remarks))] if remarks else []),
         _files(points_file, folder, decks),
-    ]
+        TableSection(
+            "Where it comes from", ("what", "as the sweep states it"), tuple(about_of(table).items()),
+            folded=True, caption="What the sweep states of itself.",
+        ),
+    ]  # fmt: skip
     deck = str(table.about.get("deck", "")) or "a deck"
     abstract = (
         "What was asked, which points failed, which are best where it is stated what is better, and how the "
         "answers depend on the axes. Figures are in units that people read, the table of all points in SI."
     )
-    facts = {name: visible(text) for name, text in about_of(table).items()}
+    about = {name: visible(text) for name, text in about_of(table).items()}
+    facts = {name: _brief(text) for name, text in about.items() if name in _FACTS}
     page = write_report(
         folder / PAGE_FILE,
         *sections,
@@ -130,6 +136,11 @@ def write_sweep_report(
     return SweepPage(
         page, points_file, {n: folder / name for n, name in decks.items()}, front, tuple(remarks)
     )
+
+
+def _brief(text: str) -> str:
+    """Return a text for the head of the page; of a digest its beginning, the whole stands at the end."""
+    return text[:12] if len(text) == 64 and not text.strip("0123456789abcdef") else text
 
 
 def _answer_order(table: SweepTable, ranked: RankedPoints) -> tuple[str, ...]:
@@ -190,7 +201,8 @@ def _best(
     command = f"nlsdesign report {shlex.quote(source)} --deck-of POINT --out {shlex.quote(str(folder))}"
     return PointTableSection(
         title, inner, points, decks=decks, rows=point_rows(table, ranked, content.shown),
-        columns=named_columns(table), command=command, elsewhere=f"All rows stand in {content.points_file.name}.",
+        columns=named_columns(table), command=command,
+        elsewhere=f"All rows stand in {content.points_file.name}.",
     )  # fmt: skip
 
 

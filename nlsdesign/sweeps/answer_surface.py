@@ -57,8 +57,8 @@ def answer_surface(across: Floats, up: Floats, answer: Floats, *, others_vary: b
     """Return an answer over two axes, or why there is none, as text.
 
     Where nothing else varies, it is linear between neighbouring points. Where further axes vary, points
-    beside one another differ for other reasons, and a polynomial of the two axes is fitted, of the degree up to four
-    that predicts left-out points best.
+    beside one another differ for other reasons, and a polynomial of the two axes is fitted, of the degree up
+    to four that predicts left-out points best.
 
     Parameters
     ----------

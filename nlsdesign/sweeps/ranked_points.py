@@ -94,7 +94,9 @@ def rank_points(
     done = np.asarray(done, dtype=bool)
     kept = [each.kept(answers[each.answer]) for each in requirements]
     missed = done & ~np.all(kept, axis=0) if kept else np.zeros_like(done)
-    costs = np.array([each.cost(answers[each.answer]) for each in preferences]).reshape(len(named), -1).T
+    costs = (
+        np.array([each.cost(answers[each.answer]) for each in preferences]).reshape(len(named), len(done)).T
+    )
     whole = np.all(np.isfinite(costs), axis=1) if named else done
     incomplete = done & ~missed & ~whole
     rows = np.flatnonzero(done & ~missed & ~incomplete)
