@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import matplotlib as mpl
@@ -36,7 +38,7 @@ def svg_text(figure: Figure) -> str:
         Any figure.
     """
     stream = io.StringIO()
-    with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}):
+    with mpl.rc_context({**STYLE, "savefig.facecolor": "white"}), _any_letters():
         metadata = {"Date": None, "Creator": None, "Description": alternative_text(figure)}
         figure.savefig(stream, format="svg", metadata=metadata)
     return stream.getvalue()
@@ -58,7 +60,7 @@ def inline_svg(figure: Figure, key: str, *, alternative: str = "") -> str:
         Alternative text; by default the one attached to the figure.
     """
     stream = io.StringIO()
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE), _any_letters():
         figure.savefig(stream, format="svg", metadata={"Date": None})
     root = ET.fromstring(stream.getvalue())
     _remove_global(root)
@@ -103,6 +105,14 @@ def write_figures(folder: Path, figures: Mapping[str, Figure], *, suffix: str = 
     for path, figure in paths.items():
         write_bytes(path, _content(figure, suffix))
     return list(paths)
+
+
+@contextmanager
+def _any_letters() -> Iterator[None]:
+    """Accept letters that matplotlib's font lacks: text stays text, and who shows it has fonts of its own."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
+        yield
 
 
 def _content(figure: Figure, suffix: str) -> bytes:

@@ -73,7 +73,8 @@ def coordinate_sections(content: PageContent) -> list[Section]:
     caption = " ".join(filter(None, (
         "Each line is a point; each column has its own scale, from its least to its largest number. "
         "The line of a point that failed ends with the last axis.",
-        "Axes are in the order of their share of the variance, where it is known." if len(axes) > 1 else "",
+        "Axes are in the order of their largest share of the variance."
+        if len(axes) > 1 and any(_importance(content, axis.name) for axis in axes) else "",
         f"{left} further columns are left out." if left else "",
         f"The same at all points: {listed_names(same)}." if same else "",
         shown.rule,

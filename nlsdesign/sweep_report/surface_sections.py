@@ -53,8 +53,8 @@ def surface_sections(content: PageContent) -> list[Section]:
         *sentences, *([content.shown.rule] if content.shown.rule else []),
     ])  # fmt: skip
     means = (
-        "The error is that on points which were left out when the surface was made; where it is no smaller "
-        "than the deviation of the answers themselves, only the points are drawn."
+        "The error is that on points which were left out when the surface was made; where less than a tenth "
+        "of the variance of the answers is predicted, only the points are drawn."
     )
     return [
         FigureSection(
@@ -107,8 +107,8 @@ def _sentence(surface: AnswerSurface | str, answer: ShownColumn, why: str) -> st
         )
     if not surface.predicts:
         return (
-            f"{head}{surface.method}; its error on left-out points is {error} rms and the deviation of the "
-            f"answers {deviation}, so it predicts no better than their mean and is not drawn.{outside}"
+            f"{head}{surface.method}; its error on left-out points is {error} rms and the deviation of "
+            f"the answers {deviation}, so less than a tenth of their variance is predicted, and it is not drawn.{outside}"
         )  # fmt: skip
     return (
         f"{head}{surface.method}; error on left-out points {error} rms, with a deviation of the answers of "

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import NlsError
 from ..sweeps import SweepTable
-from ..sweeps.point_deck import point_deck_text
+from ..sweeps.point_deck import point_deck_texts
 from ..writing import write_table, write_text
 
 _NAMES = {
@@ -76,11 +76,9 @@ def write_decks(table: SweepTable, points: Iterable[int], folder: Path) -> tuple
     """
     written: dict[int, str] = {}
     remarks: dict[str, list[int]] = {}
-    for point in points:
-        try:
-            text = point_deck_text(table, point)
-        except NlsError as error:
-            remarks.setdefault(f"{error.thing}: {error.rule}", []).append(point)
+    for point, text in point_deck_texts(table, points):
+        if isinstance(text, NlsError):
+            remarks.setdefault(f"{text.thing}: {text.rule}", []).append(point)
             continue
         name = f"{DECKS_FOLDER}/point_{point}.toml"
         write_text(folder / name, text)

@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay, QhullError
 
 Floats = NDArray[np.float64]
 _FOLDS, _CELLS, _HIGHEST_DEGREE = 10, 41, 4
+_LEAST_EXPLAINED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +45,11 @@ class AnswerSurface:
 
     @property
     def predicts(self) -> bool:
-        """Whether it predicts left-out points better than the mean of all does."""
-        return bool(self.error < self.deviation)
+        """Whether it predicts at least a tenth of the variance of points that were left out.
+
+        The form that predicts best is chosen by the same error, so a little is predicted of noise too.
+        """
+        return bool(self.explained >= _LEAST_EXPLAINED)
 
     @property
     def explained(self) -> float:

@@ -1,8 +1,15 @@
-"""The deck behind a point of a sweep, as text."""
+"""The decks behind points of a sweep, as text."""
 
 from __future__ import annotations
 
-from ..components.assembly.deck_writer import deck_text
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from ..components.assembly.deck_writer import deck_text, declare
+from ..components.assembly.named_parts import Assembly
+from ..deck import read_deck
+from ..errors import MeasurementError, NlsError
+from .changes import changed_assembly
 from .sweep_table import SweepTable
 
 
@@ -29,11 +36,52 @@ def point_deck_text(table: SweepTable, point: int) -> str:
         If a part refuses a number of the point, which is then why the point failed.
     """
     row = table.row_of(point)
-    text = deck_text(table.assembly_at(point))
-    lines = [f"Point {point} of a sweep of {table.about.get('deck', 'a deck')}; its axes, in SI:"]
-    lines += [f"{axis.name} = {table.values[axis.name][row]} {axis.unit}".rstrip() for axis in table.axes]
-    head = "".join(f"# {' '.join(_printable(line).split())}\n" for line in lines)
-    return head + text
+    return _text(table, row, _bases(table))
+
+
+def point_deck_texts(table: SweepTable, points: Iterable[int]) -> Iterator[tuple[int, str | NlsError]]:
+    """Yield the deck behind each point, or why it has none; decks that were swept are read once.
+
+    Parameters
+    ----------
+    table
+        Of the sweep.
+    points
+        Numbers of the points.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such point.
+    """
+    bases: dict[str, Assembly] | NlsError
+    try:
+        bases = _bases(table)
+    except NlsError as error:
+        bases = error
+    for point in points:
+        row = table.row_of(point)
+        try:
+            yield point, bases if isinstance(bases, NlsError) else _text(table, row, bases)
+        except NlsError as error:
+            yield point, error
+
+
+def _bases(table: SweepTable) -> dict[str, Assembly]:
+    if not table.decks:
+        raise MeasurementError(
+            "sweep", "has no deck beside its table", next_step="run the sweep again into another folder"
+        )
+    return {name: declare(read_deck(text, Path(f"{name}.toml"))) for name, text in table.decks.items()}
+
+
+def _text(table: SweepTable, row: int, bases: dict[str, Assembly]) -> str:
+    values = {axis.name: table.values[axis.name][row] for axis in table.axes}
+    text = deck_text(changed_assembly(bases, values))
+    deck = table.about.get("deck", "a deck")
+    lines = [f"Point {table.values['point'][row]} of a sweep of {deck}; its axes, in SI:"]
+    lines += [f"{axis.name} = {values[axis.name]} {axis.unit}".rstrip() for axis in table.axes]
+    return "".join(f"# {' '.join(_printable(line).split())}\n" for line in lines) + text
 
 
 def _printable(text: str) -> str:

@@ -3,7 +3,7 @@
 Three ways, in this order: the whole table of a full grid, exactly; a Saltelli plan, by SALib's Sobol
 indices, with totals; any other independent sample, by first-order indices from the data as they are
 (SALib's RBD-FAST for numbers, the correlation ratio for words and for numbers of which there are no more than
-twelve). What the indices mean rests on independent axes, so axes that depend on each other are refused.
+twenty). What the indices mean rests on independent axes, so axes that depend on each other are refused.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 FEWEST_POINTS: Final = 200
 FEWEST_BLOCKS: Final = 16
 MOST_FAILED: Final = 0.1
-_MOST_LEVELS, _DRAWS, _SEED = 12, 100, 1
+_MOST_LEVELS, _DRAWS, _SEED = 20, 100, 1
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,9 @@ def _of_answer(
     remarks = [f"{lost} points without a finite answer are left out"] if lost else []
     grid = _full_grid(kept)
     if grid and not lost:
-        method = "exact shares of the variance over all points of the grid, each of the same weight"
+        method = (
+            "exact shares of the variance over all points of the grid, all of the same weight, no interval"
+        )
         return AnswerSensitivity(name, method, count, _ordered(_by_grid(kept, values)), tuple(remarks))
     if plan is not None:
         return _by_plan(name, list(axes), values, good, plan)
@@ -136,8 +138,18 @@ def _of_answer(
     tied = dependent_axes(kept)
     if tied:
         return refused(f"{tied}; shares of the variance are defined for independent axes only")
+    if any(2 * len(np.unique(codes(column))) < count for column in kept.values() if _smooth(column)):
+        remarks.append(
+            "axes that were crossed repeat their values; intervals count each point as a draw of its own and "
+            "may be too narrow"
+        )
     remarks.append("of interactions between axes these indices say nothing but what they leave to one")
     return _from_data(name, kept, values[good], remarks)
+
+
+def _smooth(column: NDArray[Any]) -> bool:
+    """Tell whether an axis holds numbers that are more than levels."""
+    return column.dtype.kind == "f" and len(np.unique(column)) > _MOST_LEVELS
 
 
 def _ordered(indices: Sequence[SensitivityIndex]) -> tuple[SensitivityIndex, ...]:
@@ -216,7 +228,7 @@ def _from_data(
 ) -> AnswerSensitivity:
     smooth = {
         axis: column.astype(float) for axis, column in axes.items()
-        if column.dtype.kind == "f" and len(np.unique(column)) > _MOST_LEVELS
+        if _smooth(column)
     }  # fmt: skip
     indices, methods = [], []
     if smooth:
