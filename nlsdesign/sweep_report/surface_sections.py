@@ -108,7 +108,8 @@ def _sentence(surface: AnswerSurface | str, answer: ShownColumn, why: str) -> st
     if not surface.predicts:
         return (
             f"{head}{surface.method}; its error on left-out points is {error} rms and the deviation of "
-            f"the answers {deviation}, so less than a tenth of their variance is predicted, and it is not drawn.{outside}"
+            f"the answers {deviation}, so less than a tenth of their variance is predicted, and it is not "
+            f"drawn.{outside}"
         )  # fmt: skip
     return (
         f"{head}{surface.method}; error on left-out points {error} rms, with a deviation of the answers of "

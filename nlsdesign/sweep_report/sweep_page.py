@@ -90,7 +90,7 @@ def write_sweep_report(
     """
     folder = Path(out)
     if requirements is None:
-        requirements = [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
+        requirements = usual_requirements(table)
     answers = {column.name: np.asarray(table.values[column.name], dtype=float) for column in table.answers}
     ranked = rank_points(answers, table.done, preferences=preferences, requirements=requirements)
     listed, notes = _listed_rows(table, ranked)
@@ -136,6 +136,17 @@ def write_sweep_report(
     return SweepPage(
         page, points_file, {n: folder / name for n, name in decks.items()}, front, tuple(remarks)
     )
+
+
+def usual_requirements(table: SweepTable) -> list[Requirement]:
+    """Return what a point must keep where nothing is stated: a design must have met its target.
+
+    Parameters
+    ----------
+    table
+        Of the sweep.
+    """
+    return [NotBelow(_MET, 1.0)] if any(each.name == _MET for each in table.answers) else []
 
 
 def _brief(text: str) -> str:

@@ -60,7 +60,7 @@ def test_a_saltelli_plan_gives_the_published_first_and_total_shares(second_order
 
 def test_a_plain_sample_gives_the_published_first_shares_within_its_intervals() -> None:
     inside = []
-    for seed in range(6):
+    for seed in range(3):
         result = shares(np.random.default_rng(seed).uniform(-np.pi, np.pi, (1000, 3)))
         assert "RBD-FAST" in result.method
         for each in result.indices:

@@ -17,6 +17,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.errors import UnknownNameError
 from nlsdesign.sweep_report import SweepPage, write_sweep_report
 from nlsdesign.sweep_report.shown_points import MOST_KEPT, MOST_OTHERS, shown_points
+from nlsdesign.sweep_report.sweep_page import usual_requirements
 from nlsdesign.sweeps import NotAbove, SmallerIsBetter
 from nlsdesign.sweeps.point_deck import point_deck_text, point_deck_texts
 from nlsdesign.sweeps.ranked_points import nondominated, rank_points
@@ -167,12 +168,13 @@ def test_without_a_direction_nothing_is_best_and_odd_numbers_are_counted(tmp_pat
     assert [rows[k]["values"][2] for k in "456"] == ["∞", "−∞", None]
 
 
-def test_a_design_that_has_not_met_its_target_is_a_miss(tmp_path: Path) -> None:
+def test_a_design_that_has_not_met_its_target_is_a_miss() -> None:
     table = table_of({AREA: [1e-4, 2e-4]}, {"met": [0.0, 1.0], "error": [0.1, 0.2]})
-    written = write_sweep_report(table, tmp_path, preferences=[SmallerIsBetter("error")])
-    assert written.front == (1,)
-    freed = write_sweep_report(table, tmp_path, preferences=[SmallerIsBetter("error")], requirements=[])
-    assert freed.front == (0,)
+    kept = rank_points(table.values, table.done, preferences=BOTH[:1], requirements=usual_requirements(table))
+    assert kept.front.tolist() == [1]
+    assert kept.missed.tolist() == [True, False]
+    assert rank_points(table.values, table.done, preferences=BOTH[:1]).front.tolist() == [0]
+    assert usual_requirements(spread_table(2)) == []
 
 
 @pytest.mark.parametrize("count", [0, 1])
