@@ -120,7 +120,8 @@ def test_the_keyboard_reaches_every_point_of_a_figure(opened: Tab) -> None:
 
 def test_a_number_that_is_typed_gives_its_row_or_says_where_it_stands(opened: Tab) -> None:
     typed = (
-        "(() => {{ const form = document.querySelector('form.choose'); form.querySelector('input').value = '{}';"
+        "(() => {{ const form = document.querySelector('form.choose');"
+        "form.querySelector('input').value = '{}';"
         "form.requestSubmit(); return " + CHOSEN + ".innerText; }})()"
     )
     assert "mass" in opened.evaluate(typed.format("7"))
