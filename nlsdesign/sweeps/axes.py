@@ -212,7 +212,7 @@ class LatinHypercube(AxisSet):
 
 @dataclass(frozen=True)
 class RandomDraws(AxisSet):
-    """Machines drawn over the spread of the deck, as its tolerances and errors over the spread are drawn.
+    """Machines drawn over the spread of the deck, as errors and loops over the spread draw them.
 
     Every number is its declared value times exp(x), x normal with ln(1 + spread) as standard deviation. A row
     of more than twelve numbers is the table of a shape and has one factor.

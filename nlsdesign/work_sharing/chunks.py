@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from ..errors import NlsError
 from ..processes import alone
-from .identity import CodeIdentity, code_identity
+from .identity import CodeIdentity, own_identity
 
 _LONGEST_REASON: Final = 500
 _one_at_a_time = threading.Lock()
@@ -179,8 +179,8 @@ def computed_elsewhere(payload: bytes, chunk: Chunk, expected: CodeIdentity) -> 
     expected
         Code that the answers are to be of.
     """
-    own = code_identity()
+    own = own_identity()
     if own != expected:
-        return Refusal(here(), own.without_files())
+        return Refusal(here(), own)
     with _one_at_a_time, alone():
         return pickled(computed(_unpickled(payload), chunk))

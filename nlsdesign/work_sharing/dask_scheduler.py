@@ -24,7 +24,7 @@ from ..errors import ValueRangeError, WorkSharingError, missing_library
 from ..reading import is_there
 from .chunks import Chunk, Loss, Refusal, computed_elsewhere, reason_of
 from .crew import Crew, Finished
-from .identity import CodeIdentity, code_identity
+from .identity import CodeIdentity, own_identity
 from .refusals import refused, sendable
 
 _CHUNKS_PER_WORKER: Final = 2
@@ -133,7 +133,7 @@ class DaskScheduler:
 class _Crew:
     def __init__(self, scheduler: DaskScheduler, payload: bytes) -> None:
         self._scheduler, self._payload = scheduler, payload
-        self._expected: CodeIdentity = code_identity().without_files()
+        self._expected = own_identity()
         self._numbers = count()
         self._flying: dict[str, tuple[Any, Chunk]] = {}
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -144,7 +144,7 @@ class _Crew:
         """Return a client whose workers all run this code."""
         client = self._scheduler.connected(seconds)
         try:
-            answers = client.run(code_identity, on_error="return")
+            answers = client.run(own_identity, on_error="return")
         except Exception:  # the scheduler went away while it was asked; that is noticed soon enough
             answers = {}
         for worker, identity in answers.items():

@@ -58,6 +58,11 @@ def code_identity(package: Path = _PACKAGE) -> CodeIdentity:
     return CodeIdentity(version(package=package), hashlib.sha256(text.encode()).hexdigest(), files)
 
 
+def own_identity() -> CodeIdentity:
+    """Return the identity of this process without its list of files, as a worker is asked for it."""
+    return code_identity().without_files()
+
+
 def _digests(package: Path) -> Iterator[tuple[str, str]]:
     models = folder("models", package=package)
     for top, prefix in ((package, "nlsdesign"), (models, "models")):

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import WorkSharingError, missing_library
 from .chunks import Chunk, Loss, Refusal, computed_elsewhere, reason_of
 from .crew import Crew, Finished
-from .identity import code_identity
+from .identity import own_identity
 from .refusals import refused, sendable
 
 
@@ -87,7 +87,7 @@ class FuturesCrew:
         chunk
             Points.
         """
-        expected = code_identity().without_files()
+        expected = own_identity()
         self._flying[self._pool.submit(computed_elsewhere, self._payload, chunk, expected)] = chunk
 
     def finished(self, seconds: float) -> list[Finished]:
