@@ -83,6 +83,11 @@ class Reading:
     at: int
     results: tuple[int, ...]
 
+    @property
+    def operands(self) -> tuple[int, ...]:
+        """Numbers of the values that it takes."""
+        return (self.at,)
+
 
 @dataclass(frozen=True)
 class Call:

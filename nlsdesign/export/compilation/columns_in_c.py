@@ -70,40 +70,40 @@ static inline void store(double *to, column value) {{ memcpy(to, &value, sizeof 
 """
 
 _LOOK_UP = """\
-static void look_up(const double *grid, const double *values, long nodes, long columns, int exact,
+static void look_up(const double *grid, const double *values, int64_t nodes, int64_t columns, int exact,
                     column at, column *result) {
     for (int j = 0; j < WIDTH; ++j) {
         double x = at[j];
-        long low = 0, high = nodes - 1;
+        int64_t low = 0, high = nodes - 1;
         if (exact) {
-            double place = (x - grid[0]) * (double)(nodes - 1) / (grid[nodes - 1] - grid[0]);
-            low = place > 0.0 ? (long)place : 0;
+            const double place = (x - grid[0]) * (double)(nodes - 1) / (grid[nodes - 1] - grid[0]);
+            low = place > 0.0 ? (int64_t)place : 0;
             if (low > nodes - 2) low = nodes - 2;
         } else {
             while (high - low > 1) {
-                long middle = low + (high - low) / 2;
+                int64_t middle = low + (high - low) / 2;
                 if (x < grid[middle]) high = middle; else low = middle;
             }
         }
         double share = (x - grid[low]) / (grid[low + 1] - grid[low]);
-        for (long k = 0; k < columns; ++k)
+        for (int64_t k = 0; k < columns; ++k)
             result[k][j] = (1.0 - share) * values[low * columns + k] + share * values[(low + 1) * columns + k];
     }
 }
 """
 
 _RUN = """\
-{export} void run(long samples, long groups, double *state, const double *given,
+{export} void run(int64_t samples, int64_t groups, double *state, const double *given,
                   const double *parameter, double *kept) {{
-    long every = groups * WIDTH;
-    for (long group = 0; group < groups; ++group) {{
-        long at = group * WIDTH;
+    int64_t every = groups * WIDTH;
+    for (int64_t group = 0; group < groups; ++group) {{
+        int64_t at = group * WIDTH;
         column s[{states} + 1], p[{parameters} + 1];
 {onces}
         for (int i = 0; i < {states}; ++i) s[i] = load(state + i * every + at);
         for (int i = 0; i < {parameters}; ++i) p[i] = load(parameter + i * every + at);
 {fixed}
-        for (long k = 0; k < samples; ++k) {{
+        for (int64_t k = 0; k < samples; ++k) {{
             const double *g = given + k * {inputs} * every + at;
             double *out = kept + k * {shown} * every + at;
 {body}
