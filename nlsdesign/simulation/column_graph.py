@@ -273,6 +273,12 @@ class _Walk:
         arguments = [self.graph.new(function.nnz_in(i)) for i in range(function.n_in())]
         self.graph.arguments = tuple(arguments)
         self.graph.fixed |= {k for i in fixed for k in arguments[i]}
+        self.graph.results = tuple(self._walked(function, arguments))
+
+    def _walked(
+        self, function: ca.Function, arguments: list[tuple[int, ...]]
+    ) -> list[tuple[int, ...]]:
+        """Return the values of each result of a function for these arguments."""
         held: dict[int, tuple[int, ...]] = {}
         results: dict[int, tuple[int, ...]] = {}
         for k in range(function.n_instructions()):
@@ -285,16 +291,17 @@ class _Walk:
                 continue
             node = function.instruction_MX(k)
             if code == ca.OP_INPUT:
-                info = node.info()
-                held[out[0]] = arguments[into[0]][info["offset"] :][: node.nnz()]
+                first = node.info()["offset"]
+                held[out[0]] = arguments[into[0]][first : first + node.nnz()]
                 continue
             given = [held[i] for i in into]
             for place, values in zip(out, self._values(code, node, given), strict=True):
                 if place >= 0:
                     held[place] = values
-        self.graph.results = tuple(results.get(i, ()) for i in range(function.n_out()))
-        if any(len(each) != function.nnz_out(i) for i, each in enumerate(self.graph.results)):
+        whole = [results.get(i, ()) for i in range(function.n_out())]
+        if any(len(each) != function.nnz_out(i) for i, each in enumerate(whole)):
             raise NotByColumnsError(f"a result of {function.name()} of another sparsity")
+        return whole
 
     def _values(
         self, code: int, node: ca.MX, given: list[tuple[int, ...]]
@@ -341,6 +348,8 @@ class _Walk:
             graph.tables.append(self._tables[function.name()])
             graph.steps.append(Reading(len(graph.tables) - 1, at, results))
             return [results]
+        if function.class_name() == "MXFunction":
+            return self._walked(function, given)
         if function.class_name() != "SXFunction":
             raise NotByColumnsError(function.class_name())
         operands = tuple(k for values in given for k in values)

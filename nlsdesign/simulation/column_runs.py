@@ -6,7 +6,7 @@ from one C library and give the same bits; NumPy has its own, whose last digit m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model import Table
 from .buffered import Translate, as_it_is
 from .column_graph import ColumnGraph, NotByColumnsError, column_graph
 from .numpy_columns import NumpyColumns
@@ -83,14 +84,91 @@ def column_run(system: SampledSystem, keep: Sequence[str], *, translate: Transla
 def _column_run(system: SampledSystem, keep: tuple[str, ...], translate: Translate, many: bool) -> ColumnRun:
     writer = SampleWriter(system)
     sample = writer.function(keep)
+    found = _together(sample, writer.tables, translate, many)
+    return found or _OneByOne(translate(_chunk(sample)))
+
+
+def _together(
+    sample: ca.Function, tables: Mapping[str, Table], translate: Translate, many: bool
+) -> ColumnRun | None:
+    """Return what computes many columns together, or None where that is not to be had or not worth it."""
     try:
         if isinstance(translate, ByColumns):
-            return translate.columns(column_graph(sample, fixed=[2], tables=writer.tables))
+            return translate.columns(column_graph(sample, fixed=[2], tables=tables))
         if translate is as_it_is and many:
-            return NumpyColumns(column_graph(sample, fixed=[2], tables=writer.tables))
+            return NumpyColumns(column_graph(sample, fixed=[2], tables=tables))
     except NotByColumnsError:
         pass  # the same numbers, one column after the other
-    return _OneByOne(translate(_chunk(sample)))
+    return None
+
+
+class ColumnEvaluator:
+    """A function of matrices, evaluated for many columns of arguments.
+
+    Parameters
+    ----------
+    function
+        Its results must be dense.
+    fixed
+        Number of the argument that holds the parameters.
+    translate
+        For instance :data:`~nlsdesign.export.natively`.
+    """
+
+    def __init__(self, function: ca.Function, fixed: int, *, translate: Translate) -> None:
+        self._function, self._fixed, self._translate = function, fixed, translate
+        self._sizes = [function.numel_out(i) for i in range(function.n_out())]
+        self._runs: dict[bool, ColumnRun | None] = {}
+
+    def __call__(self, arguments: Sequence[Array]) -> list[Array]:
+        """Return the results, each of shape (numbers, columns).
+
+        Parameters
+        ----------
+        arguments
+            Each of shape (numbers, columns); matrices column by column.
+        """
+        count = arguments[0].shape[1]
+        many = count >= MANY
+        if many not in self._runs:
+            self._runs[many] = _together(self._flat(), {}, self._translate, many)
+        run = self._runs[many]
+        if run is None:
+            return self._one_by_one(arguments, count)
+        size = count
+        if isinstance(run, NumpyColumns):  # it keeps arrays for every number of columns that it has seen
+            size = min(1 << (count - 1).bit_length(), -(-count // 1024) * 1024)
+        given = [np.pad(each, ((0, 0), (0, size - count)), mode="edge") for each in arguments]
+        numbers = given.pop(self._fixed)
+        _, kept = run(np.zeros((0, size)), np.concatenate(given)[None], numbers)
+        return np.split(kept[0, :, :count], np.cumsum(self._sizes)[:-1])
+
+    def _flat(self) -> ca.Function:
+        """Return (nothing, all arguments but the parameters, parameters) -> (nothing, all results)."""
+        function = self._function
+        sizes = [function.numel_in(i) for i in range(function.n_in())]
+        given = ca.MX.sym("given", sum(sizes) - sizes[self._fixed])
+        numbers, parts, first = ca.MX.sym("parameter", sizes[self._fixed]), [], 0
+        for i, size in enumerate(sizes):
+            if i == self._fixed:
+                parts.append(numbers)
+                continue
+            parts.append(ca.reshape(given[first : first + size], *function.size_in(i)))
+            first += size
+        results = ca.vertcat(*[ca.vec(each) for each in function.call(parts)])
+        return ca.Function("flat", [ca.MX.sym("nothing", 0, 1), given, numbers], [ca.MX(0, 1), results])
+
+    def _one_by_one(self, arguments: Sequence[Array], count: int) -> list[Array]:
+        function = self._function
+        wide = [
+            each.reshape(*function.size_in(i)[::-1], count, order="C").transpose(1, 2, 0)
+            .reshape(function.size1_in(i), -1) if function.size2_in(i) > 1 else each
+            for i, each in enumerate(arguments)
+        ]  # fmt: skip
+        results = function.map(count).call(wide)
+        return [
+            np.array(each, dtype=float).reshape(size, count) for each, size in zip(results, self._sizes, strict=True)
+        ]
 
 
 def _chunk(one: ca.Function) -> ca.Function:

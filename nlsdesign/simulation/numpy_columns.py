@@ -119,7 +119,7 @@ class _Columns:
         for place, value in zip((*self._state, *self._given), (*self.state, *given), strict=True):
             place[:] = value
         _perform(self._top.tasks)
-        self.state = np.array(self._after)
+        self.state = np.array(self._after).reshape(self.state.shape)
         return np.array(self._kept)
 
 
