@@ -138,7 +138,7 @@ class ColumnEvaluator:
         size = count
         if isinstance(run, NumpyColumns):  # it keeps arrays for every number of columns that it has seen
             size = min(1 << (count - 1).bit_length(), -(-count // 1024) * 1024)
-        given = [np.pad(each, ((0, 0), (0, size - count)), mode="edge") for each in arguments]
+        given = [_widened(each, size) for each in arguments]
         numbers = given.pop(self._fixed)
         _, kept = run(np.zeros((0, size)), np.concatenate(given)[None], numbers)
         return np.split(kept[0, :, :count], np.cumsum(self._sizes)[:-1])
@@ -169,6 +169,13 @@ class ColumnEvaluator:
         return [
             np.array(each, dtype=float).reshape(size, count) for each, size in zip(results, self._sizes, strict=True)
         ]
+
+
+def _widened(values: Array, size: int) -> Array:
+    """Return the columns, the last one repeated until there are so many."""
+    if values.shape[1] == size:
+        return values
+    return np.concatenate([values, np.repeat(values[:, -1:], size - values.shape[1], axis=1)], axis=1)
 
 
 def _chunk(one: ca.Function) -> ca.Function:

@@ -109,8 +109,7 @@ class CompiledColumns:
         """
         count = state.shape[1]
         after, inputs, numbers = (_filled_up(each) for each in (state, given, parameter))
-        if after is state:
-            after = state.copy()
+        after = after.copy() if after is state else after
         kept = np.empty((len(given), self._kept, after.shape[1]))
         arrays = (array.ctypes.data_as(ctypes.c_void_p) for array in (after, inputs, numbers, kept))
         self._run(ctypes.c_int64(len(given)), ctypes.c_int64(after.shape[1] // WIDTH), *arrays)
@@ -120,9 +119,9 @@ class CompiledColumns:
 def _filled_up(values: Array) -> Array:
     """Return an array whose last axis is a multiple of the width; the last column is repeated."""
     missing = -values.shape[-1] % WIDTH
-    if not missing:
-        return np.ascontiguousarray(values)
-    return np.concatenate([values, np.repeat(values[..., -1:], missing, axis=-1)], axis=-1)
+    if missing:
+        values = np.concatenate([values, np.repeat(values[..., -1:], missing, axis=-1)], axis=-1)
+    return np.ascontiguousarray(values)
 
 
 @lru_cache(maxsize=16)
