@@ -20,12 +20,31 @@ from ..model.function_steps import read_instructions
 
 ARITHMETIC = frozenset(
     [
-        *(ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_NEG, ca.OP_SQ, ca.OP_TWICE, ca.OP_INV, ca.OP_SQRT),
+        *(
+            ca.OP_ADD,
+            ca.OP_SUB,
+            ca.OP_MUL,
+            ca.OP_DIV,
+            ca.OP_NEG,
+            ca.OP_SQ,
+            ca.OP_TWICE,
+            ca.OP_INV,
+            ca.OP_SQRT,
+        ),
         *(ca.OP_EXP, ca.OP_LOG, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_LOG1P, ca.OP_EXPM1, ca.OP_HYPOT),
         *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_ATAN2),
         *(ca.OP_SINH, ca.OP_COSH, ca.OP_TANH, ca.OP_ASINH, ca.OP_ACOSH, ca.OP_ATANH, ca.OP_ERF),
         *(ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_IF_ELSE_ZERO),
-        *(ca.OP_FLOOR, ca.OP_CEIL, ca.OP_FMOD, ca.OP_FABS, ca.OP_SIGN, ca.OP_COPYSIGN, ca.OP_FMIN, ca.OP_FMAX),
+        *(
+            ca.OP_FLOOR,
+            ca.OP_CEIL,
+            ca.OP_FMOD,
+            ca.OP_FABS,
+            ca.OP_SIGN,
+            ca.OP_COPYSIGN,
+            ca.OP_FMIN,
+            ca.OP_FMAX,
+        ),
     ]
 )
 """Operations that are known by columns, as CasADi numbers them."""
@@ -237,9 +256,7 @@ def _body(function: ca.Function, fixed: frozenset[int]) -> ColumnGraph:
     firsts = [_places(function, i).start for i in range(function.n_in())]
     inputs = graph.new(sum(function.nnz_in(i) for i in range(function.n_in())))
     graph.fixed |= {inputs[k] for k in fixed}
-    graph.arguments = tuple(
-        tuple(inputs[k] for k in _places(function, i)) for i in range(function.n_in())
-    )
+    graph.arguments = tuple(tuple(inputs[k] for k in _places(function, i)) for i in range(function.n_in()))
     steps, results = read_instructions(function)
     values: list[int] = []
     for each in steps:
@@ -262,9 +279,7 @@ def _body(function: ca.Function, fixed: frozenset[int]) -> ColumnGraph:
 class _Walk:
     """Walks through a function of MX."""
 
-    def __init__(
-        self, function: ca.Function, fixed: frozenset[int], tables: Mapping[str, Table]
-    ) -> None:
+    def __init__(self, function: ca.Function, fixed: frozenset[int], tables: Mapping[str, Table]) -> None:
         self._built = _Builder()
         self.graph, self._tables = self._built.graph, tables
         self._bodies: dict[tuple[int, frozenset[int]], int] = {}
@@ -275,9 +290,7 @@ class _Walk:
         self.graph.fixed |= {k for i in fixed for k in arguments[i]}
         self.graph.results = tuple(self._walked(function, arguments))
 
-    def _walked(
-        self, function: ca.Function, arguments: list[tuple[int, ...]]
-    ) -> list[tuple[int, ...]]:
+    def _walked(self, function: ca.Function, arguments: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         """Return the values of each result of a function for these arguments."""
         held: dict[int, tuple[int, ...]] = {}
         results: dict[int, tuple[int, ...]] = {}
@@ -303,9 +316,7 @@ class _Walk:
             raise NotByColumnsError(f"a result of {function.name()} of another sparsity")
         return whole
 
-    def _values(
-        self, code: int, node: ca.MX, given: list[tuple[int, ...]]
-    ) -> list[tuple[int, ...]]:
+    def _values(self, code: int, node: ca.MX, given: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         """Return the values of each result of an instruction."""
         if code == ca.OP_CALL:
             return self._called(node.which_function(), given)
@@ -326,9 +337,7 @@ class _Walk:
             raise NotByColumnsError("operands of different sparsity")
         return [tuple(self._built.operation(code, each) for each in zip(*wide, strict=True))]
 
-    def _moved(
-        self, code: int, node: ca.MX, given: list[tuple[int, ...]]
-    ) -> list[tuple[int, ...]]:
+    def _moved(self, code: int, node: ca.MX, given: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         everything = tuple(k for values in given for k in values)
         if code not in (ca.OP_VERTSPLIT, ca.OP_HORZSPLIT):
             return [everything]

@@ -167,7 +167,8 @@ class ColumnEvaluator:
         ]  # fmt: skip
         results = function.map(count).call(wide)
         return [
-            np.array(each, dtype=float).reshape(size, count) for each, size in zip(results, self._sizes, strict=True)
+            np.array(each, dtype=float).reshape(size, count)
+            for each, size in zip(results, self._sizes, strict=True)
         ]
 
 

@@ -83,7 +83,9 @@ class ManySteps:
         going = np.flatnonzero(~self._gone)
         while len(going):
             self._advance(going)
-            there = going[(self._now[going] == self._drives.times[self._interval[going] + 1]) & ~self._gone[going]]
+            there = going[
+                (self._now[going] == self._drives.times[self._interval[going] + 1]) & ~self._gone[going]
+            ]
             self._interval[there] += 1
             states[:, self._interval[there], there] = self.state[:, there]
             self._budget[there] += 40.0
@@ -179,7 +181,9 @@ class ManySteps:
         """Return the inputs at moments in intervals between samples, shape (steps, moments, inputs)."""
         drives = self._drives
         since = moments - drives.times[intervals][:, None]
-        inputs = since[:, :, None] * drives.slopes.T[intervals][:, None] + drives.samples.T[intervals][:, None]
+        inputs = (
+            since[:, :, None] * drives.slopes.T[intervals][:, None] + drives.samples.T[intervals][:, None]
+        )
         if drives.functions:
             numbers = [number for _, number in drives.functions]
             inputs[:, :, numbers] = drives.at(0, moments.ravel()).reshape(inputs.shape)[:, :, numbers]

@@ -36,7 +36,8 @@ class SampledSystem:
     Raises
     ------
     ValueRangeError
-        If the plant is discrete, the blocks are not sampled alike, or delay or substeps is too small.
+        If the plant is discrete or has laws that jump, the blocks are not sampled alike, or delay or substeps is
+        too small.
     """
 
     plant: FlatModel
@@ -49,6 +50,13 @@ class SampledSystem:
     def __post_init__(self) -> None:
         if self.plant.sample_time is not None:
             raise ValueRangeError(f"model '{self.plant.name}'", "is discrete; the plant must be continuous")
+        jumps = self.plant.switching.jumps if self.plant.switching is not None else ()
+        if jumps:
+            raise ValueRangeError(
+                f"model '{self.plant.name}' with the sharp laws {', '.join(jumps)}",
+                "cannot be the plant of a sampled loop, whose fixed steps locate no events",
+                next_step="take the smooth form of the laws: flatten(smoothed(assembly))",
+            )
         times = {block.sample_time for block in self.blocks.values()}
         if len(times) != 1 or None in times:
             raise ValueRangeError(f"sample times {times} s", "all blocks must be discrete and sampled alike")

@@ -49,7 +49,7 @@ _LIBRARY: Mapping[int, str] = {
     ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh", ca.OP_ERF: "erf", ca.OP_FLOOR: "floor",
     ca.OP_CEIL: "ceil", ca.OP_FMOD: "fmod",
 }  # fmt: skip
-_TWO_OPERANDS = frozenset([ca.OP_POW, ca.OP_CONSTPOW, ca.OP_HYPOT, ca.OP_ATAN2, ca.OP_FMOD])
+_TWO_OPERANDS = frozenset(["pow", "hypot", "atan2", "fmod"])
 
 _HEAD = """\
 #include <math.h>
@@ -125,8 +125,10 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
     written = [_HEAD.format(width=WIDTH)]
     if graph.tables:
         written.append(_LOOK_UP)
-    used = {step.code for each in (graph, *graph.bodies) for step in each.steps if isinstance(step, Operation)}
-    written += [_by_columns(code) for code in sorted(used & set(_LIBRARY))]
+    used = {
+        step.code for each in (graph, *graph.bodies) for step in each.steps if isinstance(step, Operation)
+    }
+    written += [_by_columns(name) for name in sorted({_LIBRARY[code] for code in used & set(_LIBRARY)})]
     for k, table in enumerate(graph.tables):
         written.append(_numbers(f"grid{k}", table.grid) + _numbers(f"table{k}", table.values.ravel()))
     crossing = [_crossing(body) for body in graph.bodies]
@@ -173,9 +175,8 @@ def _numbers(name: str, values: Sequence[float]) -> str:
     return f"static const double {name}[] = {{{', '.join(_number(float(v)) for v in values)}}};\n"
 
 
-def _by_columns(code: int) -> str:
-    name = _LIBRARY[code]
-    two = code in _TWO_OPERANDS
+def _by_columns(name: str) -> str:
+    two = name in _TWO_OPERANDS
     return (
         f"static inline column {name}_of(column a{', column b' if two else ''}) {{\n"
         f"    column r; for (int j = 0; j < WIDTH; ++j) r[j] = {name}(a[j]{', b[j]' if two else ''});\n"
@@ -204,7 +205,9 @@ def _once(number: int, body: ColumnGraph, crossing: Sequence[int]) -> str:
     lines = [_operation(s, body, names) for s in body.steps if _is_fixed(s, body)]
     lines += [f"o[{i}] = {_name(k, body, names)};" for i, k in enumerate(crossing)]
     text = "\n    ".join(lines)
-    return f"static __attribute__((noinline)) void once{number}(const column *a, column *o) {{\n    {text}\n}}\n"
+    return (
+        f"static __attribute__((noinline)) void once{number}(const column *a, column *o) {{\n    {text}\n}}\n"
+    )
 
 
 def _each(number: int, body: ColumnGraph, crossing: Sequence[int]) -> str:
@@ -235,7 +238,9 @@ def _operation(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> st
         condition = _CONDITIONS[step.code].format(*operands)
         return f"mask m{result} = {condition}; column v{result} = number(m{result}); (void)v{result};"
     if step.code == ca.OP_IF_ELSE_ZERO:
-        where = f"m{step.operands[0]}" if _is_condition(step.operands[0], graph) else f"({operands[0]} != 0.0)"
+        where = (
+            f"m{step.operands[0]}" if _is_condition(step.operands[0], graph) else f"({operands[0]} != 0.0)"
+        )
         return f"column v{result} = (column)((mask){operands[1]} & {where});"
     if step.code in _LIBRARY:
         return f"column v{result} = {_LIBRARY[step.code]}_of({', '.join(operands)});"

@@ -187,7 +187,9 @@ def _out_of_range(model: FlatModel, columns: Mapping[str, Array]) -> dict[int, s
     reasons: dict[int, str] = {}
     for name, values in columns.items():
         v = model.variable(name)
-        for i in np.flatnonzero(~((values >= v.minimum) & (values <= v.maximum) & np.isfinite(values))).tolist():
+        for i in np.flatnonzero(
+            ~((values >= v.minimum) & (values <= v.maximum) & np.isfinite(values))
+        ).tolist():
             limits = f"must be a finite number in [{v.minimum:g}, {v.maximum:g}] {v.unit}"
             reasons.setdefault(i, f"{name} = {values[i]:g}: {limits.strip()}")
     return reasons
