@@ -121,7 +121,10 @@ SUITE = (
         (
             Promise("time of one call per draw over the batch", r"batch compiled ratio (\d+)", least=20),
             Promise("time of one call per draw over the batch without a compiler", r"NumPy ratio ([\d.]+)"),
-            Promise("time of one compiled call per draw over the batch", r"compiled call per draw: .* ([\d.]+) times"),
+            Promise(
+                "time of one compiled call per draw over the batch",
+                r"compiled call per draw: .* ([\d.]+) times",
+            ),
             Promise("time of `solve_ivp` over the batch", r"sample: .* against the batch (\d+) times"),
             Promise("open simulations one by one over the batch", r"one by one .*, ([\d.]+) times"),
         ),

@@ -1,11 +1,12 @@
-"""Many draws at once against one call per draw: the published loop, errors of observers, open simulations.
+"""Many draws at once against one call per draw: the published loop, errors of observers, simulations.
 
-Ours is a batch of 1,000 draws of the spread of the deck, numbers as columns: compiled, eight columns at a
-time, and with NumPy where there is no compiler. The first peer is our own call for one draw, ``ClosedLoop.run``
-of the plant with the drawn numbers, which is what a script writes, interpreted and compiled. The second is
-``solve_ivp`` of SciPy for the plant from sample to sample with the same observer and controller, evaluated
-sample by sample. Peers take a part of the draws or samples and are scaled by their number, which they take at
-an even pace. CPU seconds; compilation stands beside them. Printed, not asserted: ``python -m benchmarks.batches``.
+Ours is a batch of 1,000 draws of the spread of the deck, numbers as columns: compiled, eight columns at
+once, and with NumPy where there is no compiler. The first peer is our own call for one draw,
+``ClosedLoop.run`` of the plant with the drawn numbers, which is what a script writes; beside it the same
+compiled. The second is ``solve_ivp`` of SciPy for the plant from sample to sample with the same observer and
+controller, evaluated sample by sample. Peers take a part of the draws or samples and are scaled by their
+number, which they take at an even pace. CPU seconds; compilation stands beside them.
+Printed, not asserted: ``python -m benchmarks.batches``.
 """
 
 from __future__ import annotations
@@ -110,9 +111,8 @@ def loops() -> None:
     alone_compiled(0)
     _, quick = timed(lambda: [alone_compiled(i) for i in range(ALONE)])
     single, quick = single * DRAWS / ALONE, quick * DRAWS / ALONE
-    difference = max(
-        float(np.max(np.abs(ours[name][i] - run[name]))) for i, run in enumerate(runs) for name in kept
-    )
+    pairs = [(ours[name][i], run[name]) for i, run in enumerate(runs) for name in kept]
+    difference = max(float(np.max(np.abs(a - b))) for a, b in pairs)
     samples = round(STOP / loop.sample_time) + 1
     theirs = stepwise(loop) * samples * DRAWS
     print(f"published loop, {DRAWS:,} draws of {samples} samples")
@@ -144,39 +144,34 @@ def observers() -> None:
     batch, ours = timed(lambda: errors(natively))
     single, theirs = timed(lambda: errors(one_by_one))
     same = float(np.max(np.abs(batch.drawn - single.drawn)))
-    print(f"errors of two observers over 64 draws: batch {ours:.2f} s, one compiled run after the other "
-          f"{theirs:.1f} s, {theirs / ours:.0f} times; largest difference {same:.1g} N·m", flush=True)  # fmt: skip
+    print(
+        f"errors of two observers over 64 draws: batch {ours:.2f} s, one compiled run after the other "
+        f"{theirs:.1f} s, {theirs / ours:.0f} times; largest difference {same:.1g} N·m", flush=True,
+    )  # fmt: skip
 
 
-def simulations() -> None:
-    """Print the times of open simulations with error control, without and with events."""
+def simulations(deck: str, how: dict, words: str) -> None:
+    """Print the times of open simulations with error control."""
     times, drive = np.linspace(0.0, STOP, 1001), {"motor.current": Sine(2.0, 2.0)}
-    for deck in ("austin2015_soft_spring", "austin2015_figure_consistent"):
-        model = nls.flatten(nls.declare(nls.load_deck(deck)))
-        drawn = declared_prior(model).draws(SIMULATED, 1)
-        for words, how in (("interpreted", {}), ("compiled", {"translate": natively})):
+    model = nls.flatten(nls.declare(nls.load_deck(deck)))
+    drawn = declared_prior(model).draws(SIMULATED, 1)
+    given = {"inputs": drive, "tolerance": 1e-8, **how}
 
-            def batch(how: dict = how) -> object:
-                return simulate_batch(
-                    model, times, draws=drawn, keep=["spring.torque"], inputs=drive, tolerance=1e-8, **how
-                )
+    def alone(i: int) -> np.ndarray:
+        numbers = {name: float(values[i]) for name, values in drawn.items()}
+        return simulate(model.with_values(numbers), times, **given)["spring.torque"]
 
-            def alone(i: int, how: dict = how) -> nls.Trace:
-                numbers = {name: float(values[i]) for name, values in drawn.items()}
-                return simulate(model.with_values(numbers), times, inputs=drive, tolerance=1e-8, **how)
-
-            if how:
-                batch()
-                alone(0)
-            many, ours = timed(batch)
-            runs, theirs = timed(lambda: [alone(i) for i in range(ALONE)])
-            theirs *= SIMULATED / ALONE
-            events = sum(len(each) for each in many.events) / SIMULATED
-            wrong = max(float(np.max(np.abs(many["spring.torque"][i] - run["spring.torque"])))
-                        for i, run in enumerate(runs))  # fmt: skip
-            print(f"{deck}, {SIMULATED} simulations with {events:.0f} events each, {words}: batch {ours:.1f} s, "
-                  f"one by one {theirs:.1f} s, {theirs / ours:.1f} times; difference {wrong:.1g} N·m",
-                  flush=True)  # fmt: skip
+    simulate_batch(model, times, draws=drawn, keep=["spring.torque"], **given)
+    alone(0)
+    many, ours = timed(lambda: simulate_batch(model, times, draws=drawn, keep=["spring.torque"], **given))
+    runs, theirs = timed(lambda: [alone(i) for i in range(ALONE)])
+    theirs *= SIMULATED / ALONE
+    events = sum(len(each) for each in many.events) / SIMULATED
+    wrong = max(float(np.max(np.abs(many["spring.torque"][i] - run))) for i, run in enumerate(runs))
+    print(
+        f"{deck}, {SIMULATED} simulations with {events:.0f} events each, {words}: batch {ours:.1f} s, "
+        f"one by one {theirs:.1f} s, {theirs / ours:.1f} times; difference {wrong:.1g} N·m", flush=True,
+    )  # fmt: skip
 
 
 def main() -> None:
@@ -185,7 +180,9 @@ def main() -> None:
     print(f"load {load:.1f} on {cores} cores before; casadi {ca.__version__}", flush=True)
     loops()
     observers()
-    simulations()
+    for deck in ("austin2015_soft_spring", "austin2015_figure_consistent"):
+        simulations(deck, {}, "interpreted")
+        simulations(deck, {"translate": natively}, "compiled")
 
 
 if __name__ == "__main__":

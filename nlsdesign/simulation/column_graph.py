@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import TypeAlias
 
 import casadi as ca
@@ -85,7 +86,7 @@ class Operation:
 
 
 @dataclass(frozen=True)
-class Reading:
+class TableReading:
     """A table is read: linear between its nodes, held at the ends.
 
     Parameters
@@ -128,7 +129,7 @@ class Call:
     once: int
 
 
-Step: TypeAlias = Operation | Reading | Call
+Step: TypeAlias = Operation | TableReading | Call
 
 
 @dataclass(eq=False)
@@ -152,7 +153,7 @@ class ColumnGraph:
     bodies
         Graphs that are called.
     onces
-        For each set of fixed values the number of the body and the operands that are fixed, with their places.
+        For each set of fixed values the number of the body and its fixed operands.
     tables
         Tables that are read.
     """
@@ -344,7 +345,7 @@ class _Walk:
         offsets = node.info()["offset"]
         if offsets[-1] != len(everything):
             raise NotByColumnsError("a matrix that is split")
-        return [everything[a:b] for a, b in zip(offsets[:-1], offsets[1:], strict=True)]
+        return [everything[a:b] for a, b in pairwise(offsets)]
 
     def _called(self, function: ca.Function, given: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         for i, values in enumerate(given):
@@ -355,7 +356,7 @@ class _Walk:
             (at,) = given[0]
             results = graph.new(function.nnz_out(0))
             graph.tables.append(self._tables[function.name()])
-            graph.steps.append(Reading(len(graph.tables) - 1, at, results))
+            graph.steps.append(TableReading(len(graph.tables) - 1, at, results))
             return [results]
         if function.class_name() == "MXFunction":
             return self._walked(function, given)
@@ -386,5 +387,6 @@ def _chosen(info: Mapping[str, object]) -> list[int]:
         part: Mapping[str, int] = info["slice"]  # type: ignore[assignment]
         return list(range(part["start"], part["stop"], part["step"]))
     if "nz" in info:
-        return list(info["nz"])  # type: ignore[call-overload]
+        places: Sequence[int] = info["nz"]  # type: ignore[assignment]
+        return list(places)
     raise NotByColumnsError(f"places {sorted(info)}")

@@ -6,7 +6,7 @@ from one C library and give the same bits; NumPy has its own, whose last digit m
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
@@ -51,6 +51,16 @@ class ColumnRun(Protocol):
 class ByColumns(Protocol):
     """A translation that also computes many columns together."""
 
+    def __call__(self, function: ca.Function) -> ca.Function:
+        """Return a faster function with the same arguments and results.
+
+        Parameters
+        ----------
+        function
+            Any.
+        """
+        ...
+
     def columns(self, graph: ColumnGraph) -> ColumnRun:
         """Return what runs a graph of one sample.
 
@@ -84,22 +94,25 @@ def column_run(system: SampledSystem, keep: Sequence[str], *, translate: Transla
 def _column_run(system: SampledSystem, keep: tuple[str, ...], translate: Translate, many: bool) -> ColumnRun:
     writer = SampleWriter(system)
     sample = writer.function(keep)
-    found = _together(sample, writer.tables, translate, many)
-    return found or _OneByOne(translate(_chunk(sample)))
+    together = _together(sample, writer.tables, translate, many)
+    return together or _OneByOne(translate(_chunk(sample)))
 
 
 def _together(
     sample: ca.Function, tables: Mapping[str, Table], translate: Translate, many: bool
 ) -> ColumnRun | None:
     """Return what computes many columns together, or None where that is not to be had or not worth it."""
+    columns: Callable[[ColumnGraph], ColumnRun]
+    if isinstance(translate, ByColumns):
+        columns = translate.columns
+    elif translate is as_it_is and many:
+        columns = NumpyColumns
+    else:
+        return None
     try:
-        if isinstance(translate, ByColumns):
-            return translate.columns(column_graph(sample, fixed=[2], tables=tables))
-        if translate is as_it_is and many:
-            return NumpyColumns(column_graph(sample, fixed=[2], tables=tables))
+        return columns(column_graph(sample, fixed=[2], tables=tables))
     except NotByColumnsError:
-        pass  # the same numbers, one column after the other
-    return None
+        return None  # the same numbers, one column after the other
 
 
 class ColumnEvaluator:

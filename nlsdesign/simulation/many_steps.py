@@ -22,7 +22,6 @@ from .runge_kutta import (
     LARGEST_ERROR,
     NODES,
     SMALLEST_STEP,
-    STAGES,
     Stepper,
     limited_by_stability,
     step_function,
@@ -75,7 +74,7 @@ class ManySteps:
         self.stiff: set[int] = set()
 
     def run(self) -> Array:
-        """Return the states at the sample times, shape (states, samples, columns); not a number where lost."""
+        """Return the states at the sample times, (states, samples, columns); not a number where lost."""
         last = len(self._drives.times) - 1
         states = np.full((len(self.state), last + 1, self.state.shape[1]), np.nan)
         self._begin()
@@ -83,9 +82,8 @@ class ManySteps:
         going = np.flatnonzero(~self._gone)
         while len(going):
             self._advance(going)
-            there = going[
-                (self._now[going] == self._drives.times[self._interval[going] + 1]) & ~self._gone[going]
-            ]
+            ends = self._drives.times[self._interval[going] + 1]
+            there = going[(self._now[going] == ends) & ~self._gone[going]]
             self._interval[there] += 1
             states[:, self._interval[there], there] = self.state[:, there]
             self._budget[there] += 40.0
@@ -221,7 +219,8 @@ class ManySteps:
 
     def _stage_end(self, interval: int, moment: float) -> Array:
         # With a function that jumps at a sample its value is that of the interval that ends there.
-        return self._inputs(np.array([interval]), np.array([[moment]]))[0, 0]
+        result: Array = self._inputs(np.array([interval]), np.array([[moment]]))[0, 0]
+        return result
 
     def _through_event(self, column: int, length: float) -> None:
         """Take one column to the moment at which a mode ends."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from ..model import Table
-from .column_graph import Call, ColumnGraph, Operation, Reading
+from .column_graph import Call, ColumnGraph, Operation, TableReading
 
 Array = NDArray[np.float64]
 _Task: TypeAlias = tuple[Callable[..., Any], tuple[Any, ...]]
@@ -88,7 +88,7 @@ class _Columns:
         for step in graph.steps:
             if isinstance(step, Operation):
                 top.add(step)
-            elif isinstance(step, Reading):
+            elif isinstance(step, TableReading):
                 top.read(step, graph.tables[step.table])
             else:
                 top.call(step, self._bodies[step.once])
@@ -176,7 +176,7 @@ class _Program:
             tasks.append((_FUNCTIONS[step.code], (a, *others, self._new(step.result))))
         self._release(step.operands)
 
-    def read(self, step: Reading, table: Table) -> None:
+    def read(self, step: TableReading, table: Table) -> None:
         """Add the reading of a table."""
         results = [self._new(k) for k in step.results]
         self.tasks.append((_read, (table, self.values[step.at], results)))
@@ -199,7 +199,7 @@ class _Program:
         return self.values[number]
 
 
-def _as_numbers(step: Operation | Reading | Call) -> Sequence[int]:
+def _as_numbers(step: Operation | TableReading | Call) -> Sequence[int]:
     """Return the values that a step needs as numbers, not as truths."""
     if isinstance(step, Operation) and step.code in _LOGICAL:
         return ()

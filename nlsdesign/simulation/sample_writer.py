@@ -1,4 +1,4 @@
-"""One sample of a sampled system as a graph of calls: read the plant, evaluate the blocks, integrate the plant."""
+"""One sample of a sampled system as a graph of calls."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def run_batch(
 def _given(
     system: SampledSystem, courses: Sequence[Array], time: Array, span: tuple[int, int], runs: int
 ) -> Array:
-    """Return time and inputs at the samples of a span, and inputs of the plant at its end, (T, given, runs)."""
+    """Return time, inputs, and inputs of the plant one sample later, shape (T, given, runs)."""
     first, last = span
     ramped = sum(name.startswith(f"{PLANT}.") for name in system.open_inputs)
     given = np.empty((last - first, 1 + len(courses) + ramped, runs))

@@ -36,8 +36,8 @@ class SampledSystem:
     Raises
     ------
     ValueRangeError
-        If the plant is discrete or has laws that jump, the blocks are not sampled alike, or delay or substeps is
-        too small.
+        If the plant is discrete or has laws that jump, the blocks are not sampled alike, or delay or
+        substeps is too small.
     """
 
     plant: FlatModel

@@ -21,6 +21,7 @@ from .many_steps import ManySteps
 
 Array = NDArray[np.float64]
 
+_NOT_SOLVED = "a state is not finite, or an implicit equation was not solved"
 _EVALUATED = 200
 """Samples whose signals are computed in one call."""
 
@@ -110,60 +111,51 @@ def simulate_batch(
         If a number, state, input or variable does not exist.
     ValueRangeError
         If the model is discrete or has no states, times do not ascend, or columns have different lengths.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from nlsdesign import quantity
-    >>> from nlsdesign.components import Inertia, Motor, assembly
-    >>> from nlsdesign.model import flatten
-    >>> constant = quantity(0.1, "N*m/A", source="assumed")
-    >>> wheel = Inertia(inertia=quantity(1e-3, "kg*m^2", source="assumed"))
-    >>> drive = flatten(assembly("drive", motor=wheel & Motor(torque_constant=constant)))  # doctest: +SKIP
     """
-    if model.sample_time is not None or not model.states:
-        raise ValueRangeError(
-            f"model '{model.name}'", "is discrete or has no states; a batch needs a continuous model with states",
-            next_step="run a sampled loop with nlsdesign.control.loop_over_spread",
-        )  # fmt: skip
+    _check(model, keep)
     times = checked_times(times)
     columns = _columns(model, draws)
     drives = drives_of(model, times, inputs or {}, hold=False)
-    expressions = named(model, model.symbols())
-    for name in keep:
-        if name not in expressions:
-            raise unknown_name("variable of the model", name, expressions)
     failures = _out_of_range(model, columns)
     count = len(next(iter(columns.values())))
-    places = np.array([i for i in range(count) if i not in failures], dtype=np.intp)
     signals = {name: np.full((count, len(times)), np.nan) for name in keep}
     events: list[tuple[Event, ...]] = [()] * count
-    if len(places):
+    places = [i for i in range(count) if i not in failures]
+    if places:
         part = {name: values[places] for name, values in columns.items()}
         steps = ManySteps(model, drives, columns=part, tolerance=tolerance, translate=translate)
-        states = steps.run()
-        kept, left = _evaluated(model, keep, drives, states, steps.numbers, translate)
-        for i, place in enumerate(places.tolist()):
+        kept, left = _evaluated(model, keep, drives, steps.run(), steps.numbers, translate)
+        for i, place in enumerate(places):
             if i in steps.stiff:
-                values = {name: float(column[place]) for name, column in columns.items()}
+                one = model.with_values({name: float(values[i]) for name, values in part.items()})
                 try:
-                    alone = simulate(model.with_values(values), times, inputs=inputs, tolerance=tolerance)
+                    alone = simulate(one, times, inputs=inputs, tolerance=tolerance)
                 except ConvergenceError as error:
                     failures[place] = str(error)
                     continue
-                events[place] = alone.events
-                for name in keep:
-                    signals[name][place] = alone[name]
-            elif i in steps.failures:
-                failures[place] = steps.failures[i]
-            elif not left[i] <= RESIDUAL_LIMIT:
-                failures[place] = "a state is not finite, or an implicit equation was not solved"
+                events[place], rows = alone.events, [alone[name] for name in keep]
+            elif i in steps.failures or not left[i] <= RESIDUAL_LIMIT:
+                failures[place] = steps.failures.get(i, _NOT_SOLVED)
+                continue
             else:
-                events[place] = steps.events(i)
-                for k, name in enumerate(keep):
-                    signals[name][place] = kept[k, :, i]
+                events[place], rows = steps.events(i), list(kept[:, :, i])
+            for name, row in zip(keep, rows, strict=True):
+                signals[name][place] = row
     units = {name: model.variable(name).unit for name in keep}
     return SimulatedBatch(times, signals, units, failures, tuple(events))
+
+
+def _check(model: FlatModel, keep: Sequence[str]) -> None:
+    if model.sample_time is not None or not model.states:
+        raise ValueRangeError(
+            f"model '{model.name}'",
+            "is discrete or has no states; a batch needs a continuous model with states",
+            next_step="run a sampled loop with nlsdesign.control.loop_over_spread",
+        )
+    known = named(model, model.symbols())
+    for name in keep:
+        if name not in known:
+            raise unknown_name("variable of the model", name, known)
 
 
 def _columns(model: FlatModel, draws: Mapping[str, Array]) -> dict[str, Array]:
@@ -187,9 +179,8 @@ def _out_of_range(model: FlatModel, columns: Mapping[str, Array]) -> dict[int, s
     reasons: dict[int, str] = {}
     for name, values in columns.items():
         v = model.variable(name)
-        for i in np.flatnonzero(
-            ~((values >= v.minimum) & (values <= v.maximum) & np.isfinite(values))
-        ).tolist():
+        inside = (values >= v.minimum) & (values <= v.maximum) & np.isfinite(values)
+        for i in np.flatnonzero(~inside).tolist():
             limits = f"must be a finite number in [{v.minimum:g}, {v.maximum:g}] {v.unit}"
             reasons.setdefault(i, f"{name} = {values[i]:g}: {limits.strip()}")
     return reasons
@@ -198,7 +189,7 @@ def _out_of_range(model: FlatModel, columns: Mapping[str, Array]) -> dict[int, s
 def _evaluated(
     model: FlatModel, keep: Sequence[str], drives: Drives, states: Array, numbers: Array, translate: Translate
 ) -> tuple[Array, Array]:
-    """Return what is kept, (kept, T, columns), and the largest remainder of implicit equations, (columns,)."""
+    """Return what is kept, (kept, T, columns), and the largest remainder of implicit equations."""
     s = model.symbols()
     expressions = named(model, s)
     residuals = model.equations.call([s.time, s.state, s.input, s.parameter, s.table])[3]

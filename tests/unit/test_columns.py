@@ -73,7 +73,7 @@ def test_every_operation_that_is_known_is_tried() -> None:
 def test_every_operation_gives_the_number_of_casadi(
     reference: np.ndarray, translate: Translate, digits: float
 ) -> None:
-    """The same bits compiled; with NumPy, whose elementary functions are its own, the last digits may differ."""
+    """The same bits compiled; NumPy has elementary functions of its own, whose last digits may differ."""
     values = by_columns(everything(), translate)
     names = [*ONE, *TWO, "fixed times a", "fixed"]
     assert values.shape == reference.shape

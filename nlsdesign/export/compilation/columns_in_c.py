@@ -11,8 +11,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from ...simulation.column_graph import Call, ColumnGraph, Operation, Reading
+from ...simulation.column_graph import Call, ColumnGraph, Operation, TableReading
 
 WIDTH = 8
 """Columns that are computed together."""
@@ -65,7 +67,11 @@ static inline column choose(mask which, column a, column b) {{
     return (column)(((mask)a & which) | ((mask)b & ~which));
 }}
 static inline column number(mask which) {{ return (column)((mask)all(1.0) & which); }}
-static inline column load(const double *from) {{ column value; memcpy(&value, from, sizeof value); return value; }}
+static inline column load(const double *from) {{
+    column value;
+    memcpy(&value, from, sizeof value);
+    return value;
+}}
 static inline void store(double *to, column value) {{ memcpy(to, &value, sizeof value); }}
 """
 
@@ -87,7 +93,8 @@ static void look_up(const double *grid, const double *values, int64_t nodes, int
         }
         double share = (x - grid[low]) / (grid[low + 1] - grid[low]);
         for (int64_t k = 0; k < columns; ++k)
-            result[k][j] = (1.0 - share) * values[low * columns + k] + share * values[(low + 1) * columns + k];
+            result[k][j] = (1.0 - share) * values[low * columns + k]
+                           + share * values[(low + 1) * columns + k];
     }
 }
 """
@@ -138,10 +145,10 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
     names = {number: f"p[{i}]" for i, number in enumerate(parameter)}
     fixed = [_operation(s, graph, names) for s in graph.steps if _is_fixed(s, graph)]
     onces = []
-    for k, (body, operands) in enumerate(graph.onces):
-        onces.append(f"        column o{k}[{len(crossing[body])} + 1];")
+    for k, (place, operands) in enumerate(graph.onces):
+        onces.append(f"        column o{k}[{len(crossing[place])} + 1];")
         values = "".join(f"{_name(v, graph, names)}, " for v in operands)
-        fixed.append(f"{{ column a[] = {{{values}{{0}}}}; once{body}(a, o{k}); }}")
+        fixed.append(f"{{ column a[] = {{{values}{{0}}}}; once{place}(a, o{k}); }}")
     names |= {number: f"s[{i}]" for i, number in enumerate(state)}
     names |= {number: f"load(g + {i} * every)" for i, number in enumerate(given)}
     lines = [_step(step, graph, names) for step in graph.steps if not _is_fixed(step, graph)]
@@ -171,7 +178,7 @@ def _number(value: float) -> str:
     return f"({value.hex()})"
 
 
-def _numbers(name: str, values: Sequence[float]) -> str:
+def _numbers(name: str, values: NDArray[np.float64]) -> str:
     return f"static const double {name}[] = {{{', '.join(_number(float(v)) for v in values)}}};\n"
 
 
@@ -254,7 +261,7 @@ def _is_condition(number: int, graph: ColumnGraph) -> bool:
 def _step(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> str:
     if isinstance(step, Operation):
         return _operation(step, graph, names)
-    if isinstance(step, Reading):
+    if isinstance(step, TableReading):
         table, first = graph.tables[step.table], step.results[0]
         exact = int(table.breakpoints is None)
         call = (

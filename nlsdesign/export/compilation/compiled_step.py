@@ -21,7 +21,7 @@ from ...simulation.column_graph import ColumnGraph
 from ...simulation.column_runs import ColumnRun
 from ...writing import write_bytes
 from .columns_in_c import WIDTH, sampled_run_in_c
-from .cross_compiler import THIS_PROCESSOR, cache_folder, compile_library
+from .cross_compiler import BASELINE, THIS_PROCESSOR, cache_folder, compile_library
 
 Array = NDArray[np.float64]
 
@@ -168,8 +168,8 @@ def _built(text: str, flags: Sequence[str], *, this_processor: bool = False) -> 
         with tempfile.TemporaryDirectory(dir=folder) as name:
             source = Path(name) / "step.c"
             source.write_text(text, encoding="utf-8")
-            chosen = {"processor": THIS_PROCESSOR} if this_processor else {}
-            built = compile_library([source], Path(name) / library.name, flags=flags, **chosen)
+            processor = THIS_PROCESSOR if this_processor else BASELINE
+            built = compile_library([source], Path(name) / library.name, flags=flags, processor=processor)
             write_bytes(library, built.read_bytes())
     return library
 
@@ -181,5 +181,5 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return f"{platform.machine()} {platform.processor()} {platform.node()}"
-    told = [line for line in lines if line.split("\t")[0].strip() in ("flags", "Features", "model name")]
-    return "\n".join(sorted(set(told))) + platform.machine()
+    naming = [line for line in lines if line.split("\t")[0].strip() in ("flags", "Features", "model name")]
+    return "\n".join(sorted(set(naming))) + platform.machine()
