@@ -28,8 +28,8 @@ export function range(rows, { zero = false } = {}) {
 
 export class Chart {
   // x and y: { name, unit }; the unit in SI. log: the abscissa.
-  constructor(host, { title, x, y, height = 190, width = 420, log = false, zero = false, square = false }) {
-    Object.assign(this, { title, x, y, width, height, log, zero, square });
+  constructor(host, { title, x, y, height = 190, width = 420, log = false, zero = false, symlog = false }) {
+    Object.assign(this, { title, x, y, width, height, log, zero, symlog });
     this.svg = draw("svg", { role: "img", class: "chart", viewBox: `0 0 ${width} ${height}`, "aria-label": title });
     this.grid = draw("g", { class: "grid" });
     this.lines = draw("g", { class: "lines" });
@@ -63,13 +63,15 @@ export class Chart {
   }
 
   px(value) {
-    const [low, high] = this.limits.x;
+    const [low, high] = this.symlog ? this.limits.x.map(folded) : this.limits.x;
+    if (this.symlog) value = folded(value);
     const share = this.log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
     return LEFT + share * (this.width - LEFT - RIGHT);
   }
 
   py(value) {
-    const [low, high] = this.limits.y;
+    const [low, high] = this.symlog ? this.limits.y.map(folded) : this.limits.y;
+    if (this.symlog) value = folded(value);
     return TOP + (high - value) / (high - low) * (this.height - TOP - BOTTOM);
   }
 
@@ -87,20 +89,11 @@ export class Chart {
     if (!frozen) {
       const next = limits ?? {};
       this.limits = {
-        x: next.x ?? (this.log ? logRange(series) : tight(series.map((s) => s.x))),
-        y: next.y ?? range(series.map((s) => s.y), { zero: this.zero }),
+        x: next.x ?? (this.symlog ? around(series.map((s) => s.x)) : this.log ? logRange(series) : tight(series.map((s) => s.x))),
+        y: next.y ?? (this.symlog ? around(series.map((s) => s.y)) : range(series.map((s) => s.y), { zero: this.zero })),
       };
-      if (this.square) this.equalScales();
     }
     this.redraw();
-  }
-
-  equalScales() {
-    const wide = this.width - LEFT - RIGHT, high = this.height - TOP - BOTTOM;
-    let [a, b] = range(this.series.map((s) => s.x), { zero: true }), [c, d] = this.limits.y;
-    const scale = Math.max((b - a) / wide, (d - c) / high);
-    const mx = (a + b) / 2, my = (c + d) / 2;
-    this.limits = { x: [mx - scale * wide / 2, mx + scale * wide / 2], y: [my - scale * high / 2, my + scale * high / 2] };
   }
 
   redraw() {
@@ -148,12 +141,13 @@ export class Chart {
     this.grid.replaceChildren();
     const fx = factorOf(this.x.unit), fy = factorOf(this.y.unit);
     const bottom = this.height - BOTTOM, right = this.width - RIGHT;
-    const across = this.log ? decades(this.limits.x) : ticks(...this.limits.x.map((v) => v * fx), this.width / 70).map((v) => v / fx);
+    const across = this.symlog ? powers(this.limits.x) : this.log ? decades(this.limits.x) : ticks(...this.limits.x.map((v) => v * fx), this.width / 70).map((v) => v / fx);
     for (const value of across) {
       const a = this.px(value);
       this.grid.append(draw("line", { x1: a, x2: a, y1: TOP, y2: bottom }), draw("text", { x: a, y: bottom + 13, "text-anchor": "middle" }, plain(value * fx)));
     }
-    for (const value of ticks(...this.limits.y.map((v) => v * fy), this.height / 38).map((v) => v / fy)) {
+    const up = this.symlog ? powers(this.limits.y) : ticks(...this.limits.y.map((v) => v * fy), this.height / 38).map((v) => v / fy);
+    for (const value of up) {
       const b = this.py(value);
       this.grid.append(draw("line", { x1: LEFT, x2: right, y1: b, y2: b }), draw("text", { x: LEFT - 6, y: b + 3.5, "text-anchor": "end" }, plain(value * fy)));
     }
@@ -176,7 +170,7 @@ export class Chart {
   cursor(at) {
     this.at = at;
     this.dots.replaceChildren();
-    if (at === null || this.log || this.square || this.series.length === 0) return;
+    if (at === null || this.log || this.symlog || this.series.length === 0) return;
     set(this.cursorLine, { x1: this.px(at), x2: this.px(at) });
     const now = [];
     for (const s of this.series) {
@@ -209,6 +203,12 @@ function tight(rows) {
   return [low, high];
 }
 
+// Zero inside, room on both sides.
+function around(rows) {
+  const [low, high] = tight(rows);
+  return [Math.min(3 * low, -3), Math.max(3 * high, 3)];
+}
+
 function logRange(series) {
   const [low, high] = tight(series.map((s) => s.x.filter((v) => v > 0)));
   return low > 0 ? [low, high] : [0.1, 10];
@@ -218,6 +218,19 @@ function decades([low, high]) {
   const found = [];
   for (let power = Math.floor(Math.log10(low)); 10 ** power <= high * 1.001; power += 1) if (10 ** power >= low * 0.999) found.push(10 ** power);
   return found.length > 1 ? found : [low, high];
+}
+
+// Poles lie between one per minute and ten thousand per second, on both sides of zero.
+function folded(value) {
+  return Math.sign(value) * Math.log10(1 + Math.abs(value));
+}
+
+function powers([low, high]) {
+  const found = [0];
+  const most = Math.ceil(Math.max(folded(high), -folded(low)));
+  const step = Math.max(1, Math.ceil(most / 4));
+  for (let power = step; power <= most; power += step) for (const value of [10 ** power, -(10 ** power)]) if (value >= low && value <= high) found.push(value);
+  return found;
 }
 
 function sample({ tone, dash, points, area }) {
