@@ -72,7 +72,7 @@ class Server:
 def start(*words: str, folder: Path | None = None) -> subprocess.Popen[str]:
     """Start the command."""
     return subprocess.Popen(
-        [sys.executable, "-m", "nlsdesign", "serve", "--no-browser", "--json", *words],
+        [sys.executable, "-P", "-m", "nlsdesign", "serve", "--no-browser", "--json", *words],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
     )  # fmt: skip

@@ -1,9 +1,9 @@
 // One panel with axes, lines and a cursor that all panels share. Drawn once; then only paths change.
 
 import { draw, make, set, text } from "./elements.js";
-import { factorOf, plain, unitOf, withUnit } from "./units.js";
+import { factorOf, plain, scaled, unitOf, withUnit } from "./units.js";
 
-const LEFT = 52, RIGHT = 10, TOP = 10, BOTTOM = 30;
+const LEFT = 56, RIGHT = 10, TOP = 10, BOTTOM = 30;
 
 export function ticks(low, high, count) {
   const span = high - low;
@@ -43,7 +43,7 @@ export class Chart {
     host.append(make("div", { class: "head" }, this.heading, this.value), this.svg, this.key);
     this.paths = [];
     this.series = [];
-    this.limits = { x: [0, 1], y: [0, 1] };
+    this.limits = { x: log ? [0.1, 10] : [0, 1], y: [0, 1] };
     this.at = null;
     this.fit(host);
   }
@@ -97,6 +97,7 @@ export class Chart {
   }
 
   redraw() {
+    if (this.series.length === 0) return;
     this.axes();
     while (this.paths.length < this.series.length) this.paths.push(this.lines.appendChild(draw("path", { fill: "none" })));
     while (this.paths.length > this.series.length) this.paths.pop().remove();
@@ -139,7 +140,7 @@ export class Chart {
     if (code === this.drawn) return;
     this.drawn = code;
     this.grid.replaceChildren();
-    const fx = factorOf(this.x.unit), fy = factorOf(this.y.unit);
+    const fx = factorOf(this.x.unit), [unitUp, fy] = scaled(this.y.unit, Math.max(...this.limits.y.map(Math.abs)));
     const bottom = this.height - BOTTOM, right = this.width - RIGHT;
     const across = this.symlog ? powers(this.limits.x) : this.log ? decades(this.limits.x) : ticks(...this.limits.x.map((v) => v * fx), this.width / 70).map((v) => v / fx);
     for (const value of across) {
@@ -151,10 +152,10 @@ export class Chart {
       const b = this.py(value);
       this.grid.append(draw("line", { x1: LEFT, x2: right, y1: b, y2: b }), draw("text", { x: LEFT - 6, y: b + 3.5, "text-anchor": "end" }, plain(value * fy)));
     }
-    const unit = (axis) => (unitOf(axis.unit) ? `${axis.name} in ${unitOf(axis.unit)}` : axis.name);
+    const named = (axis, unit) => (unit ? `${axis.name} in ${unit}` : axis.name);
     this.grid.append(
-      draw("text", { class: "axis", x: right, y: this.height - 4, "text-anchor": "end" }, unit(this.x)),
-      draw("text", { class: "axis", x: 11, y: TOP + (bottom - TOP) / 2, "text-anchor": "middle", transform: `rotate(-90 11 ${TOP + (bottom - TOP) / 2})` }, unit(this.y)),
+      draw("text", { class: "axis", x: right, y: this.height - 4, "text-anchor": "end" }, named(this.x, unitOf(this.x.unit))),
+      draw("text", { class: "axis", x: 11, y: TOP + (bottom - TOP) / 2, "text-anchor": "middle", transform: `rotate(-90 11 ${TOP + (bottom - TOP) / 2})` }, named(this.y, unitUp)),
     );
   }
 
@@ -178,10 +179,11 @@ export class Chart {
       const value = interpolated(s.x, s.y, at);
       if (value === null) continue;
       this.dots.append(draw("circle", { cx: this.px(at), cy: this.clipped(value), r: 3.2, class: s.tone }));
-      if (now.length < 2) now.push(withUnit(value, this.y.unit));
+      now.push([s.name, withUnit(value, this.y.unit)]);
     }
-    text(this.value, now.join(" · "));
-    this.svg.setAttribute("aria-label", `${this.title} over ${this.x.name}; at ${withUnit(at, this.x.unit, 3)}: ${now.join(", ") || "no number"}`);
+    const words = now.length > 1 ? now.slice(0, 2).map(([name, number]) => `${name} ${number}`) : now.map(([, number]) => number);
+    text(this.value, words.join(" · "));
+    this.svg.setAttribute("aria-label", `${this.title} over ${this.x.name}; at ${withUnit(at, this.x.unit, 3)}: ${words.join(", ") || "no number"}`);
   }
 }
 
@@ -206,7 +208,7 @@ function tight(rows) {
 // Zero inside, room on both sides.
 function around(rows) {
   const [low, high] = tight(rows);
-  return [Math.min(3 * low, -3), Math.max(3 * high, 3)];
+  return [Math.min(3 * low, -12), Math.max(3 * high, 12)];
 }
 
 function logRange(series) {

@@ -2,7 +2,7 @@
 // so that the focus stays where a hand is.
 
 import { make, text } from "./elements.js";
-import { factorOf, plain, typed, unitOf, withUnit } from "./units.js";
+import { editable, factorOf, typed, unitOf, withUnit } from "./units.js";
 
 const SPAN = 4;
 
@@ -45,7 +45,7 @@ class NumberRow {
     this.row.classList.toggle("active", given.active === true);
     text(this.margin, given.margin ?? "");
     if (document.activeElement !== this.field || this.settled) {
-      this.field.value = given.value === null ? "" : plain(given.value * factorOf(given.unit), 5);
+      this.field.value = given.value === null ? "" : editable(given.value * factorOf(given.unit));
       this.settled = false;
     }
     if (document.activeElement !== this.slider || !this.sliding) this.rest();
@@ -73,7 +73,7 @@ class NumberRow {
     this.sliding = !last;
     text(this.wrong, "");
     const value = Number(this.valueAt(Number(this.slider.value)).toPrecision(4));
-    this.field.value = plain(value * factorOf(this.given.unit), 5);
+    this.field.value = editable(value * factorOf(this.given.unit));
     this.slider.setAttribute("aria-valuetext", withUnit(value, this.given.unit));
     this.change(value, last);
   }
@@ -99,7 +99,7 @@ class NumberRow {
     event.preventDefault();
     const size = Math.max(Math.abs(value) * (event.shiftKey ? 0.1 : 0.01), 1e-6);
     const next = Number((value + (event.key === "ArrowUp" ? size : -size)).toPrecision(4));
-    this.field.value = plain(next, 5);
+    this.field.value = editable(next);
     this.change(next / factorOf(this.given.unit), false);
   }
 
@@ -152,7 +152,7 @@ export class PointTable {
     points.forEach(([angle, torque], k) => {
       const { angleField, torqueField, remove } = this.rows[k];
       for (const [field, value] of [[angleField, angle * 180 / Math.PI], [torqueField, torque]]) {
-        if (document.activeElement !== field || field.dataset.done) { field.value = plain(value, 5); delete field.dataset.done; }
+        if (document.activeElement !== field || field.dataset.done) { field.value = editable(value); delete field.dataset.done; }
         field.disabled = k === 0;
       }
       remove.disabled = k === 0 || points.length <= 2;

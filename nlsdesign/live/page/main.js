@@ -45,10 +45,11 @@ const sizes = new Rows(byId("sizes"), "size", {
   change: (name, value, last) => edit({ edit: "SetNumber", name, value }, { drag: `number ${name}`, last }),
   free: (name, yes) => edit({ edit: yes ? "FreeNumber" : "HoldNumber", name }),
 });
+const laws = new Rows(byId("laws"), "law", sizes.actions);
 const material = make("select", { id: "material" });
 const contourBox = make("input", { type: "checkbox", id: "contour" });
-byId("sizes").prepend(
-  make("div", { class: "material" }, make("label", { for: "material" }, "rubber of the library"), material),
+byId("choice").append(
+  make("label", { for: "material" }, "rubber of the library"), material,
   make("label", { class: "contour", for: "contour" }, contourBox, "free: the contour of the cam"),
 );
 material.addEventListener("change", () => { if (material.value) edit({ edit: "ChooseMaterial", material: material.value }); });
@@ -125,7 +126,9 @@ function showAnswer() {
   table.show(controls.points.map((each) => [each[0], each[1]]));
   showCurve(frozen);
   limits.show(controls.limits.map(limitRow));
-  sizes.show(controls.numbers.map(numberRow));
+  const lengths = (each) => /^m(\^2)?$/.test(each[2]);
+  sizes.show(controls.numbers.filter(lengths).map(numberRow));
+  laws.show(controls.numbers.filter((each) => !lengths(each)).map(numberRow));
   if (document.activeElement !== material) material.value = controls.material;
   contourBox.checked = controls.contour_free;
   byId("undo").disabled = !controls.can_undo;
@@ -165,7 +168,8 @@ function showCurve(frozen) {
   editor.showTarget(points);
 }
 
-function limitRow([name, words, value, unit, , upper, byDefault]) {
+function limitRow([name, words, value, si, shown, upper, byDefault]) {
+  const unit = shown === "%" ? "%" : si;
   const margin = answer.design?.margins.find((each) => each.limit === name);
   const from = byDefault ? "from the deck" : "set here";
   return { name, path: name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false,
@@ -198,11 +202,13 @@ function showState() {
   const checking = full?.state === "computing" ? "The check with several starts is running. " : "";
   const failed = full?.state === "failed" ? `The check failed: ${full.message}. ` : "";
   const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
+  const sits = design?.active.length ? `It sits on ${design.active.join(", ")}. ` : "No limit binds. ";
+  const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
   if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${conflicts.join(", ")}. ` : ""}${message} `];
   else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
-  else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${message} `] : ["misses its target", "missed", `${missed}${message} `];
-  else [name, kind, words] = design?.met ? ["quick answer", "quick", `${message} `] : ["misses its target", "missed", `Quick answer. ${missed}${message} `];
+  else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${missed}${message} `];
+  else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer. ${missed}${message} `];
   showWords(name, kind, words + shown + checking + failed);
 }
 

@@ -8,15 +8,19 @@ const KEY = [["body", "cam"], ["cable", "cable"], ["arm", "lever arm"], ["rubber
 
 export class MechanismPicture {
   constructor(host) {
-    this.svg = draw("svg", { class: "mechanism", role: "img", preserveAspectRatio: "xMidYMid meet" });
-    this.world = draw("g", { transform: "scale(1,-1)" });
-    this.bar = draw("g", {});
-    this.svg.append(this.world, this.bar);
+    this.whole = draw("svg", { class: "mechanism", role: "img", preserveAspectRatio: "xMidYMid meet" });
+    this.world = draw("g", { id: "mechanism-world", transform: "scale(1,-1)" });
+    this.wholeBar = draw("g", {});
+    this.whole.append(this.world, this.wholeBar);
+    // The cam alone, larger: the same elements once more.
+    this.near = draw("svg", { class: "mechanism near", "aria-hidden": "true", preserveAspectRatio: "xMidYMid slice" });
+    this.nearBar = draw("g", {});
+    this.near.append(draw("use", { href: "#mechanism-world" }), this.nearBar);
     this.now = make("p", { class: "now" });
     this.remark = make("p", { class: "hint" });
     const samples = KEY.map(([name, words]) => make("li", {}, draw("svg", { viewBox: "0 0 24 12", width: 24, height: 12, "aria-hidden": "true" },
       name === "body" || name === "rubber" ? draw("rect", { x: 1, y: 1, width: 22, height: 10, class: name }) : draw("path", { d: "M0 6H24", class: name })), words));
-    host.append(make("div", { class: "head" }, make("h3", {}, "Mechanism"), this.now), this.svg, make("ul", { class: "key" }, ...samples), this.remark);
+    host.append(make("div", { class: "head" }, make("h3", {}, "Mechanism"), this.now), this.near, this.whole, make("ul", { class: "key" }, ...samples), this.remark);
     this.parts = new Map();
   }
 
@@ -29,7 +33,7 @@ export class MechanismPicture {
       set(this.parts.get(name), attributes);
     };
     const [wide, high] = mechanism.extent.map((v) => v * 1e3);
-    const size = 0.016 * Math.max(wide, high);
+    const size = 0.055 * high;
     mechanism.halves.forEach((points, k) => put(`half${k}`, "path", { class: "body", d: `${path(mm(points))}Z` }));
     mechanism.rubbers.forEach((points, k) => put(`rubber${k}`, "path", { class: "rubber", d: `${path(mm(points))}Z` }));
     mechanism.cables.forEach((points, k) => put(`cable${k}`, "path", { class: "cable", d: path(mm(points)) }));
@@ -48,23 +52,28 @@ export class MechanismPicture {
     this.frame(wide, high, mechanism.halves.length > 1);
     text(this.now, withUnit(mechanism.angle, "rad", 3));
     text(this.remark, mechanism.remark);
-    set(this.svg, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}` });
+    set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}` });
   }
 
-  // A scale below, of a round length.
+  // A scale in each picture, of a round length.
   frame(wide, high, both) {
-    const left = both ? -wide : -high;
-    const box = `${left} ${-high} ${wide - left} ${high * 2.2}`;
-    if (box === this.box) return;
-    this.box = box;
-    set(this.svg, { viewBox: box });
-    const marks = ticks(0, 2 * wide, 9);
-    const length = marks[1] ?? wide, y = high * 1.08, x = left + (wide - left) * 0.03, tall = high * 0.03;
-    this.bar.replaceChildren(
-      draw("path", { class: "scale", d: `M${x} ${y - tall}V${y + tall}M${x} ${y}H${x + length}M${x + length} ${y - tall}V${y + tall}` }),
-      draw("text", { x: x + length + 0.02 * (wide - left), y: y + tall, fill: "currentColor", "font-size": 0.035 * (wide - left) }, `${length} mm`),
-    );
+    const code = `${wide} ${high} ${both}`;
+    if (code === this.framed) return;
+    this.framed = code;
+    const left = both ? -wide : -1.2 * high;
+    scaleBar(this.whole, this.wholeBar, [left, -1.15 * high, wide - left, 2.3 * high + 0.12 * (wide - left) * 0.4], 6);
+    scaleBar(this.near, this.nearBar, [-1.9 * high, -1.25 * high, 3.8 * high, 2.5 * high], 4);
   }
+}
+
+function scaleBar(svg, bar, [x0, y0, width, height], count) {
+  set(svg, { viewBox: [x0, y0, width, height].map((v) => v.toFixed(2)).join(" ") });
+  const length = ticks(0, width, count)[1] ?? width;
+  const tall = 0.014 * width, x = x0 + 0.03 * width, y = y0 + height - 2.2 * tall;
+  bar.replaceChildren(
+    draw("path", { class: "scale", d: `M${x} ${y - tall}V${y + tall}M${x} ${y}H${x + length}M${x + length} ${y - tall}V${y + tall}` }),
+    draw("text", { x: x + length + 0.02 * width, y: y + tall, "font-size": 0.036 * width }, `${length} mm`),
+  );
 }
 
 function path(points) {

@@ -9,12 +9,12 @@ const DASHES = ["", "dashed", "dotted", "broken"];
 // Panel: title, columns (one, or all with an ending), name and unit of the ordinate, limit drawn in it.
 const PANELS = [
   { title: "Torque error", columns: /^error$/, unit: "N*m", name: "error", zero: true },
-  { title: "Strain of the rubber", columns: /\.strain$/, unit: "1", name: "strain", limit: "MaximumStrain", zero: true, percent: true },
+  { title: "Strain of the rubber", columns: /\.strain$/, unit: "%", name: "strain", limit: "MaximumStrain", zero: true },
   { title: "Stress of the rubber", columns: /\.stress$/, unit: "Pa", name: "nominal stress", limit: "MaximumStress", zero: true },
   { title: "Tension of a cable", columns: /^tension$/, unit: "N", name: "tension", limit: "MaximumCableTension", zero: true },
   { title: "Radius of curvature", columns: /^radius_of_curvature$/, unit: "m", name: "radius", limit: "MinimumRadiusOfCurvature", capped: true },
   { title: "Lever arm", columns: /^lever_arm$/, unit: "m", name: "lever arm", zero: true },
-  { title: "Stiffness", columns: /^stiffness$/, unit: "N*m/rad", name: "slope of the torque", limit: "PositiveStiffness", zero: true },
+  { title: "Stiffness", columns: /^stiffness$/, unit: "N*m/rad", name: "stiffness", limit: "PositiveStiffness", zero: true },
 ];
 
 export class Panels {
@@ -63,7 +63,7 @@ export class Panels {
       row.classList.toggle("active", each.active);
       text(row.children[0], each.of);
       row.children[0].title = each.limit;
-      text(row.children[1], `${withUnit(each.value, each.unit, 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, each.unit, 3)}${each.active ? " · active" : ""}`);
+      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, unit(each), 3)}${each.active ? " · active" : ""}`);
       row.children[2].firstChild.setAttribute("width", (300 * share).toFixed(1));
       row.children[2].firstChild.setAttribute("class", used > 1.0005 ? "broken" : each.active ? "sits" : "free");
     });
@@ -72,6 +72,10 @@ export class Panels {
   cursor(angle) {
     for (const { chart } of this.charts) chart.cursor(angle);
   }
+}
+
+function unit(margin) {
+  return margin.shown_unit === "%" || margin.limit === "MaximumStrain" ? "%" : margin.unit;
 }
 
 function bar() {

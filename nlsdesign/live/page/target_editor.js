@@ -17,12 +17,10 @@ export class TargetEditor extends Chart {
     this.handles = [];
     this.dragged = -1;
     set(this.svg, { role: "group" });
-    this.svg.removeAttribute("aria-label");
     set(this.svg, { "aria-label": "Torque over angle, with the points of the target" });
     this.svg.addEventListener("dblclick", (event) => {
       if (!event.target.closest(".handle")) this.act.add(...this.place(event));
     });
-    this.observed = null;
   }
 
   // points: [[angle, torque]]; what is dragged at the moment stays under the hand.
@@ -41,17 +39,24 @@ export class TargetEditor extends Chart {
     const knob = draw("circle", { class: "knob", r: 6.5 });
     const group = draw("g", { class: "handle", tabindex: 0, role: "slider", "aria-roledescription": "target point" },
       draw("circle", { class: "reach", r: 20 }), draw("circle", { class: "ring", r: 11 }), knob);
-    group.addEventListener("pointerdown", (event) => this.grab(event, k));
+    if (!this.held(k)) group.addEventListener("pointerdown", (event) => this.grab(event, k));
     group.addEventListener("keydown", (event) => this.key(event, k));
     group.addEventListener("keyup", (event) => { if (event.key.startsWith("Arrow") || event.key.startsWith("Page")) this.rest(k); });
     this.over.append(group);
+    if (this.held(k)) {
+      // A mark, no control: the curve begins at angle zero without torque.
+      group.replaceChildren(draw("circle", { class: "knob", r: 3.5 }));
+      group.classList.add("fixed");
+      for (const name of ["tabindex", "role", "aria-roledescription"]) group.removeAttribute(name);
+      set(group, { "aria-hidden": "true" });
+    }
     return group;
   }
 
   put(k) {
     const [angle, torque] = this.points[k];
-    set(this.handles[k], {
-      transform: `translate(${this.px(angle).toFixed(2)} ${this.py(torque).toFixed(2)})`,
+    set(this.handles[k], { transform: `translate(${this.px(angle).toFixed(2)} ${this.py(torque).toFixed(2)})` });
+    if (!this.held(k)) set(this.handles[k], {
       "aria-label": `Target point ${k + 1} of ${this.points.length}. ${HELP}`,
       "aria-valuenow": plain(torque), "aria-valuemin": plain(this.bounds.torque[0]), "aria-valuemax": plain(this.bounds.torque[1]),
       "aria-valuetext": `${withUnit(torque, "N*m")} at ${withUnit(angle, "rad")}`, "aria-orientation": "vertical",
@@ -65,18 +70,16 @@ export class TargetEditor extends Chart {
 
   // The interval in which a point may move: between its neighbours, within what the server takes.
   allowed(k) {
-    const room = 0.01 * (this.bounds.angle[1] - this.bounds.angle[0]);
+    const room = 0.002;
     return [
       k > 0 ? this.points[k - 1][0] + room : this.bounds.angle[0],
       k < this.points.length - 1 ? this.points[k + 1][0] - room : this.bounds.angle[1],
     ];
   }
 
-  move(k, angle, torque, { angleToo = true } = {}) {
+  move(k, angle, torque) {
     const [low, high] = this.allowed(k);
-    const held = this.points[k][0];
-    this.points[k] = [angleToo && !this.held(k) ? Math.min(high, Math.max(low, angle)) : held,
-      Math.min(this.bounds.torque[1], Math.max(this.bounds.torque[0], torque))];
+    this.points[k] = [Math.min(high, Math.max(low, angle)), Math.min(this.bounds.torque[1], Math.max(this.bounds.torque[0], torque))];
     this.put(k);
   }
 
@@ -97,7 +100,8 @@ export class TargetEditor extends Chart {
     const moved = (now) => {
       const begin = performance.now();
       const [x, y] = this.place(now);
-      this.move(k, x + offset[0], y + offset[1]);
+      // Within the picture: it grows when the hand lets go.
+      this.move(k, Math.min(this.limits.x[1], x + offset[0]), Math.min(this.limits.y[1], y + offset[1]));
       this.act.move(k, ...this.points[k], false, begin);
     };
     const done = () => {

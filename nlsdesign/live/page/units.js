@@ -10,7 +10,7 @@ const SHOWN = {
   "N*m/rad": ["N·m/rad", 1],
   "Pa*s": ["Pa·s", 1],
   "kg*m^2": ["kg·m²", 1],
-  "1/m": ["1/m", 1],
+  "%": ["%", 100],
 };
 
 export function unitOf(si) {
@@ -34,10 +34,27 @@ export function plain(value, digits = 4) {
   return minus(String(Number(value.toPrecision(digits))));
 }
 
+// Torques of a small error are read in smaller units.
+export function scaled(si, largest) {
+  if (si !== "N*m" || !(largest < 0.05) || largest === 0) return [unitOf(si), factorOf(si)];
+  return largest < 5e-5 ? ["µN·m", 1e6] : ["mN·m", 1e3];
+}
+
 export function withUnit(value, si, digits = 4) {
+  if (si === "N*m" && value !== null && Math.abs(value) < 0.05 && value !== 0) {
+    const [unit, factor] = scaled(si, Math.abs(value));
+    return `${plain(value * factor, digits)} ${unit}`;
+  }
   const unit = unitOf(si);
   const number = plain(value === null ? null : value * factorOf(si), digits);
   return unit === "" ? number : unit === "°" ? `${number}°` : `${number} ${unit}`;
+}
+
+// As a field takes it back.
+export function editable(value) {
+  if (value === null || !Number.isFinite(value)) return "";
+  const short = Number(value.toPrecision(5));
+  return Math.abs(short) >= 1e7 || (short !== 0 && Math.abs(short) < 1e-4) ? short.toExponential() : String(short);
 }
 
 // "1,5" is how many people type one and a half.
