@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -98,10 +99,9 @@ class SessionDesign:
 
     def _show(self, asked: Mapping[str, Any]) -> None:
         """Show everything, as to a page that was loaded just now."""
-        cards = [to_json(each) for each in gallery()]
-        self._outbox.page({"what": "gallery", "cards": cards, "materials": list(materials())})
         self._say(self._live.answer, asked)
         self._say_kept()
+        self._outbox.page({"what": "gallery", **_choices()})
         if self._trouble:
             self._outbox.page({"what": "refused", "number": None, "reason": self._trouble})
 
@@ -173,6 +173,12 @@ class SessionDesign:
             self._say_kept()
             return {}
         raise unknown_name("file", str(asked.get("kind"))[:40], ())
+
+
+@functools.cache
+def _choices() -> dict[str, Any]:
+    """Return what a page lets choose from: actuators and rubbers."""
+    return {"cards": [to_json(each) for each in gallery()], "materials": list(materials())}
 
 
 def _question(deck: str) -> LiveQuestion:

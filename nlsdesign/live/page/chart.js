@@ -36,7 +36,8 @@ export class Chart {
     this.over = draw("g", { class: "over" });
     this.cursorLine = draw("line", { class: "cursor", y1: TOP, y2: height - BOTTOM, x1: -10, x2: -10 });
     this.dots = draw("g", { class: "dots" });
-    this.svg.append(this.grid, this.lines, this.cursorLine, this.dots, this.over);
+    this.svg.append(this.grid, this.lines, ...(log || symlog ? [] : [this.cursorLine]), this.dots, this.over);
+    this.svg.classList.add("empty");
     this.heading = make("h3", {}, title);
     this.key = make("ul", { class: "key" });
     this.value = make("p", { class: "now" });
@@ -86,6 +87,7 @@ export class Chart {
   // series: [{ name, x, y, tone, dash, points }]; frozen: keep the axes, as while a point is dragged.
   show(series, { frozen = false, limits = null } = {}) {
     this.series = series;
+    this.svg.classList.toggle("empty", series.length === 0);
     if (!frozen) {
       const next = limits ?? {};
       this.limits = {

@@ -80,6 +80,7 @@ function takeAnswer(message) {
   answer = message.answer;
   if (message.full !== undefined) full = message.full;
   clearTimeout(waiting);
+  waiting = 0;
   requestAnimationFrame(() => {
     showAnswer();
     if (message.at) showAngle(message.at);
@@ -126,7 +127,7 @@ function showAnswer() {
   table.show(controls.points.map((each) => [each[0], each[1]]));
   showCurve(frozen);
   limits.show(controls.limits.map(limitRow));
-  const lengths = (each) => /^m(\^2)?$/.test(each[2]);
+  const lengths = (each) => /^m(\^2)?$/.test(each[2]) && each[1] < 1e3;
   sizes.show(controls.numbers.filter(lengths).map(numberRow));
   laws.show(controls.numbers.filter((each) => !lengths(each)).map(numberRow));
   if (document.activeElement !== material) material.value = controls.material;
@@ -176,6 +177,12 @@ function limitRow([name, words, value, si, shown, upper, byDefault]) {
     margin: margin ? `${from}; ${margin.active ? "the design sits on it" : `now ${withUnit(margin.value, unit, 3)}`}` : from };
 }
 
+// Names of limits as people call them.
+function wordsOf(names) {
+  const words = new Map((answer?.controls.limits ?? []).map((each) => [each[0], each[1]]));
+  return names.map((name) => words.get(name) ?? name).join(", ");
+}
+
 function numberRow([name, value, unit, , free, , , source]) {
   const chosen = answer.design?.numbers.find((each) => each.name === name);
   return { name, path: `${name} (${source})`, label: name, value: free && chosen ? chosen.value : value, unit, free,
@@ -186,7 +193,7 @@ function showNumbers(design) {
   const rows = [
     ["torque error, rms", `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`],
     ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
-    ["limits it sits on", design.active.join(", ") || "none"],
+    ["limits it sits on", wordsOf(design.active) || "none"],
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
     ["answered in", `${plain(1e3 * answer.seconds, 2)} ms`],
   ];
@@ -197,18 +204,19 @@ function showNumbers(design) {
 // One of: computing, quick answer, checked answer, infeasible, failed; always in words too.
 function showState() {
   if (!answer) return;
-  const { design, message, conflicts } = answer;
+  const { design, conflicts } = answer;
+  const message = answer.message.replace(/^MISSES ITS TARGET: /, "");
   const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
   const checking = full?.state === "computing" ? "The check with several starts is running. " : "";
   const failed = full?.state === "failed" ? `The check failed: ${full.message}. ` : "";
   const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
-  const sits = design?.active.length ? `It sits on ${design.active.join(", ")}. ` : "No limit binds. ";
+  const sits = design?.active.length ? `It sits on: ${wordsOf(design.active)}. ` : "No limit binds. ";
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
-  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${conflicts.join(", ")}. ` : ""}${message} `];
+  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${wordsOf(conflicts)}. ` : ""}${message} `];
   else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
-  else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${missed}${message} `];
-  else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer. ${missed}${message} `];
+  else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
+  else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer: ${message || missed} `];
   showWords(name, kind, words + shown + checking + failed);
 }
 
@@ -221,8 +229,9 @@ function showWords(name, kind, words) {
 // Computing is worth a word only where it takes longer than a glance.
 let waiting = 0;
 function later() {
-  clearTimeout(waiting);
+  if (waiting) return;
   waiting = setTimeout(() => {
+    waiting = 0;
     if (questions.busy) { showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
   }, 250);
 }

@@ -13,7 +13,7 @@ export class MechanismPicture {
     this.wholeBar = draw("g", {});
     this.whole.append(this.world, this.wholeBar);
     // The cam alone, larger: the same elements once more.
-    this.near = draw("svg", { class: "mechanism near", "aria-hidden": "true", preserveAspectRatio: "xMidYMid slice" });
+    this.near = draw("svg", { class: "mechanism near", "aria-hidden": "true", preserveAspectRatio: "xMidYMid meet" });
     this.nearBar = draw("g", {});
     this.near.append(draw("use", { href: "#mechanism-world" }), this.nearBar);
     this.now = make("p", { class: "now" });
@@ -61,7 +61,9 @@ export class MechanismPicture {
     if (code === this.framed) return;
     this.framed = code;
     const left = both ? -wide : -1.2 * high;
-    scaleBar(this.whole, this.wholeBar, [left, -1.15 * high, wide - left, 2.3 * high + 0.12 * (wide - left) * 0.4], 6);
+    const frame = [left, -1.05 * high, wide - left, 2.1 * high + 0.07 * (wide - left)];
+    scaleBar(this.whole, this.wholeBar, frame, 6);
+    this.whole.style.aspectRatio = `${frame[2]} / ${frame[3]}`;
     scaleBar(this.near, this.nearBar, [-1.9 * high, -1.25 * high, 3.8 * high, 2.5 * high], 4);
   }
 }

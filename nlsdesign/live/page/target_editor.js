@@ -10,7 +10,7 @@ export class TargetEditor extends Chart {
   // act: { move(k, angle, torque, last), remove(k), add(angle) }
   constructor(host, act) {
     super(host, {
-      title: "Torque", x: { name: "angle θ", unit: "rad" }, y: { name: "torque", unit: "N*m" }, height: 340, zero: true,
+      title: "Torque", x: { name: "angle θ", unit: "rad" }, y: { name: "torque", unit: "N*m" }, height: 380, zero: true,
     });
     this.act = act;
     this.targets = [];

@@ -37,7 +37,7 @@ export function plain(value, digits = 4) {
 // Torques of a small error are read in smaller units.
 export function scaled(si, largest) {
   if (si !== "N*m" || !(largest < 0.05) || largest === 0) return [unitOf(si), factorOf(si)];
-  return largest < 5e-5 ? ["µN·m", 1e6] : ["mN·m", 1e3];
+  return largest < 5e-4 ? ["µN·m", 1e6] : ["mN·m", 1e3];
 }
 
 export function withUnit(value, si, digits = 4) {
