@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..components.assembly.named_parts import Assembly
 from ..design import Contour
 from ..errors import NlsError
 from ..model import FlatModel, flatten
+from ..model.structure import CamNames
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from .answers import (
@@ -48,16 +49,42 @@ class AngleView:
         What is shown of it over the angle.
     contour
         Of its cam.
-    rest_length
-        Of the rubber in m, as drawn.
-    machine
-        The changed assembly.
+    cam
+        Names around it.
+    make
+        Gives the changed assembly; asked when it is first needed.
     """
 
     view: DesignView
     contour: Contour
-    rest_length: float
-    machine: Assembly
+    cam: CamNames
+    make: Callable[[], Assembly]
+
+    @cached_property
+    def machine(self) -> Assembly:
+        """The changed assembly."""
+        return self.make()
+
+    def seen_as(self, view: DesignView) -> AngleView:
+        """Return the same design under another revision, with what was computed of it.
+
+        Parameters
+        ----------
+        view
+            Of that revision.
+        """
+        changed = replace(self, view=view)
+        for name in ("machine", "model", "_grid"):
+            if name in self.__dict__:
+                changed.__dict__[name] = self.__dict__[name]
+        return changed
+
+    @property
+    def rest_length(self) -> float:
+        """Length of the rubber in m, as it is drawn."""
+        numbers = {each.name: each.value for each in self.view.numbers}
+        lengths = [numbers[p.rest_length] for p in self.cam.specimens if p.rest_length in numbers]
+        return lengths[0] if lengths else 2.0 * float(self.contour.radii.max())
 
     @cached_property
     def model(self) -> FlatModel:

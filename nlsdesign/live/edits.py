@@ -12,9 +12,10 @@ from typing import Any
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
 from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
+from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS
-from .question import LiveQuestion, TargetPoint, finite_in
+from .question import LiveQuestion, Machine, TargetPoint, finite_in
 
 _LONGEST_NAME = 200
 
@@ -24,13 +25,15 @@ class Edit(ABC):
     """Base of the edits; numbers are in SI."""
 
     @abstractmethod
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question after the edit.
 
         Parameters
         ----------
         question
             Before it.
+        shown
+            The last good design, where an edit begins from it.
 
         Raises
         ------
@@ -55,7 +58,7 @@ class MovePoint(Edit):
     angle: float
     torque: float
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with the point there, between its neighbours."""
         points = list(question.points)
         points[_index(self.index, len(points))] = TargetPoint(float(self.angle), float(self.torque))
@@ -75,7 +78,7 @@ class AddPoint(Edit):
     angle: float
     torque: float
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with one point more."""
         point = TargetPoint(float(self.angle), float(self.torque))
         return question.with_points(tuple(sorted([*question.points, point], key=lambda each: each.angle)))
@@ -93,7 +96,7 @@ class RemovePoint(Edit):
 
     index: int
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with one point less."""
         index = _index(self.index, len(question.points))
         return question.with_points(question.points[:index] + question.points[index + 1 :])
@@ -114,7 +117,7 @@ class ChangeLimit(Edit):
     limit: str
     value: float
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with that limit."""
         if self.limit not in LIMIT_KINDS:
             raise unknown_name("limit", self.limit, LIMIT_KINDS)
@@ -140,7 +143,7 @@ class DropLimit(Edit):
 
     limit: str
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question without it."""
         if self.limit not in question.limits:
             raise ValueRangeError(
@@ -166,17 +169,13 @@ class SetNumber(Edit):
     name: str
     value: float
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with that number held."""
-        number = question.number(self.name)
-        variable = question.model.variable(self.name)
+        question.number(self.name)
+        variable = question.machine.model.variable(self.name)
         value = finite_in(self.name, self.value, variable.minimum, variable.maximum)
-        given = question.actuator.quantities()[self.name].with_value(value, "given by the designer")
-        free = tuple(each for each in question.free if each != self.name)
-        changed = replace(question, actuator=question.actuator.with_values({self.name: given}), free=free)
-        # Structure is unchanged, so the model need not be made again.
-        changed.__dict__["model"] = question.model.with_values({number.name: value})
-        return changed
+        held = without_free(question, self.name)
+        return replace(held, given={**question.given, self.name: value})
 
 
 @dataclass(frozen=True)
@@ -195,13 +194,18 @@ class FreeNumber(Edit):
     minimum: float | None = None
     maximum: float | None = None
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with that number free."""
         free = (*(each for each in question.free if each != self.name), self.name)
         if self.name == question.contour:
             return replace(question, free=free)
         question.number(self.name)
-        variable = question.model.variable(self.name)
+        if self.name == question.cam.anchor_distance and question.contour not in free:
+            raise ValueRangeError(
+                f"free '{self.name}'", "the anchor shapes the contour, so it is free only together with it",
+                next_step=f"free '{question.contour}' first",
+            )  # fmt: skip
+        variable = question.machine.model.variable(self.name)
         low = variable.minimum if self.minimum is None else self.minimum
         high = variable.maximum if self.maximum is None else self.maximum
         if self.minimum is None and self.maximum is None:
@@ -214,7 +218,7 @@ class FreeNumber(Edit):
 
 @dataclass(frozen=True)
 class HoldNumber(Edit):
-    """Hold a number, or the contour, as the actuator has it; to hold it elsewhere set it.
+    """Hold a number, or the contour, where the design has it now.
 
     Parameters
     ----------
@@ -224,17 +228,20 @@ class HoldNumber(Edit):
 
     name: str
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with that number held."""
-        if self.name != question.contour:
-            question.number(self.name)
-        free = tuple(each for each in question.free if each != self.name)
-        if not free:
-            raise ValueRangeError(
-                f"hold '{self.name}'", "leaves nothing that may change",
-                next_step=f"free '{question.contour}' first",
-            )  # fmt: skip
-        return replace(question, free=free)
+        held = without_free(question, self.name)
+        if self.name == question.contour:
+            if question.cam.anchor_distance in held.free:
+                raise ValueRangeError(
+                    f"hold '{self.name}'", "the anchor shapes the contour, so it is held first",
+                    next_step=f"hold '{question.cam.anchor_distance}'",
+                )  # fmt: skip
+            return held if shown is None else replace(held, machine=_with_cam_of(question.machine, shown))
+        value = question.number(self.name).value
+        if shown is not None:
+            value = {each.name: each.value for each in shown.view.numbers}.get(self.name, value)
+        return replace(held, given={**question.given, self.name: value})
 
 
 @dataclass(frozen=True)
@@ -249,15 +256,17 @@ class ChooseMaterial(Edit):
 
     material: str
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with that rubber."""
         pieces = question.cam.specimens
         if not pieces:
-            raise ArrangementError(f"spring '{question.cam.drive}'", "has no piece of rubber")
-        changed = question.actuator
+            raise ArrangementError(
+                f"spring '{question.cam.drive}'", "has no piece of rubber", next_step="choose another deck"
+            )
+        changed = question.machine.assembly
         for piece in pieces:
             changed = with_rubber(changed, material(self.material), piece=piece.name)
-        return kept_names(replace(question, actuator=changed, material=self.material))
+        return kept_names(replace(question, machine=Machine(changed, self.material)))
 
 
 @dataclass(frozen=True)
@@ -272,25 +281,63 @@ class ChooseDeck(Edit):
 
     name: str
 
-    def applied(self, question: LiveQuestion) -> LiveQuestion:
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
         """Return the question with which that actuator begins."""
         return gallery_question(self.name)
 
 
 def kept_names(question: LiveQuestion) -> LiveQuestion:
-    """Return a question without free numbers and ranges that its machine no longer has.
+    """Return a question without numbers that its machine no longer has.
 
     Parameters
     ----------
     question
         With a changed machine.
     """
-    names = {*question.numbers, question.contour}
+    names = {*question.machine.sizes, question.contour}
     return replace(
         question,
         free=tuple(name for name in question.free if name in names),
         ranges={name: each for name, each in question.ranges.items() if name in names},
+        given={name: each for name, each in question.given.items() if name in names},
     )
+
+
+def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
+    """Return a question in which a number, or the contour, is not free.
+
+    Parameters
+    ----------
+    question
+        Before.
+    name
+        Full name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such number.
+    ValueRangeError
+        If nothing would be left that may change.
+    """
+    if name != question.contour:
+        question.number(name)
+    free = tuple(each for each in question.free if each != name)
+    if not free:
+        raise ValueRangeError(
+            f"hold '{name}'", "leaves nothing that may change",
+            next_step=f"free '{question.contour}' first",
+        )  # fmt: skip
+    return replace(question, free=free)
+
+
+def _with_cam_of(machine: Machine, shown: AngleView) -> Machine:
+    """Return the machine with the cam of a design."""
+    cam = machine.cam
+    finished = shown.machine.quantities()
+    names = [name for name in finished if name.startswith(f"{cam.name}.")]
+    changed = machine.assembly.with_values({name: finished[name] for name in names})
+    return replace(machine, assembly=changed)
 
 
 def edit_from(message: Mapping[str, Any]) -> Edit:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..design.statics.equilibrium import equilibrium_torque
 from ..errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
-from .question import LiveQuestion, TargetPoint
+from .question import LiveQuestion, Machine, TargetPoint
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""
@@ -117,19 +117,19 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     ArrangementError
         If it has no cam spring, or none whose contour can be designed, or one that gives no torque.
     """
-    blank = LiveQuestion(title, actuator, (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
+    blank = LiveQuestion(title, Machine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
     cam = blank.cam
     if cam.last_angle is not None:
-        last = blank.model.values[cam.last_angle]
+        last = blank.machine.model.values[cam.last_angle]
     else:
         last = float(contour_of_cam(actuator[cam.name]).angles[-1])
     angles = np.linspace(0.0, last, _POINTS)
-    torques = np.maximum(equilibrium_torque(blank.model, cam.drive, angles), 0.0)
+    torques = np.maximum(equilibrium_torque(blank.machine.model, cam.drive, angles), 0.0)
     torques[0] = 0.0
     points = tuple(
         TargetPoint(float(f"{a:.4g}"), float(f"{t:.4g}")) for a, t in zip(angles, torques, strict=True)
     )
-    question = LiveQuestion(title, actuator, points, free=(f"{cam.name}.contour", cam.pretension))
+    question = replace(blank, points=points, free=(blank.contour, cam.pretension))
     return question.with_points(points)
 
 

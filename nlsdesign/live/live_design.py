@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..design import CamDesign, DesignSettings, design_cam
-from ..errors import ConvergenceError, InfeasibleError, ValueRangeError
-from ..model import flatten
-from ..model.roles import series_cam
-from .answers import AngleAnswer, DesignView, Lazy, LiveAnswer
+from ..errors import ValueRangeError
+from .answers import AngleAnswer, LiveAnswer
 from .at_angle import AngleView
+from .background import WorkState
 from .edits import Edit
+from .full_design import FullDesign, angle_view_of, full_answer
 from .question import LiveQuestion, finite_in
-from .views import controls_of, view_of
+from .quick_design import QuickDesign, QuickSolver
+from .views import controls_of
+from .work import LiveWork, Task
 
 MOST_UNDO = 200
 """Steps that can be undone."""
 MOST_SNAPSHOTS = 8
 """Designs that are kept side by side."""
-_FULL = DesignSettings(look_for_size_ranges=False, look_for_remedies=False, draws=0)
 _NAME = 60
+_LARGEST_ANGLE = 6.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +43,21 @@ class Snapshot:
     answer: LiveAnswer
 
 
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """A question with its answer, and the last good design, which may be that of an earlier question."""
+
+    question: LiveQuestion
+    answer: LiveAnswer
+    solved: QuickDesign | None
+    shown: AngleView | None
+
+
 class LiveDesign:
     """State, edits and answers of one designer; one thread at a time.
+
+    Each edit gives an answer at once, from the previous design. :meth:`settle` starts the whole design in a
+    process of its own, whose answer replaces the quick one when :meth:`poll` finds it done.
 
     Parameters
     ----------
@@ -52,19 +66,29 @@ class LiveDesign:
     """
 
     def __init__(self, question: LiveQuestion) -> None:
-        self._question = question
-        self._past: list[LiveQuestion] = []
-        self._future: list[LiveQuestion] = []
+        self._solver = QuickSolver()
+        self._past: list[_Moment] = []
+        self._future: list[_Moment] = []
         self._revision = 0
-        self._shown: AngleView | None = None
         self._grip: str | None = None
         self.snapshots: dict[str, Snapshot] = {}
-        self.answer = self._answered()
+        self.work = LiveWork()
+        self._now = self._answered(question, None, None)
 
     @property
     def question(self) -> LiveQuestion:
         """What is asked now."""
-        return self._question
+        return self._now.question
+
+    @property
+    def answer(self) -> LiveAnswer:
+        """The answer to it."""
+        return self._now.answer
+
+    @property
+    def shown(self) -> AngleView | None:
+        """The last good design as it is looked at angle by angle; ``None`` before the first."""
+        return self._now.shown
 
     def apply(self, edit: Edit, *, drag: str | None = None) -> LiveAnswer:
         """Do an edit and return the answer.
@@ -81,27 +105,27 @@ class LiveDesign:
         NlsError
             If the edit cannot be done; nothing has changed then.
         """
-        changed = edit.applied(self._question)
-        changed.limit_values, changed.numbers, changed.target  # noqa: B018 - refused before anything changes
+        changed = edit.applied(self.question, self.shown)
+        moment = self._answered(changed, self._now.solved, self._now.shown)
         if drag is None or drag != self._grip:
-            self._past = [*self._past, self._question][-MOST_UNDO:]
+            self._past = [*self._past, self._now][-MOST_UNDO:]
         self._grip, self._future = drag, []
-        return self._ask(changed)
+        return self._go_to(moment)
 
     def undo(self) -> LiveAnswer:
-        """Take the last edit back and return the answer to the question before it, as it was."""
+        """Take the last edit back; the design is that of before, to the last digit."""
         if self._past:
-            self._future.append(self._question)
+            self._future.append(self._now)
             self._grip = None
-            return self._ask(self._past.pop())
+            return self._return_to(self._past.pop())
         return self.answer
 
     def redo(self) -> LiveAnswer:
-        """Do the edit that was taken back again."""
+        """Do the edit that was taken back again, with the design that it had."""
         if self._future:
-            self._past.append(self._question)
+            self._past.append(self._now)
             self._grip = None
-            return self._ask(self._future.pop())
+            return self._return_to(self._future.pop())
         return self.answer
 
     def at(self, angle: float) -> AngleAnswer:
@@ -117,16 +141,36 @@ class LiveDesign:
         ValueRangeError
             If the angle is out of range, or there is no design yet.
         """
-        if self._shown is None:
+        finite_in("angle", angle, -_LARGEST_ANGLE, _LARGEST_ANGLE)
+        if self.shown is None:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
-        finite_in("angle", angle, -6.3, 6.3)
-        return self._shown.answer(angle, self._loop_at(angle))
+        return self.shown.answer(angle, self.work.loop_at(angle, self.shown.view.revision))
 
-    def _loop_at(self, angle: float) -> Lazy:
-        return Lazy("asked for later", self._shown.view.revision if self._shown else 0)
+    def start(self, task: Task) -> WorkState:
+        """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled.
+
+        Parameters
+        ----------
+        task
+            For instance ``SettleDesign()`` or ``ToleranceCloud(draws=200)``.
+
+        Raises
+        ------
+        ValueRangeError
+            If it needs a design and there is none.
+        """
+        return self.work.start(task, self.question, self._revision, self.shown)
+
+    def poll(self) -> tuple[WorkState, ...]:
+        """Return how far all work is; a whole design that is done replaces the quick answer to its question."""
+        states = self.work.states()
+        for state in states:
+            if isinstance(state.value, FullDesign) and self._takes(state):
+                self._settled(state.value)
+        return states
 
     def keep(self, name: str) -> Snapshot:
-        """Keep the design as it is under a name.
+        """Keep the design as it is under a name, to be shown beside others.
 
         Parameters
         ----------
@@ -148,58 +192,69 @@ class LiveDesign:
                 f"{len(self.snapshots)} designs kept", f"are the most, {MOST_SNAPSHOTS}",
                 next_step="drop one of them",
             )  # fmt: skip
-        self.snapshots[name] = Snapshot(name, self._question, self.answer)
+        self.snapshots[name] = Snapshot(name, self.question, self.answer)
         return self.snapshots[name]
 
-    def _ask(self, question: LiveQuestion) -> LiveAnswer:
-        self._question = question
-        self._revision += 1
-        self.answer = self._answered()
+    def _takes(self, state: WorkState) -> bool:
+        return state.revision == self._revision and self.answer.source == "quick"
+
+    def _settled(self, full: FullDesign) -> None:
+        """Take the whole design as the answer; where it is better, the next drag begins from it."""
+        quick = self._now.solved if self.answer.state == "solved" else None
+        answer = full_answer(full, self.question, self.answer, quick)
+        if full.design is None:
+            self._now = replace(self._now, answer=answer)
+            return
+        shown = angle_view_of(answer.design, full.design, self.question) if answer.design else self.shown
+        solved = self._solver.beside_design(self.question, full.design) or self._now.solved
+        self._now = _Moment(self.question, answer, solved, shown)
+
+    def _go_to(self, moment: _Moment) -> LiveAnswer:
+        controls = controls_of(moment.question, can_undo=bool(self._past), can_redo=bool(self._future))
+        self._now = replace(moment, answer=replace(moment.answer, controls=controls))
         return self.answer
 
-    def _answered(self) -> LiveAnswer:
+    def _return_to(self, moment: _Moment) -> LiveAnswer:
+        """Make a moment of before the present one, under a revision of its own."""
+        self._revision += 1
+        stale, design = moment.answer.stale, moment.answer.design
+        shown = moment.shown
+        if design is not None and shown is not None and not stale:
+            design = replace(design, revision=self._revision)
+            shown = shown.seen_as(design)
+        answer = replace(moment.answer, revision=self._revision, design=design, seconds=0.0)
+        return self._go_to(replace(moment, answer=answer, shown=shown))
+
+    def _answered(
+        self, question: LiveQuestion, last: QuickDesign | None, shown: AngleView | None
+    ) -> _Moment:
         began = time.perf_counter()
-        state, message, conflicts = "solved", "", ()
-        try:
-            q = self._question
-            design = design_cam(
-                q.actuator,
-                target=q.target,
-                free=q.free,
-                keep=q.keep,
-                settings=DesignSettings(
-                    starts=1, look_for_size_ranges=False, look_for_remedies=False, draws=0
-                ),
-            )
-            self._shown = angle_view(view_of(q, self._revision, design), design)
-            message = "" if design.miss is None else str(design.miss)
-        except InfeasibleError as error:
-            state, message = "infeasible", str(error)
-        except ConvergenceError as error:
-            state, message = "not solved", str(error)
-        return LiveAnswer(
-            revision=self._revision,
-            state=state,
-            message=message,
-            source="quick",
-            design=self._shown.view if self._shown else None,
-            controls=controls_of(self._question, can_undo=bool(self._past), can_redo=bool(self._future)),
-            seconds=time.perf_counter() - began,
-            conflicts=conflicts,
-        )
+        revision = self._revision + 1
+        solved, outcome = self._solver.answer(question, last)
+        message = outcome.words
+        if solved is not None:
+            shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.machine)
+            message = "" if shown.view.met else missed(shown)
+        controls = controls_of(question, can_undo=bool(self._past), can_redo=bool(self._future))
+        self._revision = revision
+        answer = LiveAnswer(
+            revision=revision, state=outcome.state, message=message, source="quick",
+            design=shown.view if shown else None, controls=controls,
+            seconds=time.perf_counter() - began, conflicts=outcome.conflicts,
+        )  # fmt: skip
+        return _Moment(question, answer, solved or last, shown)
 
 
-def angle_view(view: DesignView, design: CamDesign) -> AngleView:
-    """Return a finished design as it is looked at angle by angle.
+def missed(shown: AngleView) -> str:
+    """Return how far a design misses its target, and which limits hold it.
 
     Parameters
     ----------
-    view
-        What is shown of it.
-    design
-        Finished.
+    shown
+        The design.
     """
-    model = flatten(design.actuator)
-    pieces = series_cam(model, design.drive).specimens
-    length = model.values[pieces[0].rest_length] if pieces else 2.0 * float(design.contour.radii.max())
-    return AngleView(view, design.contour, length, design.actuator)
+    view = shown.view
+    held = f"held by {', '.join(view.active)}" if view.active else "no limit holds it"
+    return (
+        f"misses its target: {100.0 * view.relative_error:.3g} % rms of the largest torque, 1 % allowed; {held}"
+    )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..components.assembly.named_parts import Assembly
-from ..design import Limit, TabulatedTorque, safe_limits
+from ..design import Limit, NumberRange, TabulatedTorque, safe_limits
 from ..design.statics.smooth_cables import with_smooth_cables
 from ..errors import ValueRangeError, unknown_name
 from ..model import FlatModel, flatten
@@ -25,6 +25,7 @@ LEAST_STEP = 1e-3
 """Least distance of two points in rad."""
 LARGEST_ANGLE = 6.28
 LARGEST_TORQUE = 1e5
+_GIVEN = "given by the designer"
 
 
 class TargetPoint(NamedTuple):
@@ -47,12 +48,53 @@ class NumberState(NamedTuple):
     source: str
 
 
-class SetLimit(NamedTuple):
+class LimitNumber(NamedTuple):
     """A limit that holds: what it is, its number in SI, and whether it follows from the deck."""
 
     kind: LimitKind
     value: float
     by_default: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """An actuator with the rubber that was chosen; questions about it share what follows from its structure.
+
+    Parameters
+    ----------
+    assembly
+        As declared.
+    material
+        Rubber of the library; empty for that of the deck.
+    """
+
+    assembly: Assembly
+    material: str = ""
+
+    @cached_property
+    def model(self) -> FlatModel:
+        """Flat model, with cables that are smooth."""
+        return flatten(with_smooth_cables(self.assembly))
+
+    @cached_property
+    def cam(self) -> CamNames:
+        """Names around its cam."""
+        return series_cam(self.model)
+
+    @cached_property
+    def sizes(self) -> tuple[str, ...]:
+        """Names of the single numbers that may be given or freed: pretension, rubber, anchor."""
+        cam = self.cam
+        rubber = [name for piece in cam.specimens for name in (*piece.section, piece.rest_length)]
+        names = [cam.pretension, *rubber, *([] if cam.anchor_distance is None else [cam.anchor_distance])]
+        known = self.assembly.quantities()
+        return tuple(name for name in dict.fromkeys(names) if name in known)
+
+    @cached_property
+    def default_limits(self) -> dict[str, float]:
+        """Limits that follow from cable and rubber, in SI, by name of their kind."""
+        kinds = [(LIMIT_KINDS[type(each).__name__], each) for each in safe_limits(self.model)]
+        return {kind.name: kind.value_of(each) for kind, each in kinds}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +105,8 @@ class LiveQuestion:
     ----------
     title
         Of the actuator that it began from.
-    actuator
-        With the rubber that was chosen and the numbers that were last given.
+    machine
+        Actuator and rubber.
     points
         Of the target, ascending; the first is angle zero without torque. The curve between them is the
         monotone cubic of :class:`~nlsdesign.design.TabulatedTorque`, C¹ and without bumps of its own;
@@ -75,29 +117,30 @@ class LiveQuestion:
         Names of what may change.
     ranges
         Between which numbers in SI a free number may move, by name.
-    material
-        Rubber of the library; empty for that of the deck.
-    base
-        Key of the structure: the same for questions whose machines differ in numbers only.
+    given
+        Numbers in SI in place of those of the machine, by name.
     """
 
     title: str
-    actuator: Assembly
+    machine: Machine
     points: tuple[TargetPoint, ...]
     limits: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    material: str = ""
+    given: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
-    def model(self) -> FlatModel:
-        """Flat model of the actuator, with cables that are smooth."""
-        return flatten(with_smooth_cables(self.actuator))
+    def actuator(self) -> Assembly:
+        """The machine with the numbers that were given."""
+        known = self.machine.assembly.quantities()
+        return self.machine.assembly.with_values(
+            {name: known[name].with_value(value, _GIVEN) for name, value in self.given.items()}
+        )
 
-    @cached_property
+    @property
     def cam(self) -> CamNames:
         """Names around its cam."""
-        return series_cam(self.model)
+        return self.machine.cam
 
     @property
     def contour(self) -> str:
@@ -112,35 +155,37 @@ class LiveQuestion:
             angles, torques = (0.0, angles[1] / 2.0, angles[1]), (0.0, torques[1] / 2.0, torques[1])
         return TabulatedTorque(angles=angles, torques=torques)
 
+    @property
+    def target_size(self) -> float:
+        """Largest torque of the target in N·m; between its points the curve is monotone."""
+        return max(point.torque for point in self.points)
+
     @cached_property
-    def limit_values(self) -> dict[str, SetLimit]:
-        """All limits that hold by name: those that were set, and those of the deck besides."""
-        result = {}
-        for each in safe_limits(self.model):
-            kind = LIMIT_KINDS[type(each).__name__]
-            result[kind.name] = SetLimit(kind, kind.value_of(each), True)
-        for name, value in self.limits.items():
-            result[name] = SetLimit(LIMIT_KINDS[name], value, False)
+    def limit_values(self) -> dict[str, LimitNumber]:
+        """All limits that hold by name: those that were set, and those of the machine besides."""
+        result = {name: LimitNumber(LIMIT_KINDS[name], value, False) for name, value in self.limits.items()}
+        for name, value in self.machine.default_limits.items():
+            result.setdefault(name, LimitNumber(LIMIT_KINDS[name], value, True))
         return dict(sorted(result.items()))
 
     @property
     def keep(self) -> tuple[Limit, ...]:
-        """The same as limits of a design."""
-        return tuple(each.kind.limit(each.value) for each in self.limit_values.values())
+        """The same as limits of a design, with the ranges of what is free."""
+        limits = [each.kind.limit(each.value) for each in self.limit_values.values()]
+        ranges = [NumberRange(name, *self.ranges[name]) for name in self.free if name in self.ranges]
+        return (*limits, *ranges)
 
     @cached_property
     def numbers(self) -> dict[str, NumberState]:
         """The single numbers that may be given or freed, by name."""
-        names = [*self.cam.numbers, self.cam.anchor_distance]
-        known, result = self.actuator.quantities(), {}
-        for name in names:
-            if name is None or name == self.cam.elements or name not in known:
-                continue
-            v, given = self.model.variable(name), known[name]
+        known, result = self.machine.assembly.quantities(), {}
+        for name in self.machine.sizes:
+            v, declared = self.machine.model.variable(name), known[name]
             low, high = self.ranges.get(name, (v.minimum, v.maximum))
             result[name] = NumberState(
-                name, given.number, v.unit, given.unit, name in self.free, low, high, given.source
-            )
+                name, self.given.get(name, declared.number), v.unit, declared.unit, name in self.free,
+                low, high, _GIVEN if name in self.given else declared.source,
+            )  # fmt: skip
         return result
 
     def number(self, name: str) -> NumberState:

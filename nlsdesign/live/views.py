@@ -38,7 +38,7 @@ def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> Li
     )  # fmt: skip
     return LiveControls(
         title=question.title,
-        material=question.material,
+        material=question.machine.material,
         points=tuple(tuple(point) for point in question.points),
         limits=limits,
         numbers=tuple(tuple(each) for each in question.numbers.values()),
