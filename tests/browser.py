@@ -66,7 +66,8 @@ class Tab:
         """Send a command and return its result."""
         number = next(self._numbers)
         message: dict[str, Any] = {"id": number, "method": method, "params": parameters}
-        if self.session:
+        # Profiles are made by the browser itself, not by a tab.
+        if self.session and method != "Target.createBrowserContext":
             message["sessionId"] = self.session
         self.commands.write(json.dumps(message).encode() + b"\0")
         self.commands.flush()
@@ -78,7 +79,7 @@ class Tab:
 
     def beside(self, *, another_person: bool = False) -> Tab:
         """Open another tab, in a profile of its own for another person."""
-        context = self.ask("Target.createBrowserContext")["browserContextId"] if another_person else ""
+        context = str(self.ask("Target.createBrowserContext")["browserContextId"]) if another_person else ""
         return Tab(self.commands, self.answers, self.tabs, context or self.context)
 
     def open(self, path: Path) -> None:

@@ -100,7 +100,6 @@ class _Answers:
             await socket.send_json({"what": "refused", "reason": words})
             await socket.close(4429)
             return
-        await self._sessions.prepare()
         number = session.shown = next(self._sockets)
 
         async def listener(text: str) -> None:

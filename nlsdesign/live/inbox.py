@@ -41,6 +41,11 @@ class Inbox:
                 self._waiting.append(message)
             self._condition.notify()
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a message waits."""
+        return bool(self._waiting)
+
     def take(self, seconds: float | None) -> Mapping[str, Any] | None:
         """Return the next message; ``None`` where none came in time.
 

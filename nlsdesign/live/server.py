@@ -76,6 +76,8 @@ def serve(
             while True:
                 await asyncio.sleep(_PAUSE)
                 sessions.end_the_idle()
+                if sessions.quiet:
+                    await sessions.prepare()
 
         looking = asyncio.create_task(look())
         try:

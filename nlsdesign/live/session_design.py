@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,15 @@ from .inbox import Inbox
 from .live_design import LiveDesign
 from .question import LiveQuestion
 from .session_work import Outbox
+from .work import SettleDesign
+from .work_news import TASKS, WorkNews
 
 FIRST = "cam-actuator"
 """With which a page begins that names no actuator."""
-_TICK = 0.15
+_TICK = 0.1
 """Seconds between two looks at work that runs."""
+_REST = 0.4
+"""Seconds without an edit after which the whole design is begun: while a hand moves it would be in its way."""
 
 
 class SessionDesign:
@@ -40,14 +45,16 @@ class SessionDesign:
     def __init__(self, deck: str, folder: str, outbox: Outbox) -> None:
         self._outbox = outbox
         self._folder = Path(folder)
-        self._deck = deck
-        self._design: LiveDesign | None = None
         self._angle: float | None = None
         self._trouble = ""
-        self._asked: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
-            "show": self._show, "edit": self._edit, "angle": self._turn, "undo": self._undo, "redo": self._redo,
-            "keep": self._keep, "forget": self._forget,
-        }  # fmt: skip
+        self._settle_at: float | None = None
+        self._look_at: float | None = None
+        try:
+            self._live = LiveDesign(_question(deck))
+        except NlsError as error:
+            self._trouble = f"{error}; the page begins with {FIRST} instead"
+            self._live = LiveDesign(gallery_question(FIRST))
+        self._news = WorkNews(self._live, self._folder / "records")
 
     def run(self, inbox: Inbox) -> None:
         """Answer until no message can come any more.
@@ -62,48 +69,54 @@ class SessionDesign:
         EOFError
             When the server has closed it.
         """
-        try:
-            self._design = LiveDesign(_question(self._deck))
-        except NlsError as error:
-            self._trouble = f"{error}; the page begins with {FIRST} instead"
-            self._design = LiveDesign(gallery_question(FIRST))
         while True:
-            message = inbox.take(None)
+            idle = self._settle_at is None and self._look_at is None and not self._news.running
+            message = inbox.take(None if idle else _TICK)
             if message is not None:
-                self._answer(message)
+                self._answer(message, more=inbox.waiting)
+            else:
+                self._on_a_pause()
 
-    def _answer(self, message: Mapping[str, Any]) -> None:
+    def _answer(self, message: Mapping[str, Any], *, more: bool) -> None:
         if "server" in message:
             self._serve(message["server"])
             return
         asked = message["page"]
         try:
-            what = asked.get("what")
-            if not isinstance(what, str) or what not in self._asked:
-                raise unknown_name("message", str(what)[:80], self._asked)
-            self._asked[what](asked)
+            self._do(asked)
         except NlsError as error:
-            self._refuse(asked, error)
+            self._refuse(asked, str(error))
         except Exception as error:  # a fault of ours must not take the design with it
-            self._refuse(asked, NlsError("a fault of the program", f"{type(error).__name__}: {error}"))
+            self._refuse(asked, f"a fault of the program: {type(error).__name__}: {error}")
+        if not more:
+            self._on_a_pause()
 
-    def _refuse(self, asked: Mapping[str, Any], error: NlsError) -> None:
-        self._outbox.page({"what": "refused", "number": _number(asked), "reason": str(error)})
-
-    @property
-    def _live(self) -> LiveDesign:
-        assert self._design is not None
-        return self._design
+    def _refuse(self, asked: Mapping[str, Any], reason: str) -> None:
+        self._outbox.page({"what": "refused", "number": _number(asked), "reason": reason})
 
     # --- what a page asks ----------------------------------------------------------------------
+
+    def _do(self, asked: Mapping[str, Any]) -> None:
+        what = asked.get("what")
+        kinds: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
+            "show": self._show, "edit": self._edit, "angle": self._turn, "step": self._step,
+            "keep": self._keep, "work": self._work,
+        }  # fmt: skip
+        if not isinstance(what, str) or what not in kinds:
+            raise unknown_name("message", str(what)[:80], kinds)
+        kinds[what](asked)
 
     def _show(self, asked: Mapping[str, Any]) -> None:
         """Show everything, as to a page that was loaded just now."""
         self._say(self._live.answer, asked)
-        self._say_kept()
+        self._say_kept({})
         self._outbox.page({"what": "gallery", **_choices()})
+        for each in self._news.all():
+            self._outbox.page({"what": "work", "work": each})
         if self._trouble:
-            self._outbox.page({"what": "refused", "number": None, "reason": self._trouble})
+            self._refuse({}, self._trouble)
+        if self._live.answer.source == "quick":
+            self._settle_soon()
 
     def _edit(self, asked: Mapping[str, Any]) -> None:
         fields, drag = asked.get("edit"), asked.get("drag")
@@ -111,29 +124,57 @@ class SessionDesign:
             raise ValueRangeError("edit", "is no table", next_step="send its name and its fields")
         answer = self._live.apply(edit_from(fields), drag=drag if isinstance(drag, str) else None)
         self._say(answer, asked)
+        self._settle_soon()
 
-    def _undo(self, asked: Mapping[str, Any]) -> None:
-        self._say(self._live.undo(), asked)
-
-    def _redo(self, asked: Mapping[str, Any]) -> None:
-        self._say(self._live.redo(), asked)
+    def _step(self, asked: Mapping[str, Any]) -> None:
+        answer = self._live.undo() if asked.get("back") is True else self._live.redo()
+        self._say(answer, asked)
+        if answer.source == "quick":
+            self._settle_soon()
 
     def _turn(self, asked: Mapping[str, Any]) -> None:
         self._angle = _finite("angle", asked.get("angle"))
-        self._outbox.page({"what": "at", "number": _number(asked), "at": to_json(self._live.at(self._angle))})
+        said = {"angle": self._angle, "mechanism": self._mechanism()}
+        self._outbox.page({"what": "at", "number": _number(asked), "at": said})
+        self._look_at = time.monotonic()
 
     def _keep(self, asked: Mapping[str, Any]) -> None:
-        self._live.keep(str(asked.get("name", "")))
-        self._say_kept(asked)
-
-    def _forget(self, asked: Mapping[str, Any]) -> None:
         name = str(asked.get("name", ""))
-        if name not in self._live.snapshots:
+        if asked.get("forget") is not True:
+            self._live.keep(name)
+        elif name in self._live.snapshots:
+            del self._live.snapshots[name]
+        else:
             raise unknown_name("kept design", name[:80], self._live.snapshots)
-        del self._live.snapshots[name]
         self._say_kept(asked)
 
-    def _say_kept(self, asked: Mapping[str, Any] | None = None) -> None:
+    def _work(self, asked: Mapping[str, Any]) -> None:
+        name = str(asked.get("name", ""))
+        if name not in TASKS:
+            raise unknown_name("work", name[:80], TASKS)
+        self._news.stop(name) if asked.get("stop") is True else self._news.start(name)
+        self._outbox.page({"what": "work", "number": _number(asked), "work": self._news.of(name)})
+
+    # --- what is said --------------------------------------------------------------------------
+
+    def _say(self, answer: LiveAnswer, asked: Mapping[str, Any]) -> None:
+        """Send an answer with the mechanism; what takes longer at the angle follows on a pause."""
+        at = None
+        if answer.design is not None:
+            last = float(answer.design.columns[0].values[-1])
+            given = asked.get("angle")
+            wanted = self._angle if given is None else _finite("angle", given)
+            self._angle = min(0.6 * last if wanted is None else wanted, last)
+            at = {"angle": self._angle, "mechanism": self._mechanism()}
+            self._look_at = time.monotonic()
+        said = to_json(answer)
+        self._outbox.page({"what": "answer", "number": _number(asked), "answer": said, "at": at})
+
+    def _mechanism(self) -> Any:
+        shown = self._live.shown
+        return None if shown is None or self._angle is None else to_json(shown.mechanism(self._angle))
+
+    def _say_kept(self, asked: Mapping[str, Any]) -> None:
         kept = [
             {
                 "name": name, "title": each.question.title, "material": each.question.material,
@@ -141,38 +182,55 @@ class SessionDesign:
             }
             for name, each in self._live.snapshots.items()
         ]  # fmt: skip
-        self._outbox.page({"what": "kept", "number": _number(asked or {}), "kept": kept})
+        self._outbox.page({"what": "kept", "number": _number(asked), "kept": kept})
 
-    def _say(self, answer: LiveAnswer, asked: Mapping[str, Any]) -> None:
-        """Send an answer, with what holds at the angle that the page looks at."""
-        at = None
-        if answer.design is not None:
-            last = float(answer.design.columns[0].values[-1])
-            given = asked.get("angle")
-            wanted = self._angle if given is None else _finite("angle", given)
-            self._angle = min(0.6 * last if wanted is None else wanted, last)
-            at = to_json(self._live.at(self._angle))
-        self._outbox.page({"what": "answer", "number": _number(asked), "answer": to_json(answer), "at": at})
+    def _settle_soon(self) -> None:
+        self._settle_at = time.monotonic() + _REST
+        self._live.work.cancel(SettleDesign.__name__)
+
+    def _on_a_pause(self) -> None:
+        """Do what may wait while a hand moves: what holds at the angle, the whole design, news of work."""
+        now = time.monotonic()
+        if self._look_at is not None and now - self._look_at >= 0.5 * _TICK:
+            self._look_at = None
+            self._look()
+        if self._settle_at is not None and now >= self._settle_at:
+            self._settle_at = None
+            self._live.start(SettleDesign())
+        before = self._live.answer
+        for each in self._news.changed():
+            self._outbox.page({"what": "work", "work": each})
+        if self._live.answer is not before:
+            self._say(self._live.answer, {})
+
+    def _look(self) -> None:
+        if self._live.shown is None or self._angle is None:
+            return
+        try:
+            self._outbox.page({"what": "at", "number": None, "at": to_json(self._live.at(self._angle))})
+        except NlsError as error:
+            self._refuse({}, str(error))
 
     # --- what the server asks ------------------------------------------------------------------
 
     def _serve(self, asked: Mapping[str, Any]) -> None:
         try:
-            answer = self._answered(asked)
+            answer = self._served(asked)
         except NlsError as error:
             answer = {"refused": str(error)}
         except Exception as error:
             answer = {"refused": f"a fault of the program: {type(error).__name__}: {error}"}
         self._outbox.server({"number": asked["number"], **answer})
 
-    def _answered(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        if asked["what"] == "open":
-            self._design = LiveDesign(question_of_deck(asked["text"], "opened.toml"))
-            self._angle = None
-            self._say(self._live.answer, {})
-            self._say_kept()
-            return {}
-        raise unknown_name("file", str(asked.get("kind"))[:40], ())
+    def _served(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        if asked["what"] != "open":
+            raise unknown_name("file", str(asked.get("kind"))[:40], ())
+        live = LiveDesign(question_of_deck(asked["text"], "opened.toml"))
+        self._live.work.close()
+        self._live, self._angle, self._trouble = live, None, ""
+        self._news = WorkNews(live, self._folder / "records")
+        self._show({})
+        return {}
 
 
 @functools.cache

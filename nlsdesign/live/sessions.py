@@ -17,6 +17,9 @@ ALONE = 15 * 60.0
 UNTOUCHED = 12 * 3600.0
 """Seconds after which a session ends in whose tab nobody has changed anything."""
 
+QUIET = 10.0
+"""Seconds without a change after which the process of the next session is prepared."""
+
 
 @dataclass(eq=False)
 class Session:
@@ -63,6 +66,12 @@ class Sessions:
 
     def __len__(self) -> int:
         return len(self._sessions)
+
+    @property
+    def quiet(self) -> bool:
+        """Whether nobody has changed anything for a while, so that the processor may be used otherwise."""
+        now = self._clock()
+        return all(now - each.touched > QUIET for each in self._sessions.values())
 
     async def prepare(self) -> None:
         """Start the process of the next session before anybody asks for it."""

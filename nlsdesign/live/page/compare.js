@@ -27,7 +27,7 @@ export class Compare {
       return given ? `${withUnit(given.value, given.unit)}${given.free ? " (free)" : ""}` : "–";
     };
     const heads = columns.map((each) => make("th", { scope: "col", class: "numeric" }, each.name, " ",
-      each.design === now ? null : make("button", { type: "button", "aria-label": `Forget ${each.name}`, onclick: () => this.ask({ what: "forget", name: each.name }) }, "×")));
+      each.design === now ? null : make("button", { type: "button", "aria-label": `Forget ${each.name}`, onclick: () => this.ask({ what: "keep", forget: true, name: each.name }) }, "×")));
     byId("compare-table").replaceChildren(
       make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "design"), ...heads)),
       make("tbody", {},

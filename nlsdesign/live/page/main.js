@@ -71,29 +71,28 @@ function receive(message) {
     refused: () => refuse(message), work: () => takeWork(message.work), kept: () => compare.show(message.kept, answer?.design),
   };
   kinds[message.what]?.();
-  if (message.number !== undefined) questions.answered(message.number);
+  if (typeof message.number === "number") questions.answered(message.number);
 }
 
 function takeAnswer(message) {
-  if (message.number !== undefined && message.number < shownNumber) return;
+  if (message.number !== null && message.number < shownNumber) return;
   shownNumber = message.number ?? shownNumber;
   answer = message.answer;
-  if (message.full !== undefined) full = message.full;
   clearTimeout(waiting);
   waiting = 0;
   requestAnimationFrame(() => {
     showAnswer();
     if (message.at) showAngle(message.at);
     const number = message.number;
-    if (number !== undefined) afterPaint(() => questions.drawn(number, "drag to drawn"));
+    if (number !== null) afterPaint(() => questions.drawn(number, "drag to drawn"));
   });
-  if (message.answer.seconds !== undefined && message.number !== undefined) performance.measure("computed", { start: 0, duration: 1e3 * message.answer.seconds });
+  if (message.answer.seconds !== undefined && message.number !== null) performance.measure("computed", { start: 0, duration: 1e3 * message.answer.seconds });
 }
 
 function takeAngle(message) {
   requestAnimationFrame(() => {
     showAngle(message.at);
-    afterPaint(() => questions.drawn(message.number, "slide to drawn"));
+    if (message.number !== null) afterPaint(() => questions.drawn(message.number, "slide to drawn"));
   });
 }
 
@@ -111,9 +110,10 @@ function refuse(message) {
 }
 
 function takeWork(work) {
-  if (work.name === "full") { full = work; showState(); fade(); }
-  if (work.name === "tolerance") { lastCloud = work; tolerance.show(work, answer?.revision); }
-  if (work.name === "diagnosis") diagnosis.show(work);
+  if (work.name === "SettleDesign") { full = work; showState(); fade(); }
+  if (work.name === "ToleranceCloud") { lastCloud = work; tolerance.show(work, answer); }
+  if (work.name === "DiagnoseRecords") diagnosis.show(work);
+  if (work.name === "TorqueLoop") atAngle.showLoopWork(work);
 }
 
 let lastCloud = null;
@@ -136,7 +136,7 @@ function showAnswer() {
   byId("redo").disabled = !controls.can_redo;
   byId("keep").disabled = !design;
   tolerance.run.disabled = !design || lastCloud?.state === "computing";
-  if (lastCloud && !frozen) tolerance.show(lastCloud, answer.revision);
+  if (lastCloud && !frozen) tolerance.show(lastCloud, answer);
   if (design) {
     panels.show(design, frozen);
     showNumbers(design);
@@ -198,17 +198,16 @@ function showNumbers(design) {
     ["answered in", `${plain(1e3 * answer.seconds, 2)} ms`],
   ];
   byId("numbers").replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
-  byId("remarks").replaceChildren(...(full?.words ? [make("p", {}, full.words)] : []));
 }
 
 // One of: computing, quick answer, checked answer, infeasible, failed; always in words too.
 function showState() {
   if (!answer) return;
   const { design, conflicts } = answer;
-  const message = answer.message.replace(/^MISSES ITS TARGET: /, "");
+  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.");
   const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
-  const checking = full?.state === "computing" ? "The check with several starts is running. " : "";
-  const failed = full?.state === "failed" ? `The check failed: ${full.message}. ` : "";
+  const checking = full?.state === "computing" && full.revision === answer.revision ? `The check runs: ${full.message}. ` : "";
+  const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
   const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
   const sits = design?.active.length ? `It sits on: ${wordsOf(design.active)}. ` : "No limit binds. ";
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
@@ -276,9 +275,10 @@ function cursor() {
   text(byId("linear-angle"), `θ = ${withUnit(angle, "rad", 3)}`);
 }
 
+// The mechanism comes at once; what takes longer to compute comes when the hand rests.
 function showAngle(at) {
-  picture.show(at.mechanism);
-  atAngle.show(at);
+  if (at.mechanism) picture.show(at.mechanism);
+  if (at.poles) atAngle.show(at);
 }
 
 // --- gallery, files, keys -------------------------------------------------------------------------
@@ -297,8 +297,8 @@ function showGallery(message) {
 }
 
 byId("gallery").addEventListener("change", (event) => { angle = null; edit({ edit: "ChooseDeck", name: event.target.value }); event.target.blur(); });
-byId("undo").addEventListener("click", () => ask({ what: "undo", angle }));
-byId("redo").addEventListener("click", () => ask({ what: "redo", angle }));
+byId("undo").addEventListener("click", () => ask({ what: "step", back: true, angle }));
+byId("redo").addEventListener("click", () => ask({ what: "step", back: false, angle }));
 byId("keep").addEventListener("click", () => ask({ what: "keep", name: keptName() }));
 
 function keptName() {
@@ -336,7 +336,7 @@ document.addEventListener("keydown", (event) => {
   const typing = event.target instanceof HTMLInputElement && event.target.type === "text";
   if (typing || !["z", "y"].includes(key)) return;
   event.preventDefault();
-  ask({ what: key === "y" || event.shiftKey ? "redo" : "undo", angle });
+  ask({ what: "step", back: key === "z" && !event.shiftKey, angle });
 });
 
 document.addEventListener("click", (event) => { if (!event.target.closest("#files")) byId("files").open = false; });

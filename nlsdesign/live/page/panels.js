@@ -91,7 +91,6 @@ function cap(series) {
 
 export class AtAngle {
   constructor(host, ask) {
-    this.ask = ask;
     const card = (title, name) => {
       const state = make("p", { class: "job" });
       const place = make("div", { class: "card" }, make("div", { class: "head" }, make("h3", {}, title)), state);
@@ -103,6 +102,8 @@ export class AtAngle {
     this.poles = card("Poles of the plant", "poles");
     this.poles.chart = new Chart(inner(this.poles.place), { title: "", x: { name: "real part", unit: "1/s" }, y: { name: "imaginary part", unit: "rad/s" }, height: 200, symlog: true });
     this.loop = card("Torque loop", "loop");
+    this.run = make("button", { type: "button", onclick: () => ask({ what: "work", name: "TorqueLoop" }) }, "Compute");
+    this.loop.place.firstChild.append(this.run);
     this.loop.magnitude = new Chart(inner(this.loop.place), { title: "Magnitude", x: { name: "frequency", unit: "Hz" }, y: { name: "magnitude", unit: "dB" }, height: 150, log: true });
     this.loop.phase = new Chart(inner(this.loop.place), { title: "Phase", x: { name: "frequency", unit: "Hz" }, y: { name: "phase in °", unit: "" }, height: 130, log: true });
   }
@@ -118,10 +119,16 @@ export class AtAngle {
     if (at.poles.value) this.poles.chart.show(at.poles.value.map((each, k) => ({ name: each.mode, x: each.real, y: each.imaginary, points: true, tone: TONES[k % 4] })));
     this.state(this.loop, at.loop, (loop) => `${loop.stable ? "Stable." : "UNSTABLE."} ${loop.words}`);
     const loop = at.loop.value;
+    this.run.hidden = at.loop.state === "done" || at.loop.state === "computing";
     if (loop) {
       this.loop.magnitude.show([{ name: "", x: loop.frequencies, y: loop.magnitude, tone: "blue" }]);
       this.loop.phase.show([{ name: "", x: loop.frequencies, y: loop.phase, tone: "blue" }]);
     }
+  }
+
+  showLoopWork(work) {
+    if (work.state === "computing") text(this.loop.state, `computing: ${work.message}, for ${Math.round(work.seconds)} s`);
+    this.run.hidden = work.state === "computing";
   }
 
   // Each has a state of its own and says what it holds for.
