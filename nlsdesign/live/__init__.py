@@ -5,6 +5,7 @@ page stand in modules of their own. Never computes what a room below could compu
 """
 
 from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
+from .background import WorkState
 from .edits import (
     AddPoint,
     ChangeLimit,
@@ -19,13 +20,61 @@ from .edits import (
     SetNumber,
     edit_from,
 )
+from .exports import EXPORTS, ExportDesign, ExportedFile
+from .full_design import FullDesign
 from .gallery import GalleryCard, gallery, gallery_question, question_of, question_of_deck
 from .live_design import LiveDesign, Snapshot
 from .question import LiveQuestion, TargetPoint
+from .saved import SavedDesign, reopened
+from .work import (
+    CloudAnswer,
+    DiagnoseRecords,
+    DiagnosisAnswer,
+    SettleDesign,
+    Task,
+    ToleranceCloud,
+    TorqueLoop,
+)
 
 __all__ = [
-    "AddPoint", "AngleAnswer", "ChangeLimit", "ChooseDeck", "ChooseMaterial", "DesignView", "DropLimit",
-    "Edit", "FreeNumber", "GalleryCard", "HoldNumber", "LiveAnswer", "LiveDesign", "LiveQuestion",
-    "Mechanism", "MovePoint", "RemovePoint", "SetNumber", "Snapshot", "TargetPoint", "edit_from", "gallery",
-    "gallery_question", "question_of", "question_of_deck", "to_json",
-]  # fmt: skip
+    "EXPORTS",
+    "AddPoint",
+    "AngleAnswer",
+    "ChangeLimit",
+    "ChooseDeck",
+    "ChooseMaterial",
+    "CloudAnswer",
+    "DesignView",
+    "DiagnoseRecords",
+    "DiagnosisAnswer",
+    "DropLimit",
+    "Edit",
+    "ExportDesign",
+    "ExportedFile",
+    "FreeNumber",
+    "FullDesign",
+    "GalleryCard",
+    "HoldNumber",
+    "LiveAnswer",
+    "LiveDesign",
+    "LiveQuestion",
+    "Mechanism",
+    "MovePoint",
+    "RemovePoint",
+    "SavedDesign",
+    "SetNumber",
+    "SettleDesign",
+    "Snapshot",
+    "TargetPoint",
+    "Task",
+    "ToleranceCloud",
+    "TorqueLoop",
+    "WorkState",
+    "edit_from",
+    "gallery",
+    "gallery_question",
+    "question_of",
+    "question_of_deck",
+    "reopened",
+    "to_json",
+]

@@ -15,8 +15,8 @@ from ..components.assembly.named_parts import Assembly
 from ..design import Contour
 from ..errors import NlsError
 from ..model import FlatModel, flatten
-from ..model.structure import CamNames
 from ..model.roles import measured_motion, series_spring
+from ..model.structure import CamNames
 from ..model.transform import with_outputs
 from .answers import (
     AngleAnswer,

@@ -212,7 +212,7 @@ class FreeNumber(Edit):
             ranges = {name: each for name, each in question.ranges.items() if name != self.name}
             return replace(question, free=free, ranges=ranges)
         finite_in(f"least {self.name}", low, variable.minimum, variable.maximum)
-        finite_in(f"largest {self.name}", min(high, 1e300), low, variable.maximum)
+        finite_in(f"largest {self.name}", high, low, variable.maximum)
         return replace(question, free=free, ranges={**question.ranges, self.name: (low, high)})
 
 

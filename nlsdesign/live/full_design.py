@@ -69,7 +69,9 @@ def whole_design(
         progress=progress,
     )  # fmt: skip
     try:
-        return FullDesign("solved", design_cam(actuator, target=target, free=free, keep=keep, settings=settings))
+        return FullDesign(
+            "solved", design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
+        )
     except InfeasibleError as error:
         return FullDesign("infeasible", None, str(error))
     except ConvergenceError as error:
@@ -139,4 +141,3 @@ def angle_view_of(view: DesignView, design: CamDesign, question: LiveQuestion) -
         That it answers.
     """
     return AngleView(view, design.contour, question.cam, lambda: design.actuator)
-

@@ -13,6 +13,7 @@ from .edits import Edit
 from .full_design import FullDesign, angle_view_of, full_answer
 from .question import LiveQuestion, finite_in
 from .quick_design import QuickDesign, QuickSolver
+from .saved import SavedDesign, saved
 from .views import controls_of
 from .work import LiveWork, Task
 
@@ -63,9 +64,11 @@ class LiveDesign:
     ----------
     question
         With which it begins, for instance ``gallery_question("cam-actuator")``.
+    values
+        Numbers in SI of a design to begin beside, as :func:`~.saved.reopened` gives them.
     """
 
-    def __init__(self, question: LiveQuestion) -> None:
+    def __init__(self, question: LiveQuestion, values: dict[str, float] | None = None) -> None:
         self._solver = QuickSolver()
         self._past: list[_Moment] = []
         self._future: list[_Moment] = []
@@ -73,7 +76,8 @@ class LiveDesign:
         self._grip: str | None = None
         self.snapshots: dict[str, Snapshot] = {}
         self.work = LiveWork()
-        self._now = self._answered(question, None, None)
+        begin = self._solver.beside_values(question, values) if values else None
+        self._now = self._answered(question, begin, None)
 
     @property
     def question(self) -> LiveQuestion:
@@ -162,7 +166,7 @@ class LiveDesign:
         return self.work.start(task, self.question, self._revision, self.shown)
 
     def poll(self) -> tuple[WorkState, ...]:
-        """Return how far all work is; a whole design that is done replaces the quick answer to its question."""
+        """Return how far all work is; a whole design that is done replaces the quick answer."""
         states = self.work.states()
         for state in states:
             if isinstance(state.value, FullDesign) and self._takes(state):
@@ -195,6 +199,11 @@ class LiveDesign:
         self.snapshots[name] = Snapshot(name, self.question, self.answer)
         return self.snapshots[name]
 
+    def saved(self) -> SavedDesign:
+        """Return deck, design file and where the search stands, as text."""
+        solved = self._now.solved
+        return saved(self.question, {} if solved is None else solved.si_values())
+
     def _takes(self, state: WorkState) -> bool:
         return state.revision == self._revision and self.answer.source == "quick"
 
@@ -225,9 +234,7 @@ class LiveDesign:
         answer = replace(moment.answer, revision=self._revision, design=design, seconds=0.0)
         return self._go_to(replace(moment, answer=answer, shown=shown))
 
-    def _answered(
-        self, question: LiveQuestion, last: QuickDesign | None, shown: AngleView | None
-    ) -> _Moment:
+    def _answered(self, question: LiveQuestion, last: QuickDesign | None, shown: AngleView | None) -> _Moment:
         began = time.perf_counter()
         revision = self._revision + 1
         solved, outcome = self._solver.answer(question, last)
@@ -255,6 +262,5 @@ def missed(shown: AngleView) -> str:
     """
     view = shown.view
     held = f"held by {', '.join(view.active)}" if view.active else "no limit holds it"
-    return (
-        f"misses its target: {100.0 * view.relative_error:.3g} % rms of the largest torque, 1 % allowed; {held}"
-    )
+    share = f"{100.0 * view.relative_error:.3g} %"
+    return f"misses its target: {share} rms of the largest torque, 1 % allowed; {held}"

@@ -7,17 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..design import cam_from_profile
+from ..design import CamDesign, Contour, LimitState, cam_from_profile, contour_from_curvature, contour_of_cam
+from ..design.optimisation.result import DesignCurves
 from ..model.derived_deck import derived
 from ..quantity import Quantity
-from ..design import CamDesign, Contour, LimitState, contour_from_curvature, contour_of_cam
-from ..design.optimisation.result import DesignCurves
-from ..design.optimisation.variables import scaled
 from .answers import DesignView
 from .question import LiveQuestion
 from .quick_program import QuickOutcome, QuickPoint, QuickProgram, structure_of
@@ -123,7 +120,8 @@ class QuickDesign:
             angles=rows["angle"], lever_arms=rows["lever_arm"], radii=rows["radius"],
             radii_of_curvature=rows["radius_of_curvature"], torques=rows["torque"],
             stiffnesses=rows["stiffness"], extensions=rows["extension"], forces=rows["force"],
-            strains=dict(zip(pieces, strains, strict=True)), stresses=dict(zip(pieces, stresses, strict=True)),
+            strains=dict(zip(pieces, strains, strict=True)),
+            stresses=dict(zip(pieces, stresses, strict=True)),
         )  # fmt: skip
         states = self._limits(rows)
         rms, largest = float(np.sqrt(max(rows["mean_square"][0], 0.0))), self.question.target_size
@@ -150,9 +148,7 @@ class QuickDesign:
             values = rows[f"bound {i}"]
             value = float(values.max() if bound.upper else values.min())
             active = abs(value - wanted) <= _ACTIVE * (abs(wanted) or 1.0)
-            states.append(
-                LimitState(bound.limit, bound.of, value, wanted, bound.upper, bound.unit, active)
-            )
+            states.append(LimitState(bound.limit, bound.of, value, wanted, bound.upper, bound.unit, active))
         return states
 
 
@@ -161,6 +157,7 @@ class QuickSolver:
 
     def __init__(self) -> None:
         self._programs: OrderedDict[tuple[Any, ...], QuickProgram] = OrderedDict()
+        self._contradicted: QuickProgram | None = None
 
     def program(self, question: LiveQuestion) -> QuickProgram:
         """Return the program of a question, made where there is none yet.
@@ -192,19 +189,31 @@ class QuickSolver:
             The last good design, to begin beside.
         """
         program = self.program(question)
-        outcome = self._tried(program, question, last)
-        if outcome.state != "solved":
-            begin = outcome.point.unknowns if outcome.point else program.completed(question, {})
+        begin = self._begin(program, question, last)
+        contradicted, self._contradicted = self._contradicted is program, None
+        if contradicted:
+            # Limits that contradicted each other a moment ago are asked first.
             kept = program.conflict(question, begin)
-            if kept.state == "solved" and kept.point is not None:
-                outcome = program.from_point(question, kept.point)
-            elif kept.state == "infeasible":
+            if kept.state == "infeasible":
+                self._contradicted = program
                 return None, kept
+        outcome = self._tried(program, question, last)
+        if outcome.state != "solved" and not contradicted:
+            kept = program.conflict(question, begin)
+            if kept.state == "infeasible":
+                self._contradicted = program
+                return None, kept
+            if kept.point is not None:
+                outcome = program.from_point(question, kept.point)
         if outcome.state != "solved":
             outcome = program.from_starts(question)
         if outcome.state != "solved" or outcome.point is None:
-            return None, outcome
+            return None, replace(outcome, state="not solved", words=f"not solved yet: {outcome.words}")
         return QuickDesign(program, question, outcome.point, outcome.cost), outcome
+
+    def _begin(self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None) -> Floats:
+        values = {} if last is None else program.scaled_values(last.si_values())
+        return program.completed(question, values)
 
     def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
         """Return the quick design at a finished one, for the next drag to begin from.
@@ -216,38 +225,44 @@ class QuickSolver:
         design
             Finished.
         """
+        return self.beside_values(question, values_of_design(self.program(question), design))
+
+    def beside_values(self, question: LiveQuestion, values: dict[str, float]) -> QuickDesign | None:
+        """Return the quick design at numbers of another; ``None`` where there is none.
+
+        Parameters
+        ----------
+        question
+            Any.
+        values
+            In SI by name.
+        """
         program = self.program(question)
-        values = program.scaled_values(values_of_design(program, question, design))
-        outcome = program.from_values(question, values)
+        outcome = program.from_values(question, program.scaled_values(values))
         if outcome.state != "solved" or outcome.point is None:
             return None
         return QuickDesign(program, question, outcome.point, outcome.cost)
 
-    def _tried(
-        self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None
-    ) -> QuickOutcome:
+    def _tried(self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None) -> QuickOutcome:
         if last is None:
             return program.from_starts(question)
         if last.program is program:
             outcome = program.beside(question, last.point)
-            if outcome.state != "not solved":
+            if outcome.state in ("solved", "infeasible"):
                 return outcome
-        values = last.si_values()
-        outcome = program.from_values(question, program.scaled_values(values))
+        outcome = program.from_values(question, program.scaled_values(last.si_values()))
         if outcome.state == "solved" or last.program is program:
             return outcome
         return program.from_starts(question)
 
 
-def values_of_design(program: QuickProgram, question: LiveQuestion, design: CamDesign) -> dict[str, float]:
+def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:
     """Return the variables of a finished design in SI by name.
 
     Parameters
     ----------
     program
         Of the question.
-    question
-        That it answers.
     design
         Finished.
     """

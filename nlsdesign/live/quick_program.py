@@ -35,8 +35,10 @@ ROUNDING = 0.003
 """Width over which knots of a rubber's law are rounded, relative to its stretch, as a design begins."""
 _COLD = 120
 """Iterations at most of a search from a start."""
-_WARM = 60
-"""Iterations at most of a search from the last solution."""
+_WARM = 16
+"""Iterations at most of a search with the last multipliers; where they do not help one without takes over."""
+_AGAIN = 45
+"""Iterations at most of a search from the last design without its multipliers."""
 _STARTS = 4
 _INVOLVED = 1e-3
 """Price from which a limit counts as part of a conflict, as in the whole design."""
@@ -154,6 +156,10 @@ class QuickProgram:
         return ca.nlpsol("beside", "ipopt", self._nlp, {**_COMMON, **_BESIDE, "ipopt.max_iter": _WARM})
 
     @cached_property
+    def _again(self) -> ca.Function:
+        return ca.nlpsol("again", "ipopt", self._nlp, {**_COMMON, "ipopt.max_iter": _AGAIN})
+
+    @cached_property
     def _softened(self) -> ca.Function:
         """The program with a slack for each limit; what is made small is their sum."""
         slacks = ca.SX.sym("slack", len(self.bounds))
@@ -170,7 +176,7 @@ class QuickProgram:
 
     def prepare(self) -> None:
         """Make the derivatives, which takes some tenths of a second."""
-        _ = self._cold, self._warm
+        _ = self._cold, self._warm, self._again
 
     def limits_of(self, question: LiveQuestion) -> tuple[Floats, Floats]:
         """Return the bounds of the rows.
@@ -243,8 +249,8 @@ class QuickProgram:
         """
         low, high = self.ranges_of(question)
         parameters = self.numbers_of(question)
-        point = np.array([values.get(v.name, v.start) for v in self.problem.variables])
-        point = np.clip(point, low, high)
+        wanted = [values.get(v.name, v.start) for v in self.problem.variables]
+        point: Floats = np.clip(np.array(wanted), low, high)
         states, errors = self.problem.states.shape[0], self.problem.structure[-1].expression.shape[0]
         first = len(point) - errors - states
         follows, misses = self._following
@@ -272,8 +278,13 @@ class QuickProgram:
             values = start_values(
                 start, scalars=self.problem.scalars, contour=self.problem.contour, sizes=self.problem.sizes
             )
-            outcome = self._solved(self._cold, question, QuickPoint(self.completed(question, values), _NONE, _NONE))
-            if best is None or (outcome.state == "solved", -outcome.cost) > (best.state == "solved", -best.cost):
+            outcome = self._solved(
+                self._cold, question, QuickPoint(self.completed(question, values), _NONE, _NONE)
+            )
+            if best is None or (outcome.state == "solved", -outcome.cost) > (
+                best.state == "solved",
+                -best.cost,
+            ):
                 best = outcome
             if self.problem.contour is None and best.state == "solved":
                 break
@@ -303,7 +314,7 @@ class QuickProgram:
             By name.
         """
         point = QuickPoint(self.completed(question, values), _NONE, _NONE)
-        return self._solved(self._cold, question, point)
+        return self._solved(self._again, question, point)
 
     def chosen_values(self, unknowns: Floats) -> dict[str, float]:
         """Return sizes and variables of the contour in SI by name.

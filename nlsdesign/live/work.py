@@ -140,9 +140,7 @@ class LiveWork:
     def __init__(self) -> None:
         self._running: dict[str, BackgroundWork] = {}
 
-    def start(
-        self, task: Task, question: LiveQuestion, revision: int, shown: AngleView | None
-    ) -> WorkState:
+    def start(self, task: Task, question: LiveQuestion, revision: int, shown: AngleView | None) -> WorkState:
         """Start a task; one of its kind that runs is cancelled.
 
         Parameters
