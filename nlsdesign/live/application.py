@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import itertools
 import json
@@ -183,13 +184,10 @@ class _Answers:
             content += part
             if len(content) > DECK_BYTES:
                 raise too_large("deck", DECK_BYTES)
-        try:
-            text = content.decode("utf-8")
-        except UnicodeDecodeError:
-            raise NlsError("deck", "is no text in UTF-8", next_step="open a TOML file") from None
-        answer = await session.process.ask({"what": "open", "text": text})
+        sent = base64.b64encode(content).decode()
+        answer = await session.process.ask({"what": "open", "content": sent})
         if "refused" in answer:
-            raise NlsError("deck", str(answer["refused"]))
+            raise NlsError("not opened", str(answer["refused"]))
         return JSONResponse({"opened": True})
 
     async def _file(self, request: Request, session: Session) -> Response:

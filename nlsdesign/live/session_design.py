@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import functools
 import math
 import time
@@ -12,12 +13,16 @@ from typing import Any
 from ..components.materials.library import materials
 from ..errors import NlsError, ValueRangeError, brief, unknown_name
 from .answers import LiveAnswer, to_json
+from .archive import archived, unarchived
 from .edits import edit_from
+from .exports import ExportDesign
 from .gallery import gallery, gallery_question, question_of_deck
 from .inbox import Inbox
 from .live_design import LiveDesign
 from .question import LiveQuestion
+from .saved import reopened
 from .session_work import Outbox
+from .uploads import plain_letters
 from .work import SettleDesign
 from .work_news import TASKS, WorkNews
 
@@ -49,6 +54,7 @@ class SessionDesign:
         self._trouble = ""
         self._settle_at: float | None = None
         self._look_at: float | None = None
+        self._file_for: int | None = None
         try:
             self._live = LiveDesign(_question(deck))
         except NlsError as error:
@@ -200,6 +206,7 @@ class SessionDesign:
         before = self._live.answer
         for each in self._news.changed():
             self._outbox.page({"what": "work", "work": each})
+        self._send_file()
         if self._live.answer is not before:
             self._say(self._live.answer, {})
 
@@ -220,17 +227,48 @@ class SessionDesign:
             answer = {"refused": str(error)}
         except Exception as error:
             answer = {"refused": f"a fault of the program: {type(error).__name__}: {error}"}
-        self._outbox.server({"number": asked["number"], **answer})
+        if answer is not None:
+            self._outbox.server({"number": asked["number"], **answer})
 
-    def _served(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        if asked["what"] != "open":
-            raise unknown_name("file", str(asked.get("kind"))[:40], ())
-        live = LiveDesign(question_of_deck(asked["text"], "opened.toml"))
+    def _served(self, asked: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Return an answer; nothing where it is given when a file is ready."""
+        if asked["what"] == "open":
+            self._opened(base64.b64decode(asked["content"]))
+            return {}
+        if asked["kind"] == "design":
+            return _file("design.zip", archived(self._live.saved()))
+        if self._file_for is not None:
+            self._outbox.server({"number": self._file_for, "refused": "another file was asked for meanwhile"})
+        self._file_for = None
+        self._live.start(ExportDesign(str(asked["kind"])))
+        self._file_for = asked["number"]
+        return None
+
+    def _opened(self, content: bytes) -> None:
+        """Begin anew from a saved design or a deck; what is open stays where it cannot be read."""
+        if content.startswith(b"PK"):
+            question, values = reopened(unarchived(content))
+            live = LiveDesign(question, values)
+        else:
+            try:
+                text = content.decode("utf-8")
+            except UnicodeDecodeError:
+                raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
+            live = LiveDesign(question_of_deck(text, "deck.toml"))
         self._live.work.close()
         self._live, self._angle, self._trouble = live, None, ""
         self._news = WorkNews(live, self._folder / "records")
         self._show({})
-        return {}
+
+    def _send_file(self) -> None:
+        """Send the file that the server waits for once it is made."""
+        state = self._news.export
+        if self._file_for is None or state is None or state.state == "computing":
+            return
+        made = state.value
+        answer = _file(made.name, made.content) if made is not None else {"refused": state.message}
+        self._outbox.server({"number": self._file_for, **answer})
+        self._file_for = None
 
 
 @functools.cache
@@ -248,6 +286,10 @@ def _question(deck: str) -> LiveQuestion:
         except (OSError, UnicodeDecodeError) as error:
             raise NlsError(str(file), f"cannot be read: {error}") from error
     return gallery_question(deck or FIRST)
+
+
+def _file(name: str, content: bytes) -> dict[str, Any]:
+    return {"name": plain_letters(name), "content": base64.b64encode(content).decode()}
 
 
 def _number(asked: Mapping[str, Any]) -> int | None:

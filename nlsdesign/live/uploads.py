@@ -119,9 +119,20 @@ def plain_name(name: str) -> str:
         If its ending is none of records.
     """
     last = re.split(r"[/\\]", name)[-1]
-    stem, dot, ending = last.rpartition(".")
+    _, dot, ending = last.rpartition(".")
     if dot + ending.lower() not in ENDINGS:
         raise NlsError(f"file '{last}'", "is no table of records", next_step=f"take one of {', '.join(ENDINGS)}")
-    if ending.lower() == "toml":
-        return "records.toml"
-    return (re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:80] or "record") + dot + ending.lower()
+    return "records.toml" if ending.lower() == "toml" else plain_letters(last)
+
+
+def plain_letters(name: str) -> str:
+    """Return the name of a file in letters that every system takes, and that end no header.
+
+    Parameters
+    ----------
+    name
+        With its ending.
+    """
+    stem, dot, ending = name.rpartition(".")
+    kept = (re.sub(r"[^A-Za-z0-9_-]+", "_", part).strip("_")[:80] for part in (stem, ending.lower()))
+    return f"{next(kept) or 'record'}{dot}{next(kept)}"

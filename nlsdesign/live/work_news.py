@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from .answers import to_json
 from .background import WorkState
+from .exports import ExportDesign
 from .full_design import FullDesign
 from .live_design import LiveDesign
 from .work import DiagnoseRecords, SettleDesign, Task, ToleranceCloud, TorqueLoop
@@ -76,10 +77,17 @@ class WorkNews:
         if state is not None:
             self._noted(state)
 
+    @property
+    def export(self) -> WorkState | None:
+        """How far the file is that was asked for last."""
+        return next((each for each in self._live.work.states() if each.name == ExportDesign.__name__), None)
+
     def changed(self) -> list[dict[str, Any]]:
         """Return the news of all work that has changed; a whole design that is done has become the answer."""
         news = []
         for state in self._live.poll():
+            if state.name not in TASKS:
+                continue
             now = self._noted(state)
             if self._last.get(state.name) != now:
                 self._last[state.name] = now

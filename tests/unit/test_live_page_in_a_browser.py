@@ -23,6 +23,7 @@ STATE = "document.getElementById('state-name').textContent"
 ANSWERED = f"['quick answer', 'checked answer', 'misses its target'].includes({STATE}) && {STATE}"
 POINT = "document.querySelectorAll('.point:not(.names)')[{0}].querySelectorAll('input')[1].value"
 HANDLE = """(() => {{
+  window.scrollTo(0, 0);
   const box = document.querySelectorAll('.handle')[{0}].querySelector('.knob').getBoundingClientRect();
   return [box.x + box.width / 2, box.y + box.height / 2];
 }})()"""
@@ -56,6 +57,12 @@ def settled(tab: Tab, change: str, before: object) -> object:
     return tab.until(f"(() => {{ const now = {change}; return now !== {before!r} && now; }})()".replace("None", "null"))
 
 
+def resting(tab: Tab) -> None:
+    """Wait until everything that was asked is answered and shown."""
+    tab.until("document.body.dataset.busy === 'false'")
+    tab.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
+
+
 def session_of(tab: Tab) -> str:
     return str(tab.evaluate("sessionStorage.getItem('session')"))
 
@@ -84,6 +91,7 @@ def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back
     for step in range(1, 13):
         tab.mouse("Moved", x, y - step)
     tab.mouse("Released", x, y - 12)
+    resting(tab)
     after = settled(tab, point, before)
     assert float(str(after)) > float(before)
     settled(tab, "document.querySelector('#torque .line.blue').getAttribute('d')", curve)
@@ -100,7 +108,7 @@ def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back
 
 def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
     reached: list[str] = []
-    tab.evaluate("document.activeElement.blur(); window.scrollTo(0, 0)")
+    tab.evaluate("document.querySelector('.skip').focus()")
     for _ in range(90):
         tab.press("Tab")
         reached.append(
@@ -151,10 +159,10 @@ def test_a_number_that_is_none_is_answered_beside_its_field(tab: Tab) -> None:
     tab.evaluate(f"{field}.focus(); {field}.value = 'a lot'; {field}.dispatchEvent(new Event('change'))")
     assert "no number" in tab.evaluate("document.querySelector('#limits .wrong').textContent")
     tab.evaluate(f"{field}.value = '-5'; {field}.dispatchEvent(new Event('change'))")
-    tab.until("!document.getElementById('connection').hidden")
-    assert tab.evaluate("document.getElementById('connection').textContent")
+    tab.until("!document.getElementById('notice').hidden")
+    assert "MaximumCableTension" in tab.evaluate("document.getElementById('notice').textContent")
     tab.evaluate(f"{field}.value = {before!r}; {field}.dispatchEvent(new Event('change')); {field}.blur()")
-    tab.until("document.getElementById('connection').hidden")
+    tab.until("document.getElementById('notice').hidden")
 
 
 def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab: Tab) -> None:
@@ -256,7 +264,7 @@ ASK = """fetch("{path}", {{
 
 def test_hostile_names_stay_words(tab: Tab) -> None:
     name = "<img src=x onerror=window.hit=1>"
-    text = f"[model]\\nname = '{name}'\\ndescription = '{name}'\\n['{name}']\\ncomponent = '{name}'\\n"
+    text = f"[deck]\\nname = '{name}'\\n['{name}']\\ncomponent = '{name}'\\n"
     status, words = tab.evaluate(ASK.format(path="/api/open", body=f'"{text}"'))
     assert status == 422
     assert "onerror" in words
@@ -268,7 +276,7 @@ def test_hostile_names_stay_words(tab: Tab) -> None:
           input.dispatchEvent(new Event("change"));
         }})()"""
     )
-    tab.until("document.getElementById('connection').textContent.includes('onerror')")
+    tab.until("document.getElementById('notice').textContent.includes('onerror')")
     tab.evaluate(
         f"""(() => {{
           const files = new DataTransfer(), input = document.getElementById("records");

@@ -20,7 +20,8 @@ let full = null;
 let shownNumber = 0;
 
 const connection = { send: (message) => live?.send(message) ?? false };
-const questions = new Questions((message) => connection.send(message));
+const questions = new Questions((message) => connection.send(message), (busy) => { document.body.dataset.busy = String(busy); });
+window.addEventListener("pagehide", () => questions.flush());
 const ask = (message, begin) => { const number = questions.ask(message, begin); later(); return number; };
 const edit = (fields, { drag = null, last = true, begin } = {}) => ask({ what: "edit", edit: fields, drag, last, angle }, begin);
 
@@ -78,6 +79,7 @@ function takeAnswer(message) {
   if (message.number !== null && message.number < shownNumber) return;
   shownNumber = message.number ?? shownNumber;
   answer = message.answer;
+  if (message.number !== null) byId("notice").hidden = true;
   clearTimeout(waiting);
   waiting = 0;
   requestAnimationFrame(() => {
@@ -103,8 +105,8 @@ function afterPaint(then) {
 }
 
 function refuse(message) {
-  text(byId("connection"), message.reason);
-  byId("connection").hidden = false;
+  text(byId("notice"), message.reason);
+  byId("notice").hidden = false;
   announce(message.reason);
   if (answer) requestAnimationFrame(showAnswer);
 }
@@ -123,7 +125,6 @@ let lastCloud = null;
 function showAnswer() {
   const { controls, design } = answer;
   const frozen = editor.moving;
-  if (!document.body.classList.contains("lost")) byId("connection").hidden = true;
   table.show(controls.points.map((each) => [each[0], each[1]]));
   showCurve(frozen);
   limits.show(controls.limits.map(limitRow));

@@ -1,9 +1,10 @@
 // What is asked of the session: one at a time, in order; of a drag only the newest waits.
 
 export class Questions {
-  // send(message) tells whether it went.
-  constructor(send) {
+  // send(message) tells whether it went; told(busy) whether an answer is awaited.
+  constructor(send, told) {
     this.send = send;
+    this.told = told;
     this.number = 0;
     this.waiting = [];
     this.open = null;
@@ -28,8 +29,13 @@ export class Questions {
   }
 
   next() {
-    if (this.open !== null || this.waiting.length === 0) return;
-    if (this.send(this.waiting[0])) this.open = this.waiting.shift().number;
+    if (this.open === null && this.waiting.length > 0 && this.send(this.waiting[0])) this.open = this.waiting.shift().number;
+    this.told(this.busy);
+  }
+
+  // The page is left: what waits must not be lost.
+  flush() {
+    for (const message of this.waiting.splice(0)) this.send(message);
   }
 
   // After the connection broke off nothing is on its way any more.

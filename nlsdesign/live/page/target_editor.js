@@ -40,7 +40,7 @@ export class TargetEditor extends Chart {
     const group = draw("g", { class: "handle", tabindex: 0, role: "slider", "aria-roledescription": "target point" },
       draw("circle", { class: "reach", r: 20 }), draw("circle", { class: "ring", r: 11 }), knob);
     if (!this.held(k)) group.addEventListener("pointerdown", (event) => this.grab(event, k));
-    group.addEventListener("keydown", (event) => this.key(event, k));
+    group.addEventListener("keydown", (event) => this.pressed(event, k));
     group.addEventListener("keyup", (event) => { if (event.key.startsWith("Arrow") || event.key.startsWith("Page")) this.rest(k); });
     this.over.append(group);
     if (this.held(k)) {
@@ -116,7 +116,7 @@ export class TargetEditor extends Chart {
     group.addEventListener("pointercancel", done);
   }
 
-  key(event, k) {
+  pressed(event, k) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === "Delete" || event.key === "Backspace") {
       event.preventDefault();
