@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .output import DECK_HELP, examples, json_option, show_json
+from .output import examples, json_option, show_json
 
 
 @click.command(
@@ -28,18 +28,13 @@ def serve(
 ) -> None:
     """Serve a page on which a design follows the mouse, to this machine only, until interrupted.
 
-    DECK is a file, or the name of one that comes with the project; without it the page begins with its
+    DECK is a file, or the name of a deck or template that comes with the project; without it the page begins with its
     gallery. The address holds a random token, without which nothing is answered.
     """
     from ..live.server import serve as run
 
     if deck_name:
-        from ..components.assembly.deck_writer import declare
-        from ..deck import load_deck
-
-        declare(load_deck(deck_name))  # a deck that cannot be read ends the command, not the page
-        if Path(deck_name).exists():
-            deck_name = str(Path(deck_name).resolve())
+        deck_name = _checked(deck_name)
 
     def ready(address: str) -> None:
         if as_json:
@@ -51,3 +46,15 @@ def serve(
 
     packages = tuple(context.find_root().params.get("packages", ()))
     run(deck_name, host=host, port=port, packages=packages, ready=ready)
+
+
+def _checked(name: str) -> str:
+    """Return a name that the page can begin with; a deck that cannot be read ends the command, not the page."""
+    from ..components.assembly.deck_template import template_names
+    from ..components.assembly.deck_writer import declare
+    from ..deck import load_deck
+
+    if name in template_names():
+        return name
+    declare(load_deck(name))
+    return str(Path(name).resolve()) if Path(name).exists() else name

@@ -75,6 +75,8 @@ class SessionDesign:
         EOFError
             When the server has closed it.
         """
+        if not inbox.waiting:
+            _choices()
         while True:
             idle = self._settle_at is None and self._look_at is None and not self._news.running
             message = inbox.take(None if idle else _TICK)
@@ -183,7 +185,7 @@ class SessionDesign:
     def _say_kept(self, asked: Mapping[str, Any]) -> None:
         kept = [
             {
-                "name": name, "title": each.question.title, "material": each.question.material,
+                "name": name, "title": each.question.title, "material": each.question.machine.material,
                 "design": to_json(each.answer.design),
             }
             for name, each in self._live.snapshots.items()

@@ -41,7 +41,7 @@ def opened(server: Server) -> Iterator[Tab]:
     with browser() as tab:
         tab.look(1400)
         tab.visit(server.address)
-        tab.until(ANSWERED)
+        tab.until(f"{ANSWERED} && !document.getElementById('gallery').disabled")
         yield tab
 
 
