@@ -70,10 +70,10 @@ class BackgroundWork:
         self._name, self._revision = name, revision
         self._began, self._took = time.monotonic(), 0.0
         self._state, self._message, self._value = "computing", "begins", None
-        context = multiprocessing.get_context("spawn")
+        context = _context()
         self._end, other = context.Pipe(duplex=False)
         # Not a daemon: a design has helpers of its own. It ends by itself when its pipe is closed.
-        self._process = context.Process(target=_run, args=(other, work, arguments), daemon=False)
+        self._process = context.Process(target=_run, args=(other, work, arguments), daemon=False)  # type: ignore[attr-defined]
         with signals_held():
             self._process.start()
         other.close()
@@ -142,6 +142,15 @@ class BackgroundWork:
                 if os.getpgid(pid) == pid:
                     os.killpg(pid, signal.SIGKILL)
         self._process.kill()
+
+
+def _context() -> multiprocessing.context.BaseContext:
+    """Return how processes are started: from a server that has loaded the rooms, where there can be one."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__.rpartition(".")[0] + ".exports"])
+    return context
 
 
 def _run(pipe: Connection, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:

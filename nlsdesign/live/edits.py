@@ -381,7 +381,7 @@ def _require_kind(what: str, value: object, hint: Any) -> None:
         return
     if str in allowed and isinstance(value, str) and len(value) <= _LONGEST_NAME:
         return
-    if int in allowed and isinstance(value, int) and not isinstance(value, bool):
+    if int in allowed and isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1_000_000:
         return
     if float in allowed:
         finite_in(what, value, -1e300, 1e300)

@@ -33,6 +33,8 @@ class LimitKind:
         SI unit, and that in which people read it.
     upper
         Whether the number is the largest that is allowed, or the least.
+    of_shape
+        Whether the contour alone decides it.
     """
 
     kind: type[Limit]
@@ -41,6 +43,7 @@ class LimitKind:
     unit: str
     shown_unit: str
     upper: bool
+    of_shape: bool = False
 
     @property
     def name(self) -> str:
@@ -76,8 +79,8 @@ class LimitKind:
 
 
 _ALL = (
-    LimitKind(MinimumRadiusOfCurvature, "radius", "radius of curvature", "m", "mm", False),
-    LimitKind(MaximumCamRadius, "radius", "cam radius", "m", "mm", True),
+    LimitKind(MinimumRadiusOfCurvature, "radius", "radius of curvature", "m", "mm", False, True),
+    LimitKind(MaximumCamRadius, "radius", "cam radius", "m", "mm", True, True),
     LimitKind(MaximumStrain, "strain", "strain of the rubber", "1", "%", True),
     LimitKind(MaximumStress, "stress", "nominal stress of the rubber", "Pa", "MPa", True),
     LimitKind(MaximumCableTension, "tension", "tension of a cable", "N", "N", True),

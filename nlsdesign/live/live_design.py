@@ -241,7 +241,7 @@ class LiveDesign:
         message = outcome.words
         if solved is not None:
             shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.machine)
-            message = "" if shown.view.met else missed(shown)
+            message = "; ".join([*([] if shown.view.met else [missed(shown)]), *not_kept(question)])
         controls = controls_of(question, can_undo=bool(self._past), can_redo=bool(self._future))
         self._revision = revision
         answer = LiveAnswer(
@@ -264,3 +264,15 @@ def missed(shown: AngleView) -> str:
     held = f"held by {', '.join(view.active)}" if view.active else "no limit holds it"
     share = f"{100.0 * view.relative_error:.3g} %"
     return f"misses its target: {share} rms of the largest torque, 1 % allowed; {held}"
+
+
+def not_kept(question: LiveQuestion) -> list[str]:
+    """Return in words which limits are shown and not kept.
+
+    Parameters
+    ----------
+    question
+        As it stands.
+    """
+    names = [name for name, each in question.limit_values.items() if not question.keeps(each.kind)]
+    return [f"the contour is held, so {', '.join(names)} is shown and not kept"] if names else []

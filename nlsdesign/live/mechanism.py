@@ -42,7 +42,7 @@ def mechanism_at(
     shown = min(rest_length + extensions[0], guide)
     wall = guide + _CLEARANCE + extensions[2] - extensions[0] + shown
     line, contact, end = _cable(contour, angle, guide, both)
-    clamp = np.array([end[0] + _CLEARANCE + extensions[1] - extensions[0], end[1]])
+    clamp = np.array([wall - shown - (extensions[1] - extensions[0]), end[1]])
     half = 0.5 * _THICKNESS * float(np.sqrt(rest_length / max(rest_length + extensions[1], 1e-6)))
     up = np.array([0.0, half])
     corners = np.array([clamp + up, [wall, end[1] + half], [wall, end[1] - half], clamp - up])

@@ -13,7 +13,7 @@ import numpy as np
 from ..components.assembly.named_parts import Assembly
 from ..design import Limit, NumberRange, TabulatedTorque, safe_limits
 from ..design.statics.smooth_cables import with_smooth_cables
-from ..errors import ValueRangeError, unknown_name
+from ..errors import ValueRangeError, brief, unknown_name
 from ..model import FlatModel, flatten
 from ..model.roles import series_cam
 from ..model.structure import CamNames
@@ -170,10 +170,23 @@ class LiveQuestion:
 
     @property
     def keep(self) -> tuple[Limit, ...]:
-        """The same as limits of a design, with the ranges of what is free."""
-        limits = [each.kind.limit(each.value) for each in self.limit_values.values()]
+        """The same as limits of a design, with the ranges of what is free.
+
+        Without limits on the shape of a contour that is held: nothing that is free changes them.
+        """
+        limits = [each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind)]
         ranges = [NumberRange(name, *self.ranges[name]) for name in self.free if name in self.ranges]
         return (*limits, *ranges)
+
+    def keeps(self, kind: LimitKind) -> bool:
+        """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.
+
+        Parameters
+        ----------
+        kind
+            Of the limit.
+        """
+        return self.contour in self.free or not kind.of_shape
 
     @cached_property
     def numbers(self) -> dict[str, NumberState]:
@@ -261,9 +274,13 @@ def finite_in(what: str, value: object, lowest: float, highest: float) -> float:
     ValueRangeError
         If it is no finite number in the range.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    try:
+        sound = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        sound = False
+    if not sound or not isinstance(value, int | float):
         raise ValueRangeError(
-            f"{what} = {value!r:.40}", "is no finite number", next_step="give a number in SI"
+            f"{what} = {brief(value)}", "is no finite number", next_step="give a number in SI"
         )
     if not lowest <= value <= highest:
         raise ValueRangeError(

@@ -143,7 +143,7 @@ class QuickDesign:
     def _limits(self, rows: dict[str, Floats]) -> list[LimitState]:
         states = []
         for i, (bound, wanted) in enumerate(
-            zip(self.program.bounds, self.program.values_of(self.question), strict=True)
+            zip(self.program.shown_bounds, self.program.values_of(self.question), strict=True)
         ):
             values = rows[f"bound {i}"]
             value = float(values.max() if bound.upper else values.min())

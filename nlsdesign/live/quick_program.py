@@ -126,8 +126,13 @@ class QuickProgram:
             sized_for=question.target,
         )
         design = self.problem.design
-        kinds = [each.kind.limit(each.value) for each in question.limit_values.values()]
-        self.bounds: tuple[Bound, ...] = tuple(bound for limit in kinds for bound in limit.bounds(design))
+        kept: list[Bound] = []
+        watched: list[Bound] = []
+        for each in question.limit_values.values():
+            bounds = each.kind.limit(each.value).bounds(design)
+            (kept if question.keeps(each.kind) else watched).extend(bounds)
+        self.bounds: tuple[Bound, ...] = tuple(kept)
+        self.shown_bounds: tuple[Bound, ...] = (*kept, *watched)
         self.cost = sum((goal.cost(design) for goal in GOALS), start=ca.SX(0))
         parameters = self.target.numbers(question.target)
         scales = ca.vertcat(*[bound.scale for bound in self.bounds])
@@ -188,21 +193,21 @@ class QuickProgram:
         """
         low = [np.full(row.expression.shape[0], row.lower) for row in self.problem.structure]
         high = [np.full(row.expression.shape[0], row.upper) for row in self.problem.structure]
-        for bound, value, scale in zip(self.bounds, self.values_of(question), self._scales, strict=True):
+        for bound, value, scale in zip(self.bounds, self.values_of(question), self._scales, strict=False):
             size, at = bound.expression.shape[0], value / scale
             low.append(np.full(size, -np.inf if bound.upper else at))
             high.append(np.full(size, at if bound.upper else np.inf))
         return np.concatenate(low), np.concatenate(high)
 
     def values_of(self, question: LiveQuestion) -> list[float]:
-        """Return the number of each bound as a question has it.
+        """Return the number of each bound, the kept ones first, as a question has it.
 
         Parameters
         ----------
         question
             Of this structure.
         """
-        return [question.limit_values[bound.limit].value for bound in self.bounds]
+        return [question.limit_values[bound.limit].value for bound in self.shown_bounds]
 
     def ranges_of(self, question: LiveQuestion) -> tuple[Floats, Floats]:
         """Return the bounds of the variables: what is held has no room.
@@ -367,7 +372,7 @@ class QuickProgram:
             "mean_square": design.mean_square_error, "volume": design.rubber_volume,
             "sizes": ca.vertcat(*[v.value for v in self.problem.scalars]),
             "first_slope": ca.SX(0) if contour is None else contour.first_slope.value,
-            **{f"bound {i}": bound.expression for i, bound in enumerate(self.bounds)},
+            **{f"bound {i}": bound.expression for i, bound in enumerate(self.shown_bounds)},
         }  # fmt: skip
         return tuple(columns), [ca.SX(each) for each in columns.values()]
 
