@@ -18,12 +18,13 @@ from .edits import edit_from
 from .exports import ExportDesign
 from .gallery import gallery, gallery_question, question_of_deck
 from .inbox import Inbox
+from .limit_kinds import LIMIT_KINDS
 from .live_design import LiveDesign
 from .question import LiveQuestion
 from .saved import reopened
 from .session_work import Outbox
 from .uploads import plain_letters
-from .work import SettleDesign
+from .work import SettleDesign, TorqueLoop
 from .work_news import TASKS, WorkNews
 
 FIRST = "cam-actuator"
@@ -208,6 +209,8 @@ class SessionDesign:
         before = self._live.answer
         for each in self._news.changed():
             self._outbox.page({"what": "work", "work": each})
+            if each["name"] == TorqueLoop.__name__:
+                self._look_at = now
         self._send_file()
         if self._live.answer is not before:
             self._say(self._live.answer, {})
@@ -275,8 +278,12 @@ class SessionDesign:
 
 @functools.cache
 def _choices() -> dict[str, Any]:
-    """Return what a page lets choose from: actuators and rubbers."""
-    return {"cards": [to_json(each) for each in gallery()], "materials": list(materials())}
+    """Return what a page lets choose from: actuators, rubbers, limits."""
+    kinds = [
+        {"name": each.name, "words": each.words, "unit": each.unit, "upper": each.upper}
+        for each in LIMIT_KINDS.values()
+    ]
+    return {"cards": [to_json(each) for each in gallery()], "materials": list(materials()), "limits": kinds}
 
 
 def _question(deck: str) -> LiveQuestion:

@@ -20,7 +20,7 @@ pytest.importorskip("websockets")
 pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
 
 STATE = "document.getElementById('state-name').textContent"
-ANSWERED = f"['quick answer', 'checked answer', 'misses its target'].includes({STATE}) && {STATE}"
+ANSWERED = f"['quick answer', 'checked answer', 'checked, with remarks', 'misses its target'].includes({STATE}) && {STATE}"
 POINT = "document.querySelectorAll('.point:not(.names)')[{0}].querySelectorAll('input')[1].value"
 HANDLE = """(() => {{
   window.scrollTo(0, 0);

@@ -34,7 +34,7 @@ export class Chart {
     this.grid = draw("g", { class: "grid" });
     this.lines = draw("g", { class: "lines" });
     this.over = draw("g", { class: "over" });
-    this.cursorLine = draw("line", { class: "cursor", y1: TOP, y2: height - BOTTOM, x1: -10, x2: -10 });
+    this.cursorLine = draw("line", { class: "cursor", y1: TOP, y2: height - BOTTOM, x1: 0, x2: 0, visibility: "hidden" });
     this.dots = draw("g", { class: "dots" });
     this.svg.append(this.grid, this.lines, ...(log || symlog ? [] : [this.cursorLine]), this.dots, this.over);
     this.svg.classList.add("empty");
@@ -174,7 +174,7 @@ export class Chart {
     this.at = at;
     this.dots.replaceChildren();
     if (at === null || this.log || this.symlog || this.series.length === 0) return;
-    set(this.cursorLine, { x1: this.px(at), x2: this.px(at) });
+    set(this.cursorLine, { x1: this.px(at), x2: this.px(at), visibility: "visible" });
     const now = [];
     for (const s of this.series) {
       if (s.points || s.area || s.flat) continue;

@@ -8,7 +8,7 @@ const SPAN = 4;
 
 // One row with number field, unit and slider. change(value in SI, last) is called for each step.
 class NumberRow {
-  constructor(host, id, { change, free = null }) {
+  constructor(host, id, { change, free = null, drop = null }) {
     this.change = change;
     this.field = make("input", { type: "text", inputmode: "decimal", id: `${id}-field`, autocomplete: "off", "aria-describedby": `${id}-wrong` });
     this.unit = make("span", { class: "unit" });
@@ -24,6 +24,10 @@ class NumberRow {
       this.row.append(make("label", { class: "free", for: `${id}-free` }, this.box, "free: the design chooses it"));
     }
     this.row.append(this.margin, this.wrong);
+    if (drop) {
+      this.drop = make("button", { type: "button", class: "drop", onclick: drop }, "drop");
+      this.row.append(this.drop);
+    }
     host.append(this.row);
     this.field.addEventListener("change", () => this.entered());
     this.field.addEventListener("keydown", (event) => this.key(event));
@@ -42,6 +46,10 @@ class NumberRow {
     this.slider.disabled = locked;
     this.slider.setAttribute("aria-label", `${given.label}, slider`);
     if (this.box) this.box.checked = locked;
+    if (this.drop) {
+      this.drop.hidden = given.droppable !== true;
+      this.drop.setAttribute("aria-label", `Drop the limit: ${given.label}`);
+    }
     this.row.classList.toggle("active", given.active === true);
     text(this.margin, given.margin ?? "");
     if (document.activeElement !== this.field || this.settled) {
@@ -124,7 +132,8 @@ export class Rows {
         this.count += 1;
         const change = (value, last) => this.actions.change(name, value, last);
         const free = this.actions.free ? (yes) => this.actions.free(name, yes) : null;
-        this.rows.set(name, new NumberRow(this.host, `${this.prefix}-${this.count}`, { change, free }));
+        const drop = this.actions.drop ? () => this.actions.drop(name) : null;
+        this.rows.set(name, new NumberRow(this.host, `${this.prefix}-${this.count}`, { change, free, drop }));
       }
     }
     for (const each of list) this.rows.get(each.name).show(each);

@@ -15,6 +15,7 @@ import { Diagnosis, Tolerance } from "./work.js";
 let answer = null;
 let cards = [];
 let materials = [];
+let kinds = [];
 let angle = null;
 let full = null;
 let shownNumber = 0;
@@ -41,6 +42,11 @@ const tolerance = new Tolerance(ask);
 const diagnosis = new Diagnosis(ask);
 const limits = new Rows(byId("limits"), "limit", {
   change: (limit, value, last) => edit({ edit: "ChangeLimit", limit, value }, { drag: `limit ${limit}`, last }),
+  drop: (limit) => edit({ edit: "DropLimit", limit }),
+});
+byId("limit-add").addEventListener("click", () => {
+  const limit = byId("limit-kind").value;
+  if (limit && answer) edit({ edit: "ChangeLimit", limit, value: startOf(limit) });
 });
 const sizes = new Rows(byId("sizes"), "size", {
   change: (name, value, last) => edit({ edit: "SetNumber", name, value }, { drag: `number ${name}`, last }),
@@ -128,6 +134,7 @@ function showAnswer() {
   table.show(controls.points.map((each) => [each[0], each[1]]));
   showCurve(frozen);
   limits.show(controls.limits.map(limitRow));
+  showKinds();
   const lengths = (each) => /^m(\^2)?$/.test(each[2]) && each[1] < 1e3;
   sizes.show(controls.numbers.filter(lengths).map(numberRow));
   laws.show(controls.numbers.filter((each) => !lengths(each)).map(numberRow));
@@ -174,8 +181,31 @@ function limitRow([name, words, value, si, shown, upper, byDefault]) {
   const unit = shown === "%" ? "%" : si;
   const margin = answer.design?.margins.find((each) => each.limit === name);
   const from = byDefault ? "from the deck" : "set here";
-  return { name, path: name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false,
+  return { name, path: name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
     margin: margin ? `${from}; ${margin.active ? "the design sits on it" : `now ${withUnit(margin.value, unit, 3)}`}` : from };
+}
+
+// A new limit begins where the design is, so that nothing changes before it is moved.
+function startOf(limit) {
+  const ends = { MaximumStrain: /\.strain$/, MaximumStress: /\.stress$/, MaximumCableTension: /^tension$/, MaximumCamRadius: /^radius$/, MinimumRadiusOfCurvature: /^radius_of_curvature$/, PositiveStiffness: /^stiffness$/ };
+  const kind = kinds.find((each) => each.name === limit);
+  const rows = (answer.design?.columns ?? []).filter((each) => ends[limit]?.test(each.name)).flatMap((each) => each.values).filter((value) => value !== null && value > 0);
+  if (rows.length === 0) return 1;
+  const value = kind.upper ? Math.max(...rows) * 1.01 : Math.min(...rows) * 0.99;
+  return Number(value.toPrecision(3));
+}
+
+// Kinds of limits that do not hold yet.
+function showKinds() {
+  const held = new Set(answer.controls.limits.map((each) => each[0]));
+  const left = kinds.filter((each) => !held.has(each.name));
+  const code = left.map((each) => each.name).join(" ");
+  const select = byId("limit-kind");
+  byId("limit-add").disabled = left.length === 0;
+  select.parentElement.hidden = left.length === 0;
+  if (select.dataset.code === code) return;
+  select.dataset.code = code;
+  select.replaceChildren(...left.map((each) => make("option", { value: each.name }, `${each.upper ? "largest" : "least"} ${each.words}`)));
 }
 
 // Names of limits as people call them.
@@ -215,6 +245,7 @@ function showState() {
   let name, kind, words;
   if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${wordsOf(conflicts)}. ` : ""}${message} `];
   else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
+  else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
   else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
   else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer: ${message || missed} `];
   showWords(name, kind, words + shown + checking + failed);
@@ -268,6 +299,7 @@ function cursor() {
   const columns = answer.design.columns;
   editor.cursor(angle);
   panels.cursor(angle);
+  tolerance.cursor(angle);
   compare.cursor(angle);
   const at = (name) => interpolated(columns[0].values, columns.find((each) => each.name === name).values, angle);
   const words = `${withUnit(angle, "rad", 3)}: torque ${withUnit(at("torque"), "N*m", 3)}, tension ${withUnit(at("tension"), "N", 3)}, lever arm ${withUnit(at("lever_arm"), "m", 3)}, stiffness ${withUnit(at("stiffness"), "N*m/rad", 3)}`;
@@ -285,7 +317,8 @@ function showAngle(at) {
 // --- gallery, files, keys -------------------------------------------------------------------------
 
 function showGallery(message) {
-  ({ cards, materials } = message);
+  ({ cards, materials, limits: kinds } = message);
+  if (answer) showKinds();
   const select = byId("gallery");
   const group = (kind, label) => make("optgroup", { label }, ...cards.filter((each) => each.kind === kind).map((each) =>
     make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.reason ? `${each.name} (${each.reason})` : each.name)));

@@ -33,7 +33,8 @@ export class MechanismPicture {
       set(this.parts.get(name), attributes);
     };
     const [wide, high] = mechanism.extent.map((v) => v * 1e3);
-    const size = 0.055 * high;
+    const radius = Math.max(...mechanism.halves.flat().map(([x, y]) => Math.hypot(x, y))) * 1e3;
+    const size = 0.06 * radius;
     mechanism.halves.forEach((points, k) => put(`half${k}`, "path", { class: "body", d: `${path(mm(points))}Z` }));
     mechanism.rubbers.forEach((points, k) => put(`rubber${k}`, "path", { class: "rubber", d: `${path(mm(points))}Z` }));
     mechanism.cables.forEach((points, k) => put(`cable${k}`, "path", { class: "cable", d: path(mm(points)) }));
@@ -49,22 +50,22 @@ export class MechanismPicture {
     });
     put("centre", "circle", { class: "centre", cx: 0, cy: 0, r: size });
     for (const [name, part] of this.parts) if (!used.has(name)) { part.remove(); this.parts.delete(name); }
-    this.frame(wide, high, mechanism.halves.length > 1);
+    this.frame(wide, high, mechanism.halves.length > 1, Number(radius.toPrecision(2)));
     text(this.now, withUnit(mechanism.angle, "rad", 3));
     text(this.remark, mechanism.remark);
     set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}` });
   }
 
   // A scale in each picture, of a round length.
-  frame(wide, high, both) {
-    const code = `${wide} ${high} ${both}`;
+  frame(wide, high, both, radius) {
+    const code = `${wide} ${high} ${both} ${radius}`;
     if (code === this.framed) return;
     this.framed = code;
     const left = both ? -wide : -1.2 * high;
     const frame = [left, -1.05 * high, wide - left, 2.1 * high + 0.07 * (wide - left)];
     scaleBar(this.whole, this.wholeBar, frame, 6);
     this.whole.style.aspectRatio = `${frame[2]} / ${frame[3]}`;
-    scaleBar(this.near, this.nearBar, [-1.9 * high, -1.25 * high, 3.8 * high, 2.5 * high], 4);
+    scaleBar(this.near, this.nearBar, [-1.9 * radius, -1.15 * radius, 3.8 * radius, 2.5 * radius], 4);
   }
 }
 

@@ -128,13 +128,18 @@ export class AtAngle {
 
   showLoopWork(work) {
     if (work.state === "computing") text(this.loop.state, `computing: ${work.message}, for ${Math.round(work.seconds)} s`);
-    this.run.hidden = work.state === "computing";
+    if (work.state === "computing") this.run.hidden = true;
+    if (work.state === "failed" || work.state === "cancelled") {
+      text(this.loop.state, `${work.state}: ${work.message}`);
+      this.run.hidden = false;
+    }
   }
 
   // Each has a state of its own and says what it holds for.
   state(card, lazy, words) {
     const done = lazy.state === "done" && lazy.value !== null;
-    card.place.classList.toggle("stale", !done);
+    card.place.classList.toggle("stale", !done && card.shown === true);
+    card.shown ||= done;
     card.place.setAttribute("aria-busy", String(lazy.state === "computing"));
     const said = { computing: `computing ${lazy.message}`, failed: `failed: ${lazy.message}`, cancelled: "stopped", "asked for later": "not computed yet" };
     text(card.state, done ? words(lazy.value) : said[lazy.state] ?? lazy.state);

@@ -56,6 +56,7 @@ export class Diagnosis {
     this.words = byId("diagnosis-state");
     this.stages = byId("stages");
     this.gap = byId("gap");
+    this.stages.hidden = true;
     this.files.addEventListener("change", () => this.load([...this.files.files]));
     this.run.addEventListener("click", () => ask({ what: "work", name: "DiagnoseRecords" }));
     this.stop.addEventListener("click", () => ask({ what: "work", name: "DiagnoseRecords", stop: true }));
@@ -96,6 +97,8 @@ export class Diagnosis {
       text(this.stages.children[k], words);
       this.stages.children[k].classList.toggle("now-running", running && k === work.stages.length - 1);
     });
+    this.stages.hidden = work.stages.length === 0;
+    this.stages.scrollTop = this.stages.scrollHeight;
     const result = work.value;
     if (!result) {
       text(this.words, running ? `running for ${Math.round(work.seconds)} s` : `${work.state}: ${work.message}`);
