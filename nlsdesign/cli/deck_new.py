@@ -12,6 +12,7 @@ from ..errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..quantity import Quantity, same_dimension, typeset_unit
 from ..writing import write_text
 from .output import examples, json_option, show_json
+from .readiness import shown_command
 from .units import parse_number, split_number
 
 if TYPE_CHECKING:
@@ -74,9 +75,8 @@ def new(
         ready = list(chosen.ready_for)
         show_json({"file": file, "numbers": len(chosen.deck.numbers()), "ready_for": ready})
         return
-    click.echo(
-        f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {', '.join(chosen.ready_for)}"
-    )
+    commands = ", ".join(map(shown_command, chosen.ready_for))
+    click.echo(f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {commands}")
     click.echo(f"next: nlsdesign deck check {file}")
 
 

@@ -115,9 +115,7 @@ def check(deck_name: str, as_json: bool) -> None:
 
 
 def _show_readiness(commands: list[Readiness]) -> None:
-    ready = [
-        each.command + (f" (with {each.needs})" if each.needs else "") for each in commands if each.ready
-    ]
+    ready = [each.shown for each in commands if each.ready]
     click.echo(f"ready for: {', '.join(ready) or 'no command'}")
     reasons: dict[str, list[str]] = {}
     for each in commands:

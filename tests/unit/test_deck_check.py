@@ -40,7 +40,8 @@ def agrees(run: Run, name: str, commands: list[str]) -> dict[str, tuple[bool, st
     differing = {}
     for command in commands:
         words = (*command.split(), "--deck", str(deck) if deck.exists() else name, *COMMANDS[command])
-        status, _, err = run(*words, "--out", f"out/{command.replace(' ', '_')}")
+        out = f"out/{command.replace(' ', '_')}" + (".csv" if command == "simulate" else "")
+        status, _, err = run(*words, "--out", out)
         # A design that misses its target and a loop that limit-cycles are findings, not refusals.
         if known[command].ready != (status in (0, 1)):
             differing[command] = known[command].ready, err
@@ -69,11 +70,11 @@ def test_ready_commands_run(run: Run) -> None:
 def test_the_table_says_what_to_do_and_json_says_the_same(run: Run) -> None:
     status, out, _ = run("deck", "check", "one_sided_cable_drive")
     assert status == 0
-    assert "ready for: design (with a target), analyse angle" in out
+    assert "ready for: simulate, design (with a target), analyse angle" in out
     assert "CapstanFriction" in " ".join(out.split()), "what is in the way is named"
     content = json.loads(run("deck", "check", "one_sided_cable_drive", "--json")[1])
     ready = {name for name, each in content["commands"].items() if each["ready"]}
-    assert ready == {"design", "analyse angle", "export controller", "export fmu", "fit", "diagnose"}
+    assert ready == {"simulate", "design", "analyse angle", "export controller", "export fmu", "fit", "diagnose"}
     assert "take the friction out of the spring" in content["commands"]["observer"]["reason"]
     assert content["warnings"] == []
     assert len(content["digest"]) == 64
