@@ -41,7 +41,7 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
 
 
 def line_width() -> int:
-    """Return how many letters a line of output may have; a pipe is no narrow screen, unless COLUMNS says so."""
+    """Return the width of what is printed; a pipe is no narrow screen, unless COLUMNS says so."""
     if sys.stdout.isatty():
         return shutil.get_terminal_size((80, 24)).columns
     return _columns() or WIDE

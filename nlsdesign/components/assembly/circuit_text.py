@@ -12,7 +12,6 @@ from ..mechanics.gear import Gear
 from ..sensing.sensors import Sensor
 from .circuit import circuit_lines, circuit_of
 
-
 _WIRE = set(" ─│")
 _TREE = re.compile(r"^ *(│  )*([├└]─ )?")
 _WITHIN = re.compile(r"(?<!,) (?=[^()]*\)$)")

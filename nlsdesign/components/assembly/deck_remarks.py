@@ -85,9 +85,9 @@ def _ratios(machine: Assembly) -> Iterator[str]:
         if ratio < 1.0:
             turns = f"{1.0 / ratio:.4g}"
             yield (
-                f"{name}.{field}: {ratio:g} motor turns per output turn make the output {turns} times as fast "
-                f"as the motor, with {ratio:g} of its torque -> if {turns} motor turns per output turn were "
-                f"meant, write {turns}"
+                f"{name}.{field}: {ratio:g} motor turns per output turn make the output {turns} times as "
+                f"fast as the motor, with {ratio:g} of its torque -> if {turns} motor turns per output turn "
+                f"were meant, write {turns}"
             )
 
 
