@@ -344,6 +344,18 @@ def test_bars_are_as_high_as_the_errors_and_held_out_records_stand_right() -> No
     assert floors == [0.09, 0.08, 0.085]
 
 
+def test_small_errors_have_one_unit_and_shares_have_none() -> None:
+    errors = [figures.RecordError("a", 1.8e-4, 1.7e-4, 1.6e-4, False)]
+    axes = figures.gap_bars(errors, unit="N*m").axes[0]
+    axes.figure.canvas.draw()
+    ticks = [label.get_text() for label in axes.get_yticklabels()]
+    assert "0.00005" in ticks
+    assert axes.yaxis.get_offset_text().get_text() == ""
+    assert figures.gap_bars(errors, unit="1", quantity="error over noise").axes[0].get_ylabel() == (
+        "rms error over noise"
+    )
+
+
 def test_no_number_of_a_bar_is_struck_through_by_the_noise_floor() -> None:
     errors = [
         figures.RecordError(n, h, h, 0.25, n == "c") for n, h in (("a", 0.236), ("b", 0.27), ("c", 0.1))
