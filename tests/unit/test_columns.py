@@ -130,7 +130,7 @@ def test_parts_of_vectors_are_followed() -> None:
     # Columns that were chosen from others stand in memory the other way round.
     given = [RANDOM.normal(size=(3, 20))[:, :7:-2], RANDOM.normal(size=(1, 20))[:, :7:-2], np.zeros((0, 6))]
     given = [np.asfortranarray(each) for each in given]
-    ours = np.concatenate(ColumnEvaluator(whole, 2, translate=natively)(given))
+    ours = np.concatenate(ColumnEvaluator(whole, 0, translate=natively)(given))
     for i in range(6):
         expected = np.concatenate([np.array(r).ravel() for r in whole(given[0][:, i], given[1][:, i], [])])
         assert np.array_equal(ours[:, i], expected)
