@@ -156,3 +156,15 @@ def test_code_for_another_processor_is_not_taken(monkeypatch: pytest.MonkeyPatch
     assert elsewhere != here
     elsewhere.unlink()
     here.unlink()
+
+
+@pytest.mark.parametrize("count", [1, 6, 8])
+def test_compiled_code_gets_arrays_in_its_order(count: int) -> None:
+    """Row by row, filled up to a multiple of eight by the last column, however they stood in memory."""
+    values = np.asfortranarray(RANDOM.normal(size=(3, count)))
+    for given in (values, values[None], values[::-1], np.concatenate([values, values])[None]):
+        filled = compiled_step._filled_up(given)
+        assert filled.flags.c_contiguous
+        assert filled.shape[-1] == 8
+        assert np.array_equal(filled[..., :count], given)
+        assert np.array_equal(filled[..., count:], np.repeat(given[..., -1:], 8 - count, axis=-1))
