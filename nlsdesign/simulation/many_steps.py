@@ -31,6 +31,62 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 
+class _OneColumn:
+    """Takes one column after the other through its events.
+
+    Parameters
+    ----------
+    model, drives, tolerance, translate
+        As for :class:`ManySteps`.
+    """
+
+    def __init__(self, model: FlatModel, drives: Drives, tolerance: float, translate: Translate) -> None:
+        self._given = model, drives, tolerance, translate
+        self.logs: dict[int, EventLog] = {}
+
+    @cached_property
+    def _made(self) -> tuple[Stepper, Modes]:
+        model, drives, tolerance, translate = self._given
+        modes = Modes(model, _span(drives))
+        return Stepper(model, drives, tolerance, modes.now, translate), modes
+
+    def at(self, column: int, numbers: Array, state: Array, modes: Array) -> tuple[Stepper, Modes]:
+        """Return what steps a column and changes its modes, set to where it stands.
+
+        Parameters
+        ----------
+        column
+            Its number.
+        numbers, state, modes
+            Of all columns, the last axis.
+        """
+        model, drives, *_ = self._given
+        stepper, own = self._made
+        assert model.switching is not None
+        if column not in self.logs:
+            self.logs[column] = EventLog(model.name, model.switching.switches, _span(drives))
+        own.log = self.logs[column]
+        stepper.numbers[:] = own.numbers[:] = numbers[:, column]
+        stepper.state[:] = state[:, column]
+        own.now[:] = modes[:, column]
+        own.held = np.flatnonzero((own.now == 0.0) & np.array(model.switching.holds))
+        return stepper, own
+
+
+def _span(drives: Drives) -> float:
+    return float(drives.times[-1] - drives.times[0])
+
+
+def _inputs(drives: Drives, intervals: Places, moments: Array) -> Array:
+    """Return the inputs at moments in intervals between samples, shape (steps, moments, inputs)."""
+    since = moments - drives.times[intervals][:, None]
+    inputs = since[:, :, None] * drives.slopes.T[intervals][:, None] + drives.samples.T[intervals][:, None]
+    if drives.functions:
+        numbers = [number for _, number in drives.functions]
+        inputs[:, :, numbers] = drives.at(0, moments.ravel()).reshape(inputs.shape)[:, :, numbers]
+    return inputs
+
+
 class ManySteps:
     """Integrates all columns from sample to sample.
 
@@ -53,7 +109,7 @@ class ManySteps:
         translate: Translate,
     ) -> None:  # fmt: skip
         self._model, self._drives, self._columns = model, drives, columns
-        self._tolerance, self._translate = tolerance, translate
+        self._tolerance = tolerance
         count = len(next(iter(columns.values())))
         self.numbers = np.array([columns.get(v.name, np.full(count, v.start)) for v in model.parameters])
         self.state = np.array([columns.get(v.name, np.full(count, v.start)) for v in model.states])
@@ -67,7 +123,8 @@ class ManySteps:
         self._nominal = np.array([[v.nominal] for v in model.states])
         self._proposed = np.full(count, drives.times[1] - drives.times[0])
         self._budget, self._done = np.full(count, 40 * 20.0), np.zeros(count)
-        self._logs: dict[int, EventLog] = {}
+        self._alone = _OneColumn(model, drives, tolerance, translate)
+        self._holds = np.array(model.switching.holds if model.switching else (), dtype=bool)
         self._gone = np.zeros(count, dtype=bool)
         self._now, self._interval = np.full(count, drives.times[0]), np.zeros(count, dtype=np.intp)
         self.failures: dict[int, str] = {}
@@ -98,37 +155,11 @@ class ManySteps:
         column
             Its number.
         """
-        return tuple(self._logs[column].events) if column in self._logs else ()
+        return tuple(self._alone.logs[column].events) if column in self._alone.logs else ()
 
     def _fail(self, column: int, reason: str) -> None:
         self.failures[column] = reason
         self._gone[column] = True
-
-    @cached_property
-    def _alone(self) -> tuple[Stepper, Modes]:
-        """What takes one column after the other through events."""
-        modes = Modes(self._model, self._span)
-        return Stepper(self._model, self._drives, self._tolerance, modes.now, self._translate), modes
-
-    @property
-    def _span(self) -> float:
-        return float(self._drives.times[-1] - self._drives.times[0])
-
-    def _single(self, column: int) -> tuple[Stepper, Modes]:
-        """Return what takes a column through events, with its state and modes of now."""
-        stepper, modes = self._alone
-        if column not in self._logs and self._switching is not None:
-            self._logs[column] = EventLog(self._model.name, self._switching.switches, self._span)
-        modes.log = self._logs[column]
-        stepper.numbers[:] = modes.numbers[:] = self.numbers[:, column]
-        stepper.state[:] = self.state[:, column]
-        modes.now[:] = self._modes[:, column]
-        modes.held = np.flatnonzero((modes.now == 0.0) & self._holds)
-        return stepper, modes
-
-    @cached_property
-    def _holds(self) -> NDArray[np.bool_]:
-        return np.array(self._switching.holds if self._switching else (), dtype=bool)
 
     def _begin(self) -> None:
         """Set the modes that belong to the states."""
@@ -136,7 +167,7 @@ class ManySteps:
             return
         inputs = self._drives.at(0, self._drives.times[:1])[0]
         for column in range(self.state.shape[1]):
-            stepper, modes = self._single(column)
+            stepper, modes = self._alone.at(column, self.numbers, self.state, self._modes)
             try:
                 modes.begin(float(self._drives.times[0]), stepper.state, inputs)
             except ConvergenceError as error:
@@ -165,7 +196,7 @@ class ManySteps:
         steps = np.stack([self._now[going], length, self._interval[going]])
         steps, which = np.unique(steps, axis=1, return_inverse=True)
         moments = steps[0][:, None] + steps[1][:, None] * self._moments
-        inputs = self._inputs(steps[2].astype(np.intp), moments)[which.ravel()]
+        inputs = _inputs(self._drives, steps[2].astype(np.intp), moments)[which.ravel()]
         count = len(going)
         return self._step(
             [
@@ -174,18 +205,6 @@ class ManySteps:
                 np.repeat(self._nominal, count, axis=1), self._modes[:, going],
             ]
         )  # fmt: skip
-
-    def _inputs(self, intervals: Places, moments: Array) -> Array:
-        """Return the inputs at moments in intervals between samples, shape (steps, moments, inputs)."""
-        drives = self._drives
-        since = moments - drives.times[intervals][:, None]
-        inputs = (
-            since[:, :, None] * drives.slopes.T[intervals][:, None] + drives.samples.T[intervals][:, None]
-        )
-        if drives.functions:
-            numbers = [number for _, number in drives.functions]
-            inputs[:, :, numbers] = drives.at(0, moments.ravel()).reshape(inputs.shape)[:, :, numbers]
-        return inputs
 
     def _move(self, columns: Places, lengths: tuple[Array, Array], error: Array) -> None:
         """Move the time of the columns whose step is good enough; propose the next steps."""
@@ -209,24 +228,20 @@ class ManySteps:
             return
         held = (self._modes[:, columns] == 0.0) & self._holds[:, None] & (rate != 0.0)
         for column in columns[np.any(held, axis=0)].tolist():
-            stepper, modes = self._single(column)
+            stepper, modes = self._alone.at(column, self.numbers, self.state, self._modes)
             now, k = float(self._now[column]), int(self._interval[column])
+            inputs = _inputs(self._drives, np.array([k]), np.array([[now]]))[0, 0]
             try:
-                modes.keep(now, stepper.state, self._stage_end(k, now))
+                modes.keep(now, stepper.state, inputs)
             except ConvergenceError as error:
                 self._fail(column, str(error))
             self.state[:, column] = stepper.state
-
-    def _stage_end(self, interval: int, moment: float) -> Array:
-        # With a function that jumps at a sample its value is that of the interval that ends there.
-        result: Array = self._inputs(np.array([interval]), np.array([[moment]]))[0, 0]
-        return result
 
     def _through_event(self, column: int, length: float) -> None:
         """Take one column to the moment at which a mode ends."""
         times, k, at = self._drives.times, int(self._interval[column]), float(self._now[column])
         left = float(times[k + 1]) - at
-        stepper, modes = self._single(column)
+        stepper, modes = self._alone.at(column, self.numbers, self.state, self._modes)
         try:
             stepper.step(k, at, length)
             taken = stepper.shortened(k, length, float(times[k + 1] - times[k]))

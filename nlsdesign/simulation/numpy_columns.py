@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from threading import Lock
 from typing import Any, TypeAlias
 
 import casadi as ca
@@ -18,6 +19,9 @@ _Task: TypeAlias = tuple[Callable[..., Any], tuple[Any, ...]]
 
 AT_ONCE = 1024
 """Columns that are computed together, so that what is computed stays in the fast memory of the processor."""
+
+_SIZES = 8
+"""Numbers of columns for which arrays are kept."""
 
 _FUNCTIONS: Mapping[int, Callable[..., Any]] = {
     ca.OP_ADD: np.add, ca.OP_SUB: np.subtract, ca.OP_MUL: np.multiply, ca.OP_DIV: np.divide,
@@ -47,6 +51,8 @@ class NumpyColumns:
     def __init__(self, graph: ColumnGraph) -> None:
         self._graph = graph
         self._made: dict[int, _Columns] = {}
+        # The arrays are those of one call at a time.
+        self._lock = Lock()
 
     def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
         """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
@@ -60,12 +66,18 @@ class NumpyColumns:
         parameter
             Shape (parameters, columns).
         """
+        with self._lock:
+            return self._run(state, given, parameter)
+
+    def _run(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
         count = state.shape[1]
         after, kept = np.empty_like(state), np.empty((len(given), len(self._graph.results[1]), count))
         for first in range(0, count, AT_ONCE):
             part = slice(first, min(first + AT_ONCE, count))
             size = part.stop - part.start
             if size not in self._made:
+                if len(self._made) >= _SIZES:
+                    self._made.clear()
                 self._made[size] = _Columns(self._graph, size)
             columns = self._made[size]
             with np.errstate(all="ignore"):

@@ -233,7 +233,7 @@ def limited_by_stability(model: FlatModel, drives: Drives, interval: int, x: Arr
     ----------
     model, drives
         What is integrated.
-    k
+    interval
         Number of the interval between samples.
     x
         States.

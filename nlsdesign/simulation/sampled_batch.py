@@ -30,6 +30,10 @@ Course = Callable[[float], float] | float | Array
 __all__ = ["PLANT", "BatchTrace", "SampledSystem", "run_batch"]
 
 
+COLUMNS = 4096
+"""Runs that one call computes, so that what it needs beside the results does not grow with their number."""
+
+
 @dataclass(frozen=True, eq=False)
 class BatchTrace:
     """What many runs gave at the samples.
@@ -117,10 +121,14 @@ def run_batch(
     state = _begun(system, courses, state, values, set(start or {}))
     run = column_run(system, keep, translate=translate, runs=runs)
     kept = np.empty((runs, len(keep), count))
-    for first in range(0, count, CHUNK):
-        last = min(first + CHUNK, count)
-        state, shown = run(state, _given(system, courses, time, (first, last), runs), values)
-        kept[:, :, first:last] = shown.transpose(2, 1, 0)
+    for begun in range(0, runs, COLUMNS):
+        part = slice(begun, min(begun + COLUMNS, runs))
+        own = [course[part] if len(course) > 1 else course for course in courses]
+        for first in range(0, count, CHUNK):
+            last = min(first + CHUNK, count)
+            given = _given(system, own, time, (first, last), part.stop - part.start)
+            state[:, part], shown = run(state[:, part], given, values[:, part])
+            kept[part, :, first:last] = shown.transpose(2, 1, 0)
     finite = np.all(np.isfinite(state), axis=0)
     signals = {name: np.ascontiguousarray(kept[:, i]) for i, name in enumerate(keep)}
     return BatchTrace(time[:-1], signals, state.T.copy(), finite)

@@ -127,9 +127,11 @@ def test_parts_of_vectors_are_followed() -> None:
     changed[1] = b
     changed[[0, 2]] = outer(a[1:], b)[1:]
     whole = ca.Function("whole", [a, b, ca.MX.sym("p", 0)], [ca.vertcat(changed, outer(a[:2], 2)), a[::2]])
-    given = [RANDOM.normal(size=(3, 7)), RANDOM.normal(size=(1, 7)), np.zeros((0, 7))]
-    ours = np.concatenate(ColumnEvaluator(whole, 2, translate=natively)(given))
-    for i in range(7):
+    # Columns that were chosen from others stand in memory the other way round.
+    given = [RANDOM.normal(size=(3, 20))[:, :7:-2], RANDOM.normal(size=(1, 20))[:, :7:-2], np.zeros((0, 6))]
+    given = [np.asfortranarray(each) for each in given]
+    ours = np.concatenate(ColumnEvaluator(whole, 0, translate=natively)(given))
+    for i in range(6):
         expected = np.concatenate([np.array(r).ravel() for r in whole(given[0][:, i], given[1][:, i], [])])
         assert np.array_equal(ours[:, i], expected)
 
@@ -154,3 +156,15 @@ def test_code_for_another_processor_is_not_taken(monkeypatch: pytest.MonkeyPatch
     assert elsewhere != here
     elsewhere.unlink()
     here.unlink()
+
+
+@pytest.mark.parametrize("count", [1, 6, 8])
+def test_compiled_code_gets_arrays_in_its_order(count: int) -> None:
+    """Row by row, filled up to a multiple of eight by the last column, however they stood in memory."""
+    values = np.asfortranarray(RANDOM.normal(size=(3, count)))
+    for given in (values, values[None], values[::-1], np.concatenate([values, values])[None]):
+        filled = compiled_step._filled_up(given)
+        assert filled.flags.c_contiguous
+        assert filled.shape[-1] == 8
+        assert np.array_equal(filled[..., :count], given)
+        assert np.array_equal(filled[..., count:], np.repeat(given[..., -1:], 8 - count, axis=-1))

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nlsdesign.components import CoulombFriction, Inertia, assembly, tie
 from nlsdesign.control import ClosedLoop, torque_controller
 from nlsdesign.errors import UnknownNameError, ValueRangeError
 from nlsdesign.export import natively
-from nlsdesign.model import FlatModel
+from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
+from nlsdesign.quantity import quantity
+from nlsdesign.simulation import column_runs, sampled_batch
+from nlsdesign.simulation.buffered import Translate, as_it_is
 from nlsdesign.simulation.sampled_batch import SampledSystem, run_batch
 from tests import observed as ob
 
@@ -79,7 +83,52 @@ def test_compiled_code_gives_the_same(system: SampledSystem) -> None:
         assert np.max(np.abs(runs[0][name] - runs[1][name])) < 1e-9, name
 
 
-def test_a_run_that_diverges_is_marked_and_leaves_the_others_alone(loop: ClosedLoop) -> None:
+@pytest.mark.parametrize(("translate", "columns"), [(as_it_is, 11), (natively, 301)])
+def test_columns_are_the_runs_alone(
+    monkeypatch: pytest.MonkeyPatch, system: SampledSystem, translate: Translate, columns: int
+) -> None:
+    """Random numbers of plant and controller, also no multiple of eight columns, by NumPy and compiled.
+
+    The operations are those of the single run. Compiled they give its bits; the elementary functions of NumPy
+    may differ in the last digit, 2e-16, which a stable loop does not let grow beyond a few of them.
+    """
+    monkeypatch.setattr(column_runs, "MANY", 2)
+    monkeypatch.setattr(sampled_batch, "COLUMNS", 100)
+    random = np.random.default_rng(columns)
+    numbers = {
+        "plant.motor.inertia": random.uniform(4e-4, 9e-4, columns),
+        "plant.spring.pretension": random.uniform(0.0, 1e-3, columns),
+        "controller.controller.proportional": random.uniform(5.0, 15.0, columns),
+    }
+    start = {"plant.motor.angle": random.uniform(-0.1, 0.1, columns)}
+    given = {"inputs": {DESIRED: wanted}, "keep": KEPT}
+    batch = run_batch(system, 0.02, parameters=numbers, start=start, translate=translate, **given)
+    for i in (0, columns // 2, columns - 1):
+        one, begin = ({name: v[i : i + 1] for name, v in each.items()} for each in (numbers, start))
+        alone = run_batch(system, 0.02, parameters=one, start=begin, **given)
+        for name in KEPT:
+            size = np.max(np.abs(alone[name]))
+            allowed = 0.0 if translate is natively else 1e-10 * size
+            assert size > 1e-6
+            assert np.max(np.abs(batch[name][i] - alone[name][0])) <= allowed, (i, name)
+
+
+def test_a_plant_whose_laws_jump_is_refused(loop: ClosedLoop) -> None:
+    rubbing = flatten(
+        assembly(
+            "rubbing",
+            motor=Inertia(inertia=quantity(1e-3, "kg*m^2", source="assumed")),
+            rub=tie(CoulombFriction(sliding_effort=0.1), "motor"),
+        )
+    )
+    with pytest.raises(ValueRangeError, match=r"sharp laws rub.*smoothed\(assembly\)"):
+        SampledSystem(plant=rubbing, blocks={"observer": loop.observer}, sources={}, driven=None)
+
+
+@pytest.mark.parametrize("translate", [as_it_is, natively])
+def test_a_run_that_diverges_is_marked_and_leaves_the_others_alone(
+    loop: ClosedLoop, translate: Translate
+) -> None:
     """One Runge-Kutta step per sample is unstable for a damping of 50 N·m·s/rad on the printed inertia."""
     coarse = ClosedLoop(
         plant=loop.plant, observer=loop.observer, controller=loop.controller, wires=WIRES, substeps=1
@@ -87,6 +136,7 @@ def test_a_run_that_diverges_is_marked_and_leaves_the_others_alone(loop: ClosedL
     batch = run_batch(
         coarse.system([DESIRED]), 2.0, inputs={DESIRED: 0.0}, start={"plant.motor.speed": 1.0},
         parameters={"plant.bearing.damping": np.array([0.5, 50.0])}, keep=("plant.motor.angle",),
+        translate=translate,
     )  # fmt: skip
     assert batch.finite.tolist() == [True, False]
     assert np.all(np.isfinite(batch["plant.motor.angle"][0]))

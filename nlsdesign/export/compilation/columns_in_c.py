@@ -59,6 +59,11 @@ _HEAD = """\
 #include <string.h>
 
 #define WIDTH {width}
+#ifdef _WIN32
+#define SHOWN __declspec(dllexport)
+#else
+#define SHOWN __attribute__((visibility("default")))
+#endif
 typedef double column __attribute__((vector_size(WIDTH * 8)));
 typedef int64_t mask __attribute__((vector_size(WIDTH * 8)));
 
@@ -100,7 +105,7 @@ static void look_up(const double *grid, const double *values, int64_t nodes, int
 """
 
 _RUN = """\
-{export} void run(int64_t samples, int64_t groups, double *state, const double *given,
+SHOWN void run(int64_t samples, int64_t groups, double *state, const double *given,
                   const double *parameter, double *kept) {{
     int64_t every = groups * WIDTH;
     for (int64_t group = 0; group < groups; ++group) {{
@@ -158,8 +163,8 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
     lines += [f"s[{i}] = n{i};" for i in range(len(after))]
     written.append(
         _RUN.format(
-            export="__attribute__((visibility(\"default\")))", states=len(state), inputs=len(given),
-            parameters=len(parameter), shown=len(kept), onces="\n".join(onces),
+            states=len(state), inputs=len(given), parameters=len(parameter), shown=len(kept),
+            onces="\n".join(onces),
             fixed="\n".join(fixed), body="\n".join(lines),
         )
     )  # fmt: skip

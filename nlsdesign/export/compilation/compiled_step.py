@@ -8,6 +8,7 @@ import os
 import platform
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -30,6 +31,7 @@ _STEP_FLAGS = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")
 _COLUMN_FLAGS = ("-std=gnu99", "-fno-math-errno", "-Wno-psabi")
 
 
+@dataclass(frozen=True)
 class Natively:
     """Makes compiled code of functions, for ``simulate(..., translate=natively)`` and for batches.
 
