@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ..errors import ValueRangeError
 from .style import AFTER, BEFORE, INK, described, panels, styled
@@ -60,10 +61,12 @@ def answer_histograms(
     figure, axes = panels(rows, wide, height=2.5 * rows)
     for column, marks, panel in zip(columns, quantiles, axes, strict=False):
         _bars(panel, column)
+        panel.margins(x=0.02)
+        panel.set_xlim(*panel.get_xlim())
         _marks(panel, marks)
         panel.set_xlabel(column.label)
         panel.set_ylabel("points in each bar")
-        panel.margins(x=0.02)
+        panel.xaxis.set_major_locator(MaxNLocator(nbins=5))
     for unused in axes[len(columns) :]:
         unused.set_visible(False)
     return described(figure, words)
@@ -92,8 +95,16 @@ def _marks(panel: Axes, marks: Sequence[MarkedQuantile]) -> None:
         height = top * (1.06 + 0.09 * number)
         if not np.isfinite(mark.value):
             continue
-        bounds = [b if np.isfinite(b) else mark.value for b in (mark.lower, mark.upper)]
-        panel.plot(bounds, [height, height], color=BEFORE.light, linewidth=2.4, solid_capstyle="butt")
+        known = [b if np.isfinite(b) else mark.value for b in (mark.lower, mark.upper)]
+        bounds = known
+        if np.isfinite(mark.lower) or np.isfinite(mark.upper):
+            # A side without a bound is open: it goes on to the edge, dotted.
+            ends = panel.get_xlim()
+            bounds = [
+                b if np.isfinite(b) else end for b, end in zip((mark.lower, mark.upper), ends, strict=True)
+            ]
+            panel.plot(bounds, [height, height], color=BEFORE.light, linewidth=1.2, linestyle=(0, (1, 1.5)))
+        panel.plot(known, [height, height], color=BEFORE.light, linewidth=2.4, solid_capstyle="butt")
         panel.plot([mark.value], [height], color=INK.light, marker="|", markersize=7.0)
         panel.annotate(
             f"{100 * mark.share:g} %", (bounds[1], height), xytext=(4, 0), textcoords="offset points",
