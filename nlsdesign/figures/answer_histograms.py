@@ -65,7 +65,7 @@ def answer_histograms(
         panel.set_xlim(*panel.get_xlim())
         _marks(panel, marks)
         panel.set_xlabel(column.label)
-        panel.set_ylabel("points in each bar")
+        panel.set_ylabel("points in %")
         panel.xaxis.set_major_locator(MaxNLocator(nbins=5))
     for unused in axes[len(columns) :]:
         unused.set_visible(False)
@@ -77,7 +77,7 @@ def _bars(panel: Axes, column: ShownColumn) -> None:
     low, high = float(values.min()), float(values.max())
     if not high - low > 1e-12 * max(abs(low), abs(high)):
         room = 0.05 * abs(low) or 1.0
-        panel.bar([low], [len(values)], width=0.2 * room, color=AFTER.light, alpha=0.75)
+        panel.bar([low], [100.0], width=0.2 * room, color=AFTER.light, alpha=0.75)
         panel.set_xlim(low - room, low + room)
         return
     # The rule of Freedman and Diaconis, within what can be told apart.
@@ -85,7 +85,14 @@ def _bars(panel: Axes, column: ShownColumn) -> None:
     width = 2.0 * inner / len(values) ** (1.0 / 3.0)
     count = int(np.clip(np.ceil((high - low) / width) if width > 0.0 else _MOST_BARS, 5, _MOST_BARS))
     counts, edges = np.histogram(values, bins=count, range=(low, high))
-    panel.bar(edges[:-1], counts, width=np.diff(edges), align="edge", color=AFTER.light, alpha=0.75)
+    panel.bar(
+        edges[:-1],
+        100.0 * counts / len(values),
+        width=np.diff(edges),
+        align="edge",
+        color=AFTER.light,
+        alpha=0.75,
+    )
 
 
 def _marks(panel: Axes, marks: Sequence[MarkedQuantile]) -> None:
