@@ -17,6 +17,7 @@ from . import observer as observer
 from . import progress as progress
 from . import report as report
 from . import simulation as simulation
+from . import sweep_report as sweep_report
 from . import sweeps as sweeps
 from .analysis import EstimateDeviation as EstimateDeviation
 from .analysis import Observability as Observability

@@ -208,6 +208,52 @@ def made_springs() -> ToleranceResult:
 
 
 BESIDE = (np.array([1.0, 2.0, 5.0]), np.array([0.1, np.nan, 0.3]))
+
+
+def sweep_points() -> tuple[list[figures.ShownColumn], figures.PointKinds]:
+    """Two axes and two answers of 40 points, of which two failed, four are misses and one is on the front."""
+    x, y = np.random.default_rng(3).uniform(1.0, 2.0, (2, 40))
+    masks = [np.isin(np.arange(40), chosen) for chosen in ([7], [1, 2, 3, 4], [5, 6])]
+    columns = [("area", "mm^2", x), ("inertia", "kg*m^2", y), ("error", "N*m", x * y), ("mass", "kg", x - y)]
+    kinds = figures.PointKinds(np.arange(40), *masks)
+    return [figures.ShownColumn(*each) for each in columns], kinds
+
+
+def surfaces() -> figures.Figure:
+    (x, y, error, _), kinds = sweep_points()
+    nodes = np.linspace(1.0, 2.0, 9)
+    panel = figures.SurfacePanel(error.label, x, y, kinds, (nodes, nodes), np.outer(nodes, nodes))
+    return figures.response_surfaces(
+        [panel], words="Error over area and inertia, larger where both are large."
+    )
+
+
+def distributions() -> figures.Figure:
+    columns = sweep_points()[0][2:]
+    marks = [figures.MarkedQuantile(0.5, 1.1, 0.9, 1.3), figures.MarkedQuantile(0.95, 1.4, 1.2, math.nan)]
+    return figures.answer_histograms(
+        columns, [marks, marks], words="Error and mass of 40 points, two quantiles each."
+    )
+
+
+def shares() -> figures.Figure:
+    rows = [
+        figures.VarianceShare("area", 0.6, 0.1, 0.7, 0.1),
+        figures.VarianceShare("inertia", 0.2, 0.1, 0.3, 0.1),
+    ]
+    return figures.sensitivity_bars({"error": rows}, words="Area causes 60 % of the variance of the error.")
+
+
+def front_of_sweep() -> figures.Figure:
+    columns, kinds = sweep_points()
+    return figures.answers_against(
+        columns[2:],
+        kinds,
+        wanted=[None, 0.1],
+        words="Error over mass of 40 points, one of them on the front.",
+    )
+
+
 FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "cam_positions": lambda: figures.cam_positions(motion()),
     "torque_curve": lambda: figures.torque_curve(motion(), at=30),
@@ -247,4 +293,8 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
         words="Two curves, one of them with points, at 1 to 5 Hz; one value is missing.",
     ),
     "candidate_shares": lambda: figures.candidate_shares(SHARES),
+    "response_surfaces": surfaces,
+    "answer_histograms": distributions,
+    "sensitivity_bars": shares,
+    "answers_against": front_of_sweep,
 }

@@ -47,7 +47,7 @@ def parallel_coordinates(
     if not 2 <= len(columns) <= MOST_COORDINATES:
         rule = f"has {len(columns)} columns; two to {MOST_COORDINATES} can be drawn"
         raise ValueRangeError("parallel coordinates", rule, next_step="choose some of them")
-    heads = [in_lines(column.name) for column in columns]
+    heads = [in_lines(column.name, min(15, 160 // len(columns))) for column in columns]
     lines = 1 + max(head.count("\n") for head in heads)
     figure, (axes,) = panels(1, height=3.9 + 0.16 * lines)
     places = np.array([_scaled(axes, number, column) for number, column in enumerate(columns)]).T
@@ -68,7 +68,7 @@ def parallel_coordinates(
     axes.set_xlim(-0.45, len(columns) - 0.55)
     axes.set_ylim(-0.09, 1.09)
     axes.set_yticks([])
-    axes.set_xticks(range(len(columns)), heads, fontsize=8.0)
+    axes.set_xticks(range(len(columns)), heads, fontsize=8.0 if len(columns) < 9 else 7.2)
     axes.tick_params(axis="x", length=0.0, pad=16.0)
     axes.grid(visible=False)
     axes.spines[["left", "bottom"]].set_visible(False)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import ValueRangeError
-from .style import AFTER, BEFORE, INK, described, legend, panels, styled
+from .style import AFTER, BEFORE, INK, SURFACE, described, legend, panels, styled
 from .sweep_points import shortened
 
 
@@ -81,7 +81,7 @@ def _draw(panel: Axes, shares: Sequence[VarianceShare]) -> None:
     for label, values, errors, colour, hatch, moved in sets:
         panel.barh(
             places + moved, np.nan_to_num(values), height=height, color=colour, alpha=0.8, hatch=hatch,
-            edgecolor="white" if hatch else "none", label=label,
+            edgecolor=SURFACE.light if hatch else "none", label=label,
         )  # fmt: skip
         panel.hlines(places + moved, values - errors, values + errors, color=INK.light, linewidth=1.4)
     panel.set_yticks(places, [shortened(each.axis, 34) for each in shares])

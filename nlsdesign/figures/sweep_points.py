@@ -17,7 +17,7 @@ from .style import AFTER, DASHES, HOLDS, LIMIT, MUTED, PURPLE
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-_LETTERS, _LINES = 15, 6
+_LINES = 6
 
 
 class ShownColumn(NamedTuple):
@@ -174,19 +174,21 @@ def shortened(text: str, most: int) -> str:
     return plain if len(plain) <= most else f"{plain[: most // 3]}…{plain[-(2 * most // 3 - 1) :]}"
 
 
-def in_lines(name: str) -> str:
+def in_lines(name: str, letters: int = 15) -> str:
     """Return a name on several short lines, broken behind dots where there are some.
 
     Parameters
     ----------
     name
         Full name.
+    letters
+        Longest line.
     """
     lines: list[str] = []
     for piece in shortened(name, 80).replace(".", ".\n").replace("_", "_\u200b").split("\n"):
-        if lines and len(lines[-1]) + len(piece) <= _LETTERS and "\u200b" not in lines[-1]:
+        if lines and len(lines[-1]) + len(piece) <= letters and "\u200b" not in lines[-1]:
             lines[-1] += piece
         else:
-            lines += textwrap.wrap(piece.replace("\u200b", " \u200b"), _LETTERS + 1) or [piece]
+            lines += textwrap.wrap(piece.replace("\u200b", " \u200b"), letters + 1) or [piece]
     clean = [line.replace(" \u200b", "").replace("\u200b", "").strip() for line in lines]
     return "\n".join(clean if len(clean) <= _LINES else [*clean[: _LINES - 1], "…" + clean[-1]])

@@ -28,6 +28,10 @@ PAGE_FILE = "sweep.html"
 MOST_DECKS = 50
 _MOST_SENSITIVITIES, _MOST_AXES = 6, 8
 _MET = "met"
+_ABSTRACT = (
+    "What was asked, which points failed, which are best where it is stated what is better, and how the "
+    "answers depend on the axes. Figures are in units that people read, the table of all points in SI."
+)
 _FACTS = ("deck", "deck, digest", "question", "version", "seed", "points asked")
 
 
@@ -103,39 +107,40 @@ def write_sweep_report(
     sensitivities, refusal = _sensitivities(table, answers, names)
     remarks += refusal
     content = PageContent(table, ranked, shown_points(table, ranked), names, sensitivities, points_file)
+    best = _best(content, listed, notes, decks=decks, source=str(source))
+    files = _files(points_file, folder, decks)
+    page = _written(content, folder / PAGE_FILE, best=best, files=files, remarks=remarks)
+    front = tuple(int(table.values["point"][row]) for row in ranked.front)
+    return SweepPage(
+        page, points_file, {n: folder / name for n, name in decks.items()}, front, tuple(remarks)
+    )
+
+
+def _written(
+    content: PageContent, path: Path, *, best: Section, files: Section, remarks: Sequence[str]
+) -> Path:
+    """Write the page and return its path."""
+    table = content.table
+    about = {name: visible(text) for name, text in about_of(table).items()}
     sections: list[Section] = [
-        *asked_sections(table, ranked),
-        _best(content, listed, notes, decks=decks, source=str(source)),
+        *asked_sections(table, content.ranked),
+        best,
         *front_sections(content),
         *coordinate_sections(content),
         *sensitivity_sections(content),
         *surface_sections(content),
         *histogram_sections(content),
         *([TextSection("Remarks", "\n\n".join(remarks))] if remarks else []),
-        _files(points_file, folder, decks),
+        files,
         TableSection(
-            "Where it comes from", ("what", "as the sweep states it"), tuple(about_of(table).items()),
+            "Where it comes from", ("what", "as the sweep states it"), tuple(about.items()),
             folded=True, caption="What the sweep states of itself.",
         ),
     ]  # fmt: skip
     deck = str(table.about.get("deck", "")) or "a deck"
-    abstract = (
-        "What was asked, which points failed, which are best where it is stated what is better, and how the "
-        "answers depend on the axes. Figures are in units that people read, the table of all points in SI."
-    )
-    about = {name: visible(text) for name, text in about_of(table).items()}
     facts = {name: _brief(text) for name, text in about.items() if name in _FACTS}
-    page = write_report(
-        folder / PAGE_FILE,
-        *sections,
-        title=f"{visible(deck)}: {len(table)} points",
-        abstract=abstract,
-        facts=facts,
-    )
-    front = tuple(int(table.values["point"][row]) for row in ranked.front)
-    return SweepPage(
-        page, points_file, {n: folder / name for n, name in decks.items()}, front, tuple(remarks)
-    )
+    title = f"{visible(deck)}: {len(table)} points"
+    return write_report(path, *sections, title=title, abstract=_ABSTRACT, facts=facts)
 
 
 def usual_requirements(table: SweepTable) -> list[Requirement]:

@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nlsdesign.errors import NlsError
 from nlsdesign.sweeps.parts import Parts
+from nlsdesign.sweeps.saltelli_plan import saltelli_plan
+from nlsdesign.sweeps.sweep_file import read_sweep_file
 from nlsdesign.sweeps.sweep_table import about_text, read_sweep
 from tests.command_line import Run, run
 from tests.sweep_tables import AREA, DECK, spread_table
@@ -89,3 +92,18 @@ def test_a_folder_without_a_sweep_is_named(run: Run, tmp_path: Path) -> None:
     status, _, err = run("report", str(tmp_path))
     assert status == 2
     assert "sweep.json" in err
+
+
+def test_the_saltelli_sample_of_the_how_to_page_is_one_in_a_sweep_file(root: Path, tmp_path: Path) -> None:
+    page = (root / "docs" / "how_to" / "read_a_sweep.md").read_text(encoding="utf-8")
+    axes = page.split("```toml\n")[1].split("```")[0]
+    file = tmp_path / "sweep.toml"
+    file.write_text(f'decks = "{DECK}"\n{axes}[ask.AngleQuestion]\ncount = 3\n', encoding="utf-8")
+    plan = read_sweep_file(file).plan
+    points = np.array([row for _, row in plan.points()])
+    assert saltelli_plan(points) == (256, 4, False)
+    assert points[:, 0].min() >= 60e-6
+    assert points[:, 0].max() <= 160e-6
+    file.write_text(file.read_text(encoding="utf-8").replace("count = 256", "count = 255"), encoding="utf-8")
+    with pytest.raises(NlsError, match=r"count = 255.*power of two"):
+        read_sweep_file(file)
