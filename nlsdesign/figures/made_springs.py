@@ -85,7 +85,7 @@ def torque_band(result: ToleranceResult) -> Figure:
     figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.6, 1])
     degrees, wanted = np.degrees(result.angles), result.target.torque(result.angles)
     # No hatch: printed to PDF it covers what lies behind it. Dashed edges tell the bands without colour.
-    bands = [("as built", result.band, BEFORE.light, (0, (4, 2)))]
+    bands = [("as built", result.band, BEFORE.light, "--")]
     bands += [(f"{each.name} trimmed", each.band, AFTER.light, "-") for each in result.trims[:1]]
     for label, band, tone, dash in bands:
         for axes, scale, off in ((upper, 1.0, 0.0 * wanted), (lower, 1e3, wanted)):
