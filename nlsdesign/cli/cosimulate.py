@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import fnmatch
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..errors import ValueRangeError
+from ..errors import ValueRangeError, unknown_name
 from ..quantity import Quantity, quantity, typeset_unit
 from .output import examples, json_option, show_json, show_table
 from .overwriting import out_file_option
@@ -67,6 +68,9 @@ WIRE_HELP = (
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,
               help="Also halve the step so often and print how the signals converge.")  # fmt: skip
+@click.option("--signals", multiple=True, metavar="GLOB",
+              help="What is listed, e.g. 'plant.spring.*'; by default inputs and outputs of the FMUs. All is "
+              "written. Repeatable.")  # fmt: skip
 @out_file_option(None, "CSV to write.", ending=".csv")
 @json_option
 def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **given: Any) -> None:
@@ -92,11 +96,15 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
         if halvings is not None:
             with steps.step("halving the step"):
                 study = convergence(system, inputs=inputs, stop=stop, stepping=stepping, halvings=halvings)
+    listed = _listed(run, given["signals"])
     run.trace.write_csv(out)
     if as_json:
         show_json(_as_json(run, study, out))
         return
-    _show(run, study, system.wires)
+    _show(run, study, system.wires, listed)
+    left = len(run.trace.signals) - len(listed)
+    if left:
+        click.echo(f"and {left} more signals in {out}; --signals GLOB lists those of a name")
     click.echo(f"written: {out}, {len(run.time)} rows at most {1e3 * run.step:g} ms apart")
 
 
@@ -165,7 +173,20 @@ def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[st
     return content
 
 
-def _show(run: CoSimulation, study: Convergence | None, wires: Mapping[str, str | Wire]) -> None:
+def _listed(run: CoSimulation, globs: tuple[str, ...]) -> list[str]:
+    """Return the names that fit one of the globs; without a glob inputs and outputs, but no items of rows."""
+    names = list(run.trace.signals)
+    for each in globs:
+        if not fnmatch.filter(names, each):
+            raise unknown_name("--signals", each, names)
+    if globs:
+        return [n for n in names if any(fnmatch.fnmatchcase(n, each) for each in globs)]
+    return [n for n in names if n in run.ends and not n.endswith("]")] or names
+
+
+def _show(
+    run: CoSimulation, study: Convergence | None, wires: Mapping[str, str | Wire], listed: Sequence[str]
+) -> None:
     from ..export.cosimulation.wires import as_wire
 
     rows = []
@@ -174,7 +195,8 @@ def _show(run: CoSimulation, study: Convergence | None, wires: Mapping[str, str 
         rows.append((to, wire.source, str(wire.gain), f"{1e3 * delay:g} ms"))
     show_table("Wires", ("input", "reads", "gain", "delay"), rows)
     signals = []
-    for n, v in run.trace.signals.items():
+    for n in listed:
+        v = run[n]
         error = f"{run.errors[n]:.1e}" if n in run.errors else "-"
         unit = typeset_unit(run.trace.units[n])
         signals.append((n, f"{v.min():.4g}", f"{v.max():.4g}", f"{v[-1]:.4g}", error, unit))
@@ -183,7 +205,8 @@ def _show(run: CoSimulation, study: Convergence | None, wires: Mapping[str, str 
         return
     heads = [f"{1e3 * step:g} ms" for step in study.steps[:-1]]
     changes = []
-    for n, differences in study.differences.items():
+    for n in (each for each in listed if each in study.differences):
+        differences = study.differences[n]
         orders = ["" if math.isnan(order) else f" (order {order:.2f})" for order in study.orders(n)]
         cells = [f"{d:.2e}{order}" for d, order in zip(differences, ["", *orders], strict=True)]
         changes.append((n, *cells))

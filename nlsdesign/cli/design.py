@@ -118,7 +118,7 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
             settings=_with_progress(job, steps.note),
         )
     files = _written(designed, out)
-    remarks: list[str] = []
+    remarks = _trim_remarks(designed)
     if designed.met:
         with steps.step("drawings"):
             files += _drawn(designed, job, deck_name, out, remarks)
@@ -255,6 +255,25 @@ def _written(designed: CamDesign, out: Path) -> list[Path]:
     if designed.tolerance is not None and designed.tolerance.causes:
         pictures["tolerance"] = tolerance_bars(designed.tolerance)
     return [model, numbers, *write_figures(out, pictures)]
+
+
+def _trim_remarks(designed: CamDesign) -> list[str]:
+    """Return where made springs have to be set beyond a limit that holds for the nominal one."""
+    from ..quantity import parse_unit, with_unit
+
+    remarks = []
+    for trim in designed.tolerance.trims[:1] if designed.tolerance is not None else ():
+        low, high = trim.needed
+        for state in designed.limits:
+            if state.of == trim.name and (high > state.bound if state.upper else low < state.bound):
+                factor = parse_unit(state.unit).factor
+                needed = with_unit(f"{low / factor:.4g} to {high / factor:.4g}", state.unit)
+                bound = with_unit(f"{state.bound / factor:.4g}", state.unit)
+                remarks.append(
+                    f"{state.limit} holds for the nominal spring: to trim 95 % of the made ones, {trim.name} "
+                    f"is set from {needed}, beyond {bound} -> leave it that travel, or narrow the spreads"
+                )
+    return remarks
 
 
 def _drawn(designed: CamDesign, job: DesignJob, deck_name: str, out: Path, remarks: list[str]) -> list[Path]:

@@ -84,14 +84,15 @@ def torque_band(result: ToleranceResult) -> Figure:
     """
     figure, (upper, lower) = panels(2, height=4.6, sharex=True, height_ratios=[1.6, 1])
     degrees, wanted = np.degrees(result.angles), result.target.torque(result.angles)
-    bands = [("as built", result.band, BEFORE.light, "//")]
-    bands += [(f"{each.name} trimmed", each.band, AFTER.light, "") for each in result.trims[:1]]
-    for label, band, tone, hatch in bands:
+    # No hatch: printed to PDF it covers what lies behind it. Dashed edges tell the bands without colour.
+    bands = [("as built", result.band, BEFORE.light, "--")]
+    bands += [(f"{each.name} trimmed", each.band, AFTER.light, "-") for each in result.trims[:1]]
+    for label, band, tone, dash in bands:
         for axes, scale, off in ((upper, 1.0, 0.0 * wanted), (lower, 1e3, wanted)):
             low, middle, high = (scale * (row - off) for row in band)
             axes.fill_between(
-                degrees, low, high, color=tone, alpha=0.28, hatch=hatch, edgecolor=tone,
-                label=f"90 % of the springs, {label}",
+                degrees, low, high, facecolor=tone, alpha=0.28, edgecolor=tone, linewidth=0.9,
+                linestyle=dash, label=f"90 % of the springs, {label}",
             )  # fmt: skip
             axes.plot(degrees, middle, color=tone, linewidth=1.2)
     _targeted(upper, degrees, wanted)

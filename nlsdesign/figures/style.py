@@ -106,7 +106,8 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "axes.unicode_minus": True,
     "axes.formatter.use_mathtext": False,
-    "axes.formatter.limits": (-4, 5),
+    # A power of ten beside an axis reads as a second unit.
+    "axes.formatter.limits": (-6, 6),
     "axes.xmargin": 0.0,
     "grid.color": GRID.light,
     "grid.linewidth": 0.7,

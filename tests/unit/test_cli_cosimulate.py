@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,26 @@ def test_a_mistake_is_named_and_nothing_is_written(
     assert status == 2
     assert said in err
     assert not (tmp_path / "y.csv").exists()
+
+
+def test_inputs_and_outputs_are_listed_and_other_signals_on_request(
+    run: Run, fmus: dict[str, Path], tmp_path: Path
+) -> None:
+    call = ("cosimulate", "--fmu", f"plant={fmus['plant']}", "--stop", "0.05 s", "--out", "y.csv")
+    status, out, err = run(*call)
+    assert status == 0, err
+    heads = (tmp_path / "y.csv").read_text(encoding="utf-8").partition("\n")[0]
+    inner = [head.partition(" [")[0] for head in heads.split(",") if "der(" in head]
+    assert inner, "inner signals are in the file"
+    assert not any(name in out for name in inner)
+    assert "plant.motor.angle" in out
+    left = int(re.search(r"and (\d+) more signals in y.csv", out)[1])
+    assert left >= len(inner)
+    out = run(*call, "--force", "--signals", "plant.der(*")[1]
+    assert inner[0] in out
+    status, _, err = run(*call, "--force", "--signals", "plant.nothing*")
+    assert status == 2
+    assert "--signals 'plant.nothing*': no such name" in err
 
 
 def test_an_fmu_that_is_read_is_not_written_over(run: Run, fmus: dict[str, Path], tmp_path: Path) -> None:

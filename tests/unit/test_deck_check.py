@@ -19,7 +19,7 @@ DECKS = [*deck_names(), *template_names()]
 COMMANDS: dict[str, tuple[str, ...]] = {
     "design": ("--maximum", "0.5 N*m", "--angle", "30 deg", "--starts", "1", "--draws", "0"),
     "analyse angle": ("--to", "20 deg", "--count", "3"),
-    "analyse loop": ("--to", "20 deg", "--amplitude", "0.1 N*m"),
+    "analyse loop": ("--to", "20 deg", "--amplitude", "0.07 N*m"),
     "observer": (),
     "export c": ("--kind", "cascade"),
     "export controller": (),

@@ -350,7 +350,7 @@ def test_small_errors_have_one_unit_and_shares_have_none() -> None:
     axes = figures.gap_bars(errors, unit="N*m").axes[0]
     axes.figure.canvas.draw()
     ticks = [label.get_text() for label in axes.get_yticklabels()]
-    assert "0.00005" in ticks
+    assert "0.000050" in ticks
     assert axes.yaxis.get_offset_text().get_text() == ""
     assert figures.gap_bars(errors, unit="1", quantity="error over noise").axes[0].get_ylabel() == (
         "rms error over noise"

@@ -68,6 +68,8 @@ class CoSimulation:
         By signal: estimate of the largest error of coupling, in the unit of the signal, from a second run
         with half the step and the order of the coupling. Empty where there is no such error, or it was not
         asked for.
+    ends
+        Names of the outputs of all instances and of their inputs: what the FMUs show to each other.
     """
 
     trace: Trace
@@ -75,6 +77,7 @@ class CoSimulation:
     order: tuple[str, ...]
     delays: Mapping[str, float]
     errors: Mapping[str, float] = field(default_factory=dict)
+    ends: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Array:
         """Return one recorded signal.
@@ -242,7 +245,8 @@ class _Run:
             largest = np.max(np.abs(rows - finer), axis=0) * 2**order / (2**order - 1)
             errors = dict(zip(plan.columns, largest.tolist(), strict=True))
             self._check_converges(plan, errors, rows)
-        return CoSimulation(trace, self._step, self._system.order, self._delays(), errors)
+        shown = (*ends(self._descriptions, "input"), *ends(self._descriptions, "output"))
+        return CoSimulation(trace, self._step, self._system.order, self._delays(), errors, shown)
 
     def _plan(self, parts: int) -> Plan:
         points = points_of(self._descriptions, self._links, self._stop, self._step, parts)

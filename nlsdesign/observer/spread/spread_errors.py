@@ -211,8 +211,7 @@ def observer_errors(
             next_step="look at the spreads of the deck, or use more substeps per sample",
         )
     kept = [i for i in range(first, runs) if whole[i]]
-    inputs = np.stack([batch[name] for name in acting], axis=1)
-    bound = _bound(bench, known, rows, inputs, kept[:bounded]) if bounded else np.zeros(0)
+    bound = _bound(bench, known, rows, batch, kept[:bounded]) if bounded else np.zeros(0)
     unit = bench.model.variable(bench.estimate).unit
     return SpreadErrors(
         tuple(observers), tuple(f for f, _, _ in bench.stretches), unit, bench.torque, errors[:, 0],
@@ -294,7 +293,7 @@ def _causes(errors: Array, shifts: list[tuple[str, Array]], counted: bool) -> di
 
 
 def _bound(
-    bench: ObserverBench, known: Prior, rows: Mapping[str, Array], inputs: Array, chosen: list[int]
+    bench: ObserverBench, known: Prior, rows: Mapping[str, Array], batch: BatchTrace, chosen: list[int]
 ) -> Array:
     sensed = SensedTorque(
         bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured),
@@ -303,6 +302,7 @@ def _bound(
     bounds = []
     for i in chosen:
         values = {name: float(rows[f"{PLANT}.{name}"][i]) for name in known.names}
-        # One sample passes before a computed input acts.
-        bounds.append(estimator_bound(bench.model.with_values(values), known, inputs[i], sensed))
+        # As they act: one sample passes before that of a computed input.
+        inputs = np.stack([batch[f"{PLANT}.{v.name}"][i] for v in bench.model.inputs])
+        bounds.append(estimator_bound(bench.model.with_values(values), known, inputs, sensed))
     return np.array([rms_over(bounds, first, last) for _, first, last in bench.stretches])
