@@ -4,37 +4,45 @@ May be imported by ``cli``. The session (:class:`LiveDesign` and what it uses) i
 page stand in modules of their own. Never computes what a room below could compute.
 """
 
-from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
-from .background import WorkState
-from .edits import (
-    AddPoint,
-    ChangeLimit,
-    ChooseDeck,
-    ChooseMaterial,
-    DropLimit,
-    Edit,
-    FreeNumber,
-    HoldNumber,
-    MovePoint,
-    RemovePoint,
-    SetNumber,
-    edit_from,
-)
-from .exports import EXPORTS, ExportDesign, ExportedFile
-from .full_design import FullDesign
-from .gallery import GalleryCard, gallery, gallery_question, question_of, question_of_deck
-from .live_design import LiveDesign, Snapshot
-from .question import LiveQuestion, TargetPoint
-from .saved import SavedDesign, reopened
-from .work import (
-    CloudAnswer,
-    DiagnoseRecords,
-    DiagnosisAnswer,
-    SettleDesign,
-    Task,
-    ToleranceCloud,
-    TorqueLoop,
-)
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+# The server is a room mate of the session but must answer before any numerical library is loaded, so what
+# the session brings is imported when it is first asked for.
+if TYPE_CHECKING:
+    from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
+    from .background import WorkState
+    from .edits import (
+        AddPoint,
+        ChangeLimit,
+        ChooseDeck,
+        ChooseMaterial,
+        DropLimit,
+        Edit,
+        FreeNumber,
+        HoldNumber,
+        MovePoint,
+        RemovePoint,
+        SetNumber,
+        edit_from,
+    )
+    from .exports import EXPORTS, ExportDesign, ExportedFile
+    from .full_design import FullDesign
+    from .gallery import GalleryCard, gallery, gallery_question, question_of, question_of_deck
+    from .live_design import LiveDesign, Snapshot
+    from .question import LiveQuestion, TargetPoint
+    from .saved import SavedDesign, reopened
+    from .work import (
+        CloudAnswer,
+        DiagnoseRecords,
+        DiagnosisAnswer,
+        SettleDesign,
+        Task,
+        ToleranceCloud,
+        TorqueLoop,
+    )
 
 __all__ = [
     "EXPORTS",
@@ -78,3 +86,15 @@ __all__ = [
     "reopened",
     "to_json",
 ]
+
+_PLACES = ("answers", "background", "edits", "exports", "full_design", "gallery", "live_design", "question", "saved", "work")
+
+
+def __getattr__(name: str) -> object:
+    """Return a public name from the module in which it lives."""
+    if name in __all__:
+        for place in _PLACES:
+            module = importlib.import_module(f".{place}", __name__)
+            if name in vars(module):
+                return vars(module)[name]
+    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")

@@ -319,7 +319,7 @@ def diagnosis(stage: Callable[[str], None], actuator: Assembly, folder: Path) ->
     every = max(1, len(course.time) // 1000)
     return DiagnosisAnswer(
         verdict=verdict.verdict,
-        effects=tuple(str(each) for each in verdict.effects),
+        effects=tuple(each.headline(verdict.actuator) for each in verdict.effects),
         gap=verdict.gap()._asdict(),
         course={
             "record": course.record, "quantity": course.quantity, "unit": course.unit, "role": course.role,
