@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         ChooseDeck,
         ChooseMaterial,
         DropLimit,
-        Edit,
+        LiveEdit,
         FreeNumber,
         HoldNumber,
         MovePoint,
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
         SetNumber,
         edit_from,
     )
-    from .exports import EXPORTS, ExportDesign, ExportedFile
+    from .exports import EXPORTS, ExportDesign, ExportedDesign
     from .full_design import FullDesign
-    from .gallery import GalleryCard, gallery, gallery_question, question_of, question_of_deck
+    from .gallery import GalleryCard, gallery_cards, gallery_question, question_of, question_of_deck
     from .live_design import LiveDesign, Snapshot
     from .question import LiveQuestion, TargetPoint
     from .saved import SavedDesign, reopened
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         DiagnoseRecords,
         DiagnosisAnswer,
         SettleDesign,
-        Task,
+        LiveTask,
         ToleranceCloud,
         TorqueLoop,
     )
@@ -56,9 +56,9 @@ __all__ = [
     "DiagnoseRecords",
     "DiagnosisAnswer",
     "DropLimit",
-    "Edit",
+    "LiveEdit",
     "ExportDesign",
-    "ExportedFile",
+    "ExportedDesign",
     "FreeNumber",
     "FullDesign",
     "GalleryCard",
@@ -74,12 +74,12 @@ __all__ = [
     "SettleDesign",
     "Snapshot",
     "TargetPoint",
-    "Task",
+    "LiveTask",
     "ToleranceCloud",
     "TorqueLoop",
     "WorkState",
     "edit_from",
-    "gallery",
+    "gallery_cards",
     "gallery_question",
     "question_of",
     "question_of_deck",
@@ -87,7 +87,18 @@ __all__ = [
     "to_json",
 ]
 
-_PLACES = ("answers", "background", "edits", "exports", "full_design", "gallery", "live_design", "question", "saved", "work")
+_PLACES = (
+    "answers",
+    "background",
+    "edits",
+    "exports",
+    "full_design",
+    "gallery",
+    "live_design",
+    "question",
+    "saved",
+    "work",
+)
 
 
 def __getattr__(name: str) -> object:

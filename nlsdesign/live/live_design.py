@@ -9,13 +9,13 @@ from ..errors import ValueRangeError
 from .answers import AngleAnswer, LiveAnswer
 from .at_angle import AngleView
 from .background import WorkState
-from .edits import Edit
+from .edits import LiveEdit
 from .full_design import FullDesign, angle_view_of, full_answer
 from .question import LiveQuestion, finite_in
 from .quick_design import QuickDesign, QuickSolver
 from .saved import SavedDesign, saved
 from .views import controls_of
-from .work import LiveWork, Task
+from .work import LiveTask, LiveWork
 
 MOST_UNDO = 200
 """Steps that can be undone."""
@@ -94,7 +94,7 @@ class LiveDesign:
         """The last good design as it is looked at angle by angle; ``None`` before the first."""
         return self._now.shown
 
-    def apply(self, edit: Edit, *, drag: str | None = None) -> LiveAnswer:
+    def apply(self, edit: LiveEdit, *, drag: str | None = None) -> LiveAnswer:
         """Do an edit and return the answer.
 
         Parameters
@@ -150,7 +150,7 @@ class LiveDesign:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
         return self.shown.answer(angle, self.work.loop_at(angle, self.shown.view.revision))
 
-    def start(self, task: Task) -> WorkState:
+    def start(self, task: LiveTask) -> WorkState:
         """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled.
 
         Parameters
