@@ -185,8 +185,9 @@ def test_undo_and_redo_give_the_same_numbers(template: LiveDesign) -> None:
 
 def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(template: LiveDesign) -> None:
     good = template.answer.design
-    template.apply(ChangeLimit("MaximumCamRadius", 0.002))
-    answer = template.answer
+    template.apply(ChangeLimit("MaximumCamRadius", 0.03))
+    good = template.answer.design
+    answer = template.apply(ChangeLimit("MaximumCamRadius", 0.002))
     assert answer.state == "infeasible"
     assert answer.stale
     assert answer.design is not None
