@@ -118,7 +118,13 @@ class ChangeLimit(LiveEdit):
     value: float
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that limit."""
+        """Return the question with that limit.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such limit.
+        """
         if self.limit not in LIMIT_KINDS:
             raise unknown_name("limit", self.limit, LIMIT_KINDS)
         value = finite_in(self.limit, self.value, 0.0, 1e12)
@@ -144,7 +150,13 @@ class DropLimit(LiveEdit):
     limit: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question without it."""
+        """Return the question without it.
+
+        Raises
+        ------
+        ValueRangeError
+            If it was not set here.
+        """
         if self.limit not in question.limits:
             raise ValueRangeError(
                 f"limit '{self.limit:.80}'", "was not set here, so it cannot be dropped",
@@ -195,7 +207,13 @@ class FreeNumber(LiveEdit):
     maximum: float | None = None
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number free."""
+        """Return the question with that number free.
+
+        Raises
+        ------
+        ValueRangeError
+            If the anchor is freed while the contour is held.
+        """
         free = (*(each for each in question.free if each != self.name), self.name)
         if self.name == question.contour:
             return replace(question, free=free)
@@ -229,7 +247,13 @@ class HoldNumber(LiveEdit):
     name: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number held."""
+        """Return the question with that number held.
+
+        Raises
+        ------
+        ValueRangeError
+            If the contour is held while the anchor is free.
+        """
         held = without_free(question, self.name)
         if self.name == question.contour:
             if question.cam.anchor_distance in held.free:
@@ -257,7 +281,13 @@ class ChooseMaterial(LiveEdit):
     material: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that rubber."""
+        """Return the question with that rubber.
+
+        Raises
+        ------
+        ArrangementError
+            If there is no piece of rubber.
+        """
         pieces = question.cam.specimens
         if not pieces:
             raise ArrangementError(

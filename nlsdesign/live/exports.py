@@ -60,7 +60,15 @@ class ExportDesign(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the export of the last good design, if it answers the question that is asked."""
+        """Return the export of the last good design.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such export.
+        ValueRangeError
+            If there is no design yet.
+        """
         if self.what not in EXPORTS:
             raise unknown_name("export", self.what[:80], EXPORTS)
         if shown is None:

@@ -87,8 +87,10 @@ def question_of_deck(text: str, name: str) -> LiveQuestion:
 
     Raises
     ------
+    ValueRangeError
+        If the deck is too large.
     NlsError
-        If the deck is too large, cannot be read, or has no cam to design.
+        If it cannot be read, or has no cam to design.
     """
     size = len(text.encode())
     if size > MOST_DECK_BYTES:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..design import Target
 from ..design.optimisation.limits import Bound
-from ..design.optimisation.problem import design_problem
+from ..design.optimisation.problem import SymbolicTarget, design_problem
 from ..design.optimisation.program import PROVED_INFEASIBLE
 from ..design.optimisation.solve import GOALS
 from ..design.optimisation.starts import start_values, starts
@@ -128,7 +128,7 @@ class QuickProgram:
             free=[*contour, *sizes],
             spring=cam.drive,
             rounding=ROUNDING if knots else 0.0,
-            sized_for=question.target,
+            symbols=SymbolicTarget(question.target, self.target.end),
         )
         design = self.problem.design
         kept: list[Bound] = []

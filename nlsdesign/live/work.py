@@ -81,7 +81,13 @@ class ToleranceCloud(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the analysis on the finished assembly."""
+        """Return the analysis on the finished assembly.
+
+        Raises
+        ------
+        ValueRangeError
+            If the number of draws or the seed is out of range.
+        """
         for what, number, least, most in (
             ("draws", self.draws, _FEWEST_DRAWS, MOST_DRAWS),
             ("seed", self.seed, 0, 2**31 - 1),
@@ -122,7 +128,13 @@ class DiagnoseRecords(LiveTask):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the diagnosis of the machine as it is declared, not as it is designed."""
+        """Return the diagnosis of the machine as it is declared, not as it is designed.
+
+        Raises
+        ------
+        ValueRangeError
+            If there are too many records, or they are too large.
+        """
         files = [file for file in Path(self.folder).iterdir() if file.is_file()]
         size = sum(file.stat().st_size for file in files)
         if not 1 <= len(files) <= _MOST_FILES or size > _MOST_BYTES:
