@@ -37,7 +37,7 @@ _NEAREST_START = 0.45
 class SymbolicTarget(NamedTuple):
     """What stands for the numbers of a target that are symbols.
 
-    ``sized_for`` is a target in numbers for which variables are scaled, ``last_angle`` that angle as a symbol.
+    ``sized_for`` is a target in numbers for which variables are scaled, ``last_angle`` its symbol.
     """
 
     sized_for: Target
