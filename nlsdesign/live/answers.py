@@ -97,7 +97,9 @@ class LiveControls:
     numbers
         Rows (name, value, unit, shown unit, free, minimum, maximum, source); infinite where there is no end.
     contour
-        Name of the contour; ``contour_free`` whether it may change.
+        Name of the contour.
+    contour_free
+        Whether it may change.
     can_undo, can_redo
         Whether there is a step back or forth.
     """

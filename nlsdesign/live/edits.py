@@ -15,13 +15,13 @@ from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS
-from .question import LiveQuestion, Machine, TargetPoint, finite_in
+from .question import ChosenMachine, LiveQuestion, TargetPoint, finite_in
 
 _LONGEST_NAME = 200
 
 
 @dataclass(frozen=True)
-class Edit(ABC):
+class LiveEdit(ABC):
     """Base of the edits; numbers are in SI."""
 
     @abstractmethod
@@ -43,7 +43,7 @@ class Edit(ABC):
 
 
 @dataclass(frozen=True)
-class MovePoint(Edit):
+class MovePoint(LiveEdit):
     """Move a point of the target.
 
     Parameters
@@ -66,7 +66,7 @@ class MovePoint(Edit):
 
 
 @dataclass(frozen=True)
-class AddPoint(Edit):
+class AddPoint(LiveEdit):
     """Add a point to the target, wherever its angle belongs.
 
     Parameters
@@ -85,7 +85,7 @@ class AddPoint(Edit):
 
 
 @dataclass(frozen=True)
-class RemovePoint(Edit):
+class RemovePoint(LiveEdit):
     """Remove a point of the target.
 
     Parameters
@@ -103,7 +103,7 @@ class RemovePoint(Edit):
 
 
 @dataclass(frozen=True)
-class ChangeLimit(Edit):
+class ChangeLimit(LiveEdit):
     """Set a limit, or change one that follows from the deck.
 
     Parameters
@@ -118,7 +118,13 @@ class ChangeLimit(Edit):
     value: float
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that limit."""
+        """Return the question with that limit.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such limit.
+        """
         if self.limit not in LIMIT_KINDS:
             raise unknown_name("limit", self.limit, LIMIT_KINDS)
         value = finite_in(self.limit, self.value, 0.0, 1e12)
@@ -127,7 +133,7 @@ class ChangeLimit(Edit):
 
 
 @dataclass(frozen=True)
-class DropLimit(Edit):
+class DropLimit(LiveEdit):
     """Take a limit away; where the deck gives one of its kind, that one holds again.
 
     Parameters
@@ -144,7 +150,13 @@ class DropLimit(Edit):
     limit: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question without it."""
+        """Return the question without it.
+
+        Raises
+        ------
+        ValueRangeError
+            If it was not set here.
+        """
         if self.limit not in question.limits:
             raise ValueRangeError(
                 f"limit '{self.limit:.80}'", "was not set here, so it cannot be dropped",
@@ -155,7 +167,7 @@ class DropLimit(Edit):
 
 
 @dataclass(frozen=True)
-class SetNumber(Edit):
+class SetNumber(LiveEdit):
     """Give a number, for instance pretension or a size of the rubber; it is held from then on.
 
     Parameters
@@ -179,7 +191,7 @@ class SetNumber(Edit):
 
 
 @dataclass(frozen=True)
-class FreeNumber(Edit):
+class FreeNumber(LiveEdit):
     """Let the design choose a number, or the contour.
 
     Parameters
@@ -195,7 +207,13 @@ class FreeNumber(Edit):
     maximum: float | None = None
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number free."""
+        """Return the question with that number free.
+
+        Raises
+        ------
+        ValueRangeError
+            If the anchor is freed while the contour is held.
+        """
         free = (*(each for each in question.free if each != self.name), self.name)
         if self.name == question.contour:
             return replace(question, free=free)
@@ -217,7 +235,7 @@ class FreeNumber(Edit):
 
 
 @dataclass(frozen=True)
-class HoldNumber(Edit):
+class HoldNumber(LiveEdit):
     """Hold a number, or the contour, where the design has it now.
 
     Parameters
@@ -229,7 +247,13 @@ class HoldNumber(Edit):
     name: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that number held."""
+        """Return the question with that number held.
+
+        Raises
+        ------
+        ValueRangeError
+            If the contour is held while the anchor is free.
+        """
         held = without_free(question, self.name)
         if self.name == question.contour:
             if question.cam.anchor_distance in held.free:
@@ -245,7 +269,7 @@ class HoldNumber(Edit):
 
 
 @dataclass(frozen=True)
-class ChooseMaterial(Edit):
+class ChooseMaterial(LiveEdit):
     """Take another rubber of the library; sizes stay.
 
     Parameters
@@ -257,7 +281,13 @@ class ChooseMaterial(Edit):
     material: str
 
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
-        """Return the question with that rubber."""
+        """Return the question with that rubber.
+
+        Raises
+        ------
+        ArrangementError
+            If there is no piece of rubber.
+        """
         pieces = question.cam.specimens
         if not pieces:
             raise ArrangementError(
@@ -266,11 +296,11 @@ class ChooseMaterial(Edit):
         changed = question.machine.assembly
         for piece in pieces:
             changed = with_rubber(changed, material(self.material), piece=piece.name)
-        return kept_names(replace(question, machine=Machine(changed, self.material)))
+        return kept_names(replace(question, machine=ChosenMachine(changed, self.material)))
 
 
 @dataclass(frozen=True)
-class ChooseDeck(Edit):
+class ChooseDeck(LiveEdit):
     """Begin from another actuator of the gallery.
 
     Parameters
@@ -331,7 +361,7 @@ def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
     return replace(question, free=free)
 
 
-def _with_cam_of(machine: Machine, shown: AngleView) -> Machine:
+def _with_cam_of(machine: ChosenMachine, shown: AngleView) -> ChosenMachine:
     """Return the machine with the cam of a design."""
     cam = machine.cam
     finished = shown.machine.quantities()
@@ -340,7 +370,7 @@ def _with_cam_of(machine: Machine, shown: AngleView) -> Machine:
     return replace(machine, assembly=changed)
 
 
-def edit_from(message: Mapping[str, Any]) -> Edit:
+def edit_from(message: Mapping[str, Any]) -> LiveEdit:
     """Return the edit of a message: ``{"edit": "MovePoint", "index": 1, "angle": 0.4, "torque": 2.0}``.
 
     Parameters
@@ -355,7 +385,7 @@ def edit_from(message: Mapping[str, Any]) -> Edit:
     ValueRangeError
         If a field is missing or of the wrong kind.
     """
-    kinds = {kind.__name__: kind for kind in Edit.__subclasses__()}
+    kinds = {kind.__name__: kind for kind in LiveEdit.__subclasses__()}
     name = message.get("edit")
     if not isinstance(name, str) or name not in kinds:
         raise unknown_name("edit", str(name)[:80], kinds)

@@ -31,13 +31,20 @@ class MovableTarget:
         self._breaks = self.symbols[: pieces + 1]
         self._rows = ca.reshape(self.symbols[pieces + 1 : 5 * pieces + 1], 4, pieces)
         self.largest: Expression = self.symbols[5 * pieces + 1]
-        self.whole_energy: Expression = self.symbols[5 * pieces + 2]
+        self._energy: Expression = self.symbols[5 * pieces + 2]
+        self.end: Expression = self._breaks[pieces]
         self._pieces = pieces
         self.last_angle = last_angle
 
-    def end_law(self) -> Expression:
-        """Return the last angle."""
-        return self._breaks[self._pieces]
+    def energy(self, angle: float) -> Expression:
+        """Return the energy below the whole curve.
+
+        Parameters
+        ----------
+        angle
+            The last one.
+        """
+        return self._energy
 
     def torque_law(self, angle: Expression) -> Expression:
         """Return the torque; beyond the ends the outer pieces go on.

@@ -16,7 +16,7 @@ from .answers import LiveAnswer, to_json
 from .archive import archived, unarchived
 from .edits import edit_from
 from .exports import ExportDesign
-from .gallery import gallery, gallery_question, question_of_deck
+from .gallery import gallery_cards, gallery_question, question_of_deck
 from .inbox import Inbox
 from .limit_kinds import LIMIT_KINDS
 from .live_design import LiveDesign
@@ -283,7 +283,11 @@ def _choices() -> dict[str, Any]:
         {"name": each.name, "words": each.words, "unit": each.unit, "upper": each.upper}
         for each in LIMIT_KINDS.values()
     ]
-    return {"cards": [to_json(each) for each in gallery()], "materials": list(materials()), "limits": kinds}
+    return {
+        "cards": [to_json(each) for each in gallery_cards()],
+        "materials": list(materials()),
+        "limits": kinds,
+    }
 
 
 def _question(deck: str) -> LiveQuestion:

@@ -29,7 +29,7 @@ _MOST_BYTES = 200_000_000
 
 
 @dataclass(frozen=True)
-class Task(ABC):
+class LiveTask(ABC):
     """Base of the kinds of long work; of each kind one runs at a time."""
 
     @abstractmethod
@@ -53,7 +53,7 @@ class Task(ABC):
 
 
 @dataclass(frozen=True)
-class SettleDesign(Task):
+class SettleDesign(LiveTask):
     """The whole design of the question: :class:`~.full_design.FullDesign`."""
 
     def call(
@@ -64,7 +64,7 @@ class SettleDesign(Task):
 
 
 @dataclass(frozen=True)
-class ToleranceCloud(Task):
+class ToleranceCloud(LiveTask):
     """Torque of made springs around the design: :class:`CloudAnswer`.
 
     Parameters
@@ -81,7 +81,13 @@ class ToleranceCloud(Task):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the analysis on the finished assembly."""
+        """Return the analysis on the finished assembly.
+
+        Raises
+        ------
+        ValueRangeError
+            If the number of draws or the seed is out of range.
+        """
         for what, number, least, most in (
             ("draws", self.draws, _FEWEST_DRAWS, MOST_DRAWS),
             ("seed", self.seed, 0, 2**31 - 1),
@@ -96,7 +102,7 @@ class ToleranceCloud(Task):
 
 
 @dataclass(frozen=True)
-class TorqueLoop(Task):
+class TorqueLoop(LiveTask):
     """The torque loop over the angle: angles, and a :class:`~.answers.LoopResponse` at each."""
 
     def call(
@@ -108,7 +114,7 @@ class TorqueLoop(Task):
 
 
 @dataclass(frozen=True)
-class DiagnoseRecords(Task):
+class DiagnoseRecords(LiveTask):
     """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`.
 
     Parameters
@@ -122,7 +128,13 @@ class DiagnoseRecords(Task):
     def call(
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Return the diagnosis of the machine as it is declared, not as it is designed."""
+        """Return the diagnosis of the machine as it is declared, not as it is designed.
+
+        Raises
+        ------
+        ValueRangeError
+            If there are too many records, or they are too large.
+        """
         files = [file for file in Path(self.folder).iterdir() if file.is_file()]
         size = sum(file.stat().st_size for file in files)
         if not 1 <= len(files) <= _MOST_FILES or size > _MOST_BYTES:
@@ -140,7 +152,9 @@ class LiveWork:
     def __init__(self) -> None:
         self._running: dict[str, BackgroundWork] = {}
 
-    def start(self, task: Task, question: LiveQuestion, revision: int, shown: AngleView | None) -> WorkState:
+    def start(
+        self, task: LiveTask, question: LiveQuestion, revision: int, shown: AngleView | None
+    ) -> WorkState:
         """Start a task; one of its kind that runs is cancelled.
 
         Parameters

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -31,6 +32,16 @@ _ERROR_SCALE = 0.01
 _SHOWN = {"m": "mm", "m^2": "mm^2"}
 _NEAREST_START = 0.45
 """Largest lever arm of a start, relative to the distance of the anchor."""
+
+
+class SymbolicTarget(NamedTuple):
+    """What stands for the numbers of a target that are symbols.
+
+    ``sized_for`` is a target in numbers for which variables are scaled, ``last_angle`` its symbol.
+    """
+
+    sized_for: Target
+    last_angle: Expression
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +159,7 @@ def design_problem(
     free: Sequence[str],
     spring: str | None = None,
     rounding: float = 0.0,
-    sized_for: Target | None = None,
+    symbols: SymbolicTarget | None = None,
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
 
@@ -166,8 +177,8 @@ def design_problem(
         Path of the cam spring; decided from the structure if it is left out.
     rounding
         Width over which knots of the rubber's law are rounded, relative to its stretch.
-    sized_for
-        Target in numbers that variables are scaled for, where those of ``target`` are symbols.
+    symbols
+        Where the numbers of ``target`` are symbols: what stands for them.
 
     Raises
     ------
@@ -179,7 +190,8 @@ def design_problem(
     made = declared_cam(cam)
     law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
-    arm, stretch = _sizes(law, sized_for or target)
+    arm, stretch = _sizes(law, target if symbols is None else symbols.sized_for)
+    end = ca.SX(target.last_angle) if symbols is None else symbols.last_angle
     if rounding > 0.0:
         law = law.without_knots(2.0 * stretch, rounding)
     scalars = {number.name: scalar(number, 0.3 * stretch) for number in numbers}
@@ -190,9 +202,9 @@ def design_problem(
     if not contour_is_free:
         shape = given(model, cam, target.last_angle, law.cam.drive)
     elif made.through_centre and anchor is not None:
-        contour, shape = through_centre(parameters[anchor], target.last_angle, arm, end=target.end_law())
+        contour, shape = through_centre(parameters[anchor], target.last_angle, arm, end=end)
     else:
-        contour, shape = parallel(target.end_law(), arm)
+        contour, shape = parallel(end, arm)
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
     sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
     return _lifted(
