@@ -75,7 +75,7 @@ def rows_in_parts(out: Path) -> list[int]:
     return points
 
 
-def wait_for_rows(out: Path, count: int, seconds: float = 60.0) -> int:
+def wait_for_rows(out: Path, count: int, seconds: float = 180.0) -> int:
     """Wait until that many points stand on disk; return how many do."""
     end = time.monotonic() + seconds
     while (standing := len(rows_in_parts(out))) < count:
