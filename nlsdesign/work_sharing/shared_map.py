@@ -35,7 +35,7 @@ class ChunkSizes:
         Most points of a chunk.
     """
 
-    seconds: float = 0.5
+    seconds: float = 1.0
     largest: int = _LARGEST
 
 
