@@ -14,6 +14,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -36,19 +37,28 @@ class Tab:
     ----------
     commands, answers
         Pipes to and from the browser; messages end with a null byte.
+    tabs
+        All tabs of the browser by their session.
+    context
+        The profile that it belongs to, that of the browser where it is empty.
     """
 
     commands: IO[bytes]
     answers: IO[bytes]
+    tabs: dict[str, Tab] = field(default_factory=dict)
+    context: str = ""
     session: str = ""
     requests: list[str] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
     happened: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._numbers = itertools.count(1)
-        target = self.ask("Target.createTarget", url="about:blank")["targetId"]
+        # No number is used by two tabs, since they read answers from one pipe.
+        self._numbers = itertools.count(1 + 10_000_000 * len(self.tabs))
+        profile = {"browserContextId": self.context} if self.context else {}
+        target = self.ask("Target.createTarget", url="about:blank", **profile)["targetId"]
         self.session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self.tabs[self.session] = self
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.ask(f"{domain}.enable")
 
@@ -56,7 +66,8 @@ class Tab:
         """Send a command and return its result."""
         number = next(self._numbers)
         message: dict[str, Any] = {"id": number, "method": method, "params": parameters}
-        if self.session:
+        # Profiles are made by the browser itself, not by a tab.
+        if self.session and method != "Target.createBrowserContext":
             message["sessionId"] = self.session
         self.commands.write(json.dumps(message).encode() + b"\0")
         self.commands.flush()
@@ -66,12 +77,21 @@ class Tab:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return dict(answer["result"])
 
+    def beside(self, *, another_person: bool = False) -> Tab:
+        """Open another tab, in a profile of its own for another person."""
+        context = str(self.ask("Target.createBrowserContext")["browserContextId"]) if another_person else ""
+        return Tab(self.commands, self.answers, self.tabs, context or self.context)
+
     def open(self, path: Path) -> None:
         """Load a file and wait for it."""
+        self.visit(path.absolute().as_uri())
+
+    def visit(self, address: str) -> None:
+        """Load a page and wait for it."""
         self.requests.clear()
         self.messages.clear()
         self.happened.clear()
-        self.ask("Page.navigate", url=path.absolute().as_uri())
+        self.ask("Page.navigate", url=address)
         while "Page.loadEventFired" not in self.happened:
             self._next()
         self.evaluate("document.fonts.ready.then(() => 1)")
@@ -92,6 +112,27 @@ class Tab:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
+    def until(self, expression: str, *, seconds: float = 30.0) -> Any:
+        """Return the value of an expression once it is true."""
+        last = time.monotonic() + seconds
+        while not (value := self.evaluate(expression)):
+            assert time.monotonic() < last, f"never came true: {expression}"
+            time.sleep(0.02)
+        return value
+
+    def press(self, key: str, *, shift: bool = False, control: bool = False) -> None:
+        """Press a key and let it go."""
+        codes = {"Tab": 9, "Delete": 46, "Insert": 45, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39,
+                 "ArrowDown": 40, "Enter": 13, "z": 90}  # fmt: skip
+        given = {"key": key, "code": key, "windowsVirtualKeyCode": codes[key],
+                 "modifiers": 8 * shift + 2 * control}  # fmt: skip
+        self.ask("Input.dispatchKeyEvent", type="rawKeyDown", **given)
+        self.ask("Input.dispatchKeyEvent", type="keyUp", **given)
+
+    def mouse(self, kind: str, x: float, y: float) -> None:
+        """Press, move or release the left button at a place in CSS pixels."""
+        self.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", buttons=1, clickCount=1)
+
     def picture(self, path: Path) -> Path:
         """Write the whole page as PNG."""
         data = self.ask("Page.captureScreenshot", captureBeyondViewport=True)["data"]
@@ -110,6 +151,10 @@ class Tab:
             assert letter, "the browser has ended"
             text += letter
         answer: dict[str, Any] = json.loads(text)
+        return self.tabs.get(answer.get("sessionId", ""), self)._noted(answer)
+
+    def _noted(self, answer: dict[str, Any]) -> dict[str, Any]:
+        """Keep what an event says."""
         method, given = answer.get("method", ""), answer.get("params", {})
         self.happened.append(method)
         if method == "Network.requestWillBeSent":
@@ -153,7 +198,7 @@ def browser() -> Iterator[Tab]:
         os.close(answer_end)
         with os.fdopen(our_commands, "wb") as commands, os.fdopen(our_answers, "rb", 1 << 20) as answers:
             try:
-                yield Tab(commands, answers)
+                yield Tab(commands, answers, {})
             finally:
                 started.terminate()
                 started.wait(20)

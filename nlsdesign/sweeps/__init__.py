@@ -9,8 +9,10 @@ from .design_question import DesignQuestion
 from .diagnosis_question import DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
 from .plan import Plan
+from .preferences import LargerIsBetter, NearIsBetter, NotAbove, NotBelow, SmallerIsBetter
 from .question import FunctionQuestion, SweepQuestion
 from .run_sweep import SweepSettings, SweepTask, sweep, sweep_task
+from .saltelli_sample import SaltelliSample
 from .sweep_file import read_sweep_file
 from .sweep_table import Column, SweepTable, read_sweep
 
@@ -23,11 +25,17 @@ __all__ = [
     "DiagnosisQuestion",
     "FunctionQuestion",
     "Grid",
+    "LargerIsBetter",
     "LatinHypercube",
     "Listed",
     "LoopQuestion",
+    "NearIsBetter",
+    "NotAbove",
+    "NotBelow",
     "Plan",
     "RandomDraws",
+    "SaltelliSample",
+    "SmallerIsBetter",
     "SobolSample",
     "SpreadQuestion",
     "Subject",

@@ -23,9 +23,12 @@ from .diagnosis_question import DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
 from .question import SweepQuestion
 from .run_sweep import SweepTask, sweep_task
+from .saltelli_sample import SaltelliSample
 
 _TABLES: Final = ("decks", "axes", "ask")
-_AXES: Final = {each.__name__: each for each in (Grid, Listed, SobolSample, LatinHypercube, RandomDraws)}
+_AXES: Final = {
+    each.__name__: each for each in (Grid, Listed, SobolSample, LatinHypercube, RandomDraws, SaltelliSample)
+}
 _QUESTIONS: Final = {
     each.__name__: each
     for each in (DesignQuestion, AngleQuestion, SpreadQuestion, LoopQuestion, DiagnosisQuestion)

@@ -105,6 +105,15 @@ class Target(ABC):
         return _over(self.energy_law, angle)
 
     @property
+    def whole_energy(self) -> float:
+        """Energy in J below the curve up to the last angle."""
+        return float(self.energy(self.last_angle))
+
+    def end_law(self) -> Expression:
+        """Return the last angle as an expression; a target whose points are symbols gives a symbol."""
+        return ca.SX(self.last_angle)
+
+    @property
     def initial_stiffness(self) -> float:
         """Slope of the curve at angle zero in N·m/rad, as the one-sided limit."""
         step = 1e-7 * self.last_angle

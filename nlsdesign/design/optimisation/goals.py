@@ -110,7 +110,7 @@ class LeastRubber(Goal):
 
     def cost(self, design: DesignPoint) -> Expression:
         """Return weight · volume / typical volume."""
-        needed = float(design.target.energy(design.target.last_angle)) / self.energy_density
+        needed = design.target.whole_energy / self.energy_density
         return self.weight * design.rubber_volume / needed
 
 

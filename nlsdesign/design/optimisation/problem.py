@@ -148,6 +148,7 @@ def design_problem(
     free: Sequence[str],
     spring: str | None = None,
     rounding: float = 0.0,
+    sized_for: Target | None = None,
 ) -> DesignProblem:
     """Write the design problem of a cam spring.
 
@@ -165,6 +166,8 @@ def design_problem(
         Path of the cam spring; decided from the structure if it is left out.
     rounding
         Width over which knots of the rubber's law are rounded, relative to its stretch.
+    sized_for
+        Target in numbers that variables are scaled for, where those of ``target`` are symbols.
 
     Raises
     ------
@@ -176,7 +179,7 @@ def design_problem(
     made = declared_cam(cam)
     law = elastic_law(model, spring)
     contour_is_free, numbers = _split(model, free, law.cam)
-    arm, stretch = _sizes(law, target)
+    arm, stretch = _sizes(law, sized_for or target)
     if rounding > 0.0:
         law = law.without_knots(2.0 * stretch, rounding)
     scalars = {number.name: scalar(number, 0.3 * stretch) for number in numbers}
@@ -187,9 +190,9 @@ def design_problem(
     if not contour_is_free:
         shape = given(model, cam, target.last_angle, law.cam.drive)
     elif made.through_centre and anchor is not None:
-        contour, shape = through_centre(parameters[anchor], target.last_angle, arm)
+        contour, shape = through_centre(parameters[anchor], target.last_angle, arm, end=target.end_law())
     else:
-        contour, shape = parallel(target.last_angle, arm)
+        contour, shape = parallel(target.end_law(), arm)
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
     sizes = StartSizes(arm, stretch, law.cam.pretension, largest)
     return _lifted(

@@ -81,7 +81,9 @@ class _Support(NamedTuple):
     state_values: Expression
 
 
-def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
+def through_centre(
+    anchor: Expression, last_angle: float, size: float, *, end: Expression
+) -> tuple[ContourVariables, Shape]:
     """Return the contour of a cam through whose centre the cable passes to an anchor.
 
     Parameters
@@ -89,9 +91,11 @@ def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[
     anchor
         Distance of the anchor in m.
     last_angle
-        Cam angle at the end in rad.
+        Cam angle at the end in rad, for bounds and start.
     size
         Typical length of the contour in m.
+    end
+        The same angle as it must be reached: a number, or a symbol.
     """
     turned = ca.SX.sym("last_direction")
     last = DesignVariable(
@@ -106,7 +110,7 @@ def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[
     extensions = arcs - (slope - slope[0]) - p**2 / (anchor + root)
     rows = (
         support.rows,
-        Rows(angles[-1] - last_angle, 0.0, 0.0),
+        Rows(angles[-1] - end, 0.0, 0.0),
         Rows((root - slope) / anchor, _LEAST_CLEARANCE, ca.inf),
         Rows((p**2 + slope**2) / anchor**2, -ca.inf, (1.0 - _LEAST_CLEARANCE) ** 2),
     )
@@ -117,7 +121,7 @@ def through_centre(anchor: Expression, last_angle: float, size: float) -> tuple[
     )  # fmt: skip
 
 
-def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
+def parallel(last_angle: Expression, size: float) -> tuple[ContourVariables, Shape]:
     """Return the contour of a cam whose cable leaves to one side and stays parallel: φ = θ, h = p.
 
     Parameters
@@ -130,7 +134,7 @@ def parallel(last_angle: float, size: float) -> tuple[ContourVariables, Shape]:
     slope = _length("first_slope", size, start=0.3)._replace(lower=-_LARGEST_RADIUS / size)
     arm = _length("first_lever_arm", size, start=0.5)
     variables = ContourVariables(_radii(size), slope, arm)
-    support = _support(variables, arm.value, ca.SX(last_angle), size)
+    support = _support(variables, arm.value, last_angle, size)
     p, slopes, arcs, directions = support[:4]
     rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
     rows = (support.rows, Rows(p / size, 0.0, ca.inf))

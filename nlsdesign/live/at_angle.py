@@ -1,0 +1,250 @@
+"""What holds at one angle of a design: mechanism, observability, poles, and the torque loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis import Observability
+from ..analysis.rest_points import RestPoints, rest_points
+from ..components.assembly.named_parts import Assembly
+from ..design import Contour
+from ..errors import NlsError
+from ..model import FlatModel, flatten
+from ..model.roles import measured_motion, series_spring
+from ..model.structure import CamNames
+from ..model.transform import with_outputs
+from .answers import (
+    AngleAnswer,
+    DesignView,
+    Lazy,
+    LiveColumn,
+    LoopResponse,
+    Mechanism,
+    PoleGroup,
+    SeenStates,
+)
+from .mechanism import mechanism_at
+
+Floats = NDArray[np.float64]
+
+_GRID = 21
+"""Angles over which the typical sizes of states are taken, as observability is scaled by them."""
+_LOOP_ANGLES = 41
+_FREQUENCIES = np.geomspace(0.1, 100.0, 61)
+_SAMPLE_TIME = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class AngleView:
+    """A design that can be looked at angle by angle.
+
+    Parameters
+    ----------
+    view
+        What is shown of it over the angle.
+    contour
+        Of its cam.
+    cam
+        Names around it.
+    make
+        Gives the changed assembly; asked when it is first needed.
+    """
+
+    view: DesignView
+    contour: Contour
+    cam: CamNames
+    make: Callable[[], Assembly]
+
+    @cached_property
+    def machine(self) -> Assembly:
+        """The changed assembly."""
+        return self.make()
+
+    def seen_as(self, view: DesignView) -> AngleView:
+        """Return the same design under another revision, with what was computed of it.
+
+        Parameters
+        ----------
+        view
+            Of that revision.
+        """
+        changed = replace(self, view=view)
+        for name in ("machine", "model", "_grid"):
+            if name in self.__dict__:
+                changed.__dict__[name] = self.__dict__[name]
+        return changed
+
+    @property
+    def rest_length(self) -> float:
+        """Length of the rubber in m, as it is drawn."""
+        numbers = {each.name: each.value for each in self.view.numbers}
+        lengths = [numbers[p.rest_length] for p in self.cam.specimens if p.rest_length in numbers]
+        return lengths[0] if lengths else 2.0 * float(self.contour.radii.max())
+
+    @cached_property
+    def model(self) -> FlatModel:
+        """Flat model of the changed assembly with the measured angle and the torque as outputs."""
+        whole = flatten(self.machine)
+        return with_outputs(whole, [measured_motion(whole), series_spring(whole).effort])
+
+    @cached_property
+    def _grid(self) -> RestPoints:
+        last = float(self.view.columns[0].values[-1])
+        return rest_points(
+            self.model, np.linspace(0.0, last, _GRID), angle=measured_motion(self.model), consistent=None
+        )
+
+    def mechanism(self, angle: float) -> Mechanism:
+        """Return cam, cable and rubber at one angle.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        column = self.view.column("extension").values
+        now = float(np.interp(abs(angle), self.view.columns[0].values, column))
+        extensions = (float(column[0]), now, float(column[-1]))
+        return mechanism_at(self.contour, angle, extensions=extensions, rest_length=self.rest_length)
+
+    def readings(self, angle: float) -> tuple[LiveColumn, ...]:
+        """Return the columns of the design at one angle, by interpolation.
+
+        Parameters
+        ----------
+        angle
+            In rad; the curves are those of the positive side.
+        """
+        at = self.view.columns[0].values
+        return tuple(
+            LiveColumn(c.name, c.unit, c.description, np.array([np.interp(abs(angle), at, c.values)]))
+            for c in self.view.columns
+        )
+
+    def answer(self, angle: float, loop: Lazy) -> AngleAnswer:
+        """Return all that holds at one angle.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        loop
+            State of the torque loop there.
+        """
+        points: list[RestPoints] = []
+
+        def rest() -> RestPoints:
+            if not points:
+                here = np.array([*self._grid.at, angle])
+                points.append(rest_points(self.model, here, angle=self._grid.angle, consistent=None))
+            return points[0]
+
+        return AngleAnswer(
+            angle=angle,
+            revision=self.view.revision,
+            mechanism=self.mechanism(angle),
+            readings=self.readings(angle),
+            observability=self._lazily(lambda: seen_states(rest())),
+            poles=self._lazily(lambda: pole_groups(rest())),
+            loop=loop,
+        )
+
+    def _lazily(self, make: Callable[[], object]) -> Lazy:
+        try:
+            return Lazy("done", self.view.revision, make())
+        except NlsError as error:
+            return Lazy("failed", self.view.revision, None, str(error))
+
+
+def seen_states(points: RestPoints) -> SeenStates:
+    """Return what the sensor of the angle shows at the last of some rest points.
+
+    Parameters
+    ----------
+    points
+        Over the whole range, and the angle itself last.
+    """
+    columns = Observability(measured=(points.angle,)).over(points)
+    values = dict(zip((v.name for v in columns.columns), columns.values[-1], strict=True))
+    return SeenStates(
+        measured=points.angle,
+        rank=round(values["observability.rank"]),
+        states=len(points.state_names),
+        condition=float(values["observability.condition"]),
+        verdict=columns.words["verdict"][-1],
+    )
+
+
+def pole_groups(points: RestPoints) -> tuple[PoleGroup, ...]:
+    """Return the poles of the plant at the last of some rest points, by mode of its dry friction.
+
+    Parameters
+    ----------
+    points
+        The angle last.
+    """
+    return tuple(
+        PoleGroup(mode.name, mode.words, mode.eigenvalues[-1].real.copy(), mode.eigenvalues[-1].imag.copy())
+        for mode in points.modes
+    )
+
+
+def loop_responses(
+    stage: Callable[[str], None], machine: Assembly, last: float
+) -> tuple[Floats, list[LoopResponse]]:
+    """Return the torque loop of a machine over its angle, with controller and observer by default.
+
+    Parameters
+    ----------
+    stage
+        Called with what is done now.
+    machine
+        With a motor, a spring and an encoder.
+    last
+        Largest angle in rad.
+
+    Returns
+    -------
+    tuple
+        Angles, shape (n,), and the response at each.
+
+    Raises
+    ------
+    NlsError
+        If the machine has no such loop.
+    """
+    from ..control import encoder_loop, torque_controller
+    from ..control.evaluation.linear_loop import linear_loop
+    from ..observer import CascadeGain, design_observer
+
+    whole = flatten(machine)
+    torque = series_spring(whole).effort
+    plant = with_outputs(whole, [measured_motion(whole), torque])
+    stage("designs the observer")
+    observer = design_observer(plant, sample_time=_SAMPLE_TIME, gain=CascadeGain())
+    controller = torque_controller(plant, sample_time=_SAMPLE_TIME)
+    stage("linearises the loop")
+    angles = np.linspace(0.0, last, _LOOP_ANGLES)
+    loop = encoder_loop(plant, observer=observer, controller=controller, delay=1, substeps=10)
+    linear = linear_loop(loop, angles)
+    answers = linear.response(f"plant.{torque}", loop.desired, _FREQUENCIES)
+    words = (
+        "torque over wanted torque, small deviations around the torque that is held there: PID by default, "
+        "cascade observer, 1 kHz, one sample of delay, numbers of the deck; limits and counts take no part"
+    )
+    stable, reached = linear.stable(), linear.reached
+    with np.errstate(divide="ignore"):
+        size = 20.0 * np.log10(np.abs(answers))
+    phase = np.degrees(np.unwrap(np.angle(answers), axis=1))
+    return angles, [
+        LoopResponse(
+            _FREQUENCIES, size[k], phase[k], bool(stable[k]), str(linear.mode),
+            words if reached[k] else "the loop cannot rest at this angle within its limits; " + words,
+        )
+        for k in range(len(angles))
+    ]  # fmt: skip

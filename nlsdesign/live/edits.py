@@ -1,0 +1,400 @@
+"""What a designer does, one step at a time: each edit makes another question of one."""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..components.assembly.other_rubber import with_rubber
+from ..components.materials.library import material
+from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
+from .at_angle import AngleView
+from .gallery import gallery_question
+from .limit_kinds import LIMIT_KINDS
+from .question import LiveQuestion, Machine, TargetPoint, finite_in
+
+_LONGEST_NAME = 200
+
+
+@dataclass(frozen=True)
+class Edit(ABC):
+    """Base of the edits; numbers are in SI."""
+
+    @abstractmethod
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question after the edit.
+
+        Parameters
+        ----------
+        question
+            Before it.
+        shown
+            The last good design, where an edit begins from it.
+
+        Raises
+        ------
+        NlsError
+            If it cannot be done; the question before it stays.
+        """
+
+
+@dataclass(frozen=True)
+class MovePoint(Edit):
+    """Move a point of the target.
+
+    Parameters
+    ----------
+    index
+        Of the point, from 0 at angle zero.
+    angle, torque
+        Where to, in rad and N·m.
+    """
+
+    index: int
+    angle: float
+    torque: float
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with the point there, between its neighbours."""
+        points = list(question.points)
+        points[_index(self.index, len(points))] = TargetPoint(float(self.angle), float(self.torque))
+        return question.with_points(tuple(points))
+
+
+@dataclass(frozen=True)
+class AddPoint(Edit):
+    """Add a point to the target, wherever its angle belongs.
+
+    Parameters
+    ----------
+    angle, torque
+        In rad and N·m.
+    """
+
+    angle: float
+    torque: float
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with one point more."""
+        point = TargetPoint(float(self.angle), float(self.torque))
+        return question.with_points(tuple(sorted([*question.points, point], key=lambda each: each.angle)))
+
+
+@dataclass(frozen=True)
+class RemovePoint(Edit):
+    """Remove a point of the target.
+
+    Parameters
+    ----------
+    index
+        Of the point, from 1: the first stays.
+    """
+
+    index: int
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with one point less."""
+        index = _index(self.index, len(question.points))
+        return question.with_points(question.points[:index] + question.points[index + 1 :])
+
+
+@dataclass(frozen=True)
+class ChangeLimit(Edit):
+    """Set a limit, or change one that follows from the deck.
+
+    Parameters
+    ----------
+    limit
+        Name of its kind, for instance ``"MaximumStrain"``.
+    value
+        In SI; for a stress what is allowed, safety included.
+    """
+
+    limit: str
+    value: float
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with that limit."""
+        if self.limit not in LIMIT_KINDS:
+            raise unknown_name("limit", self.limit, LIMIT_KINDS)
+        value = finite_in(self.limit, self.value, 0.0, 1e12)
+        LIMIT_KINDS[self.limit].limit(value)
+        return replace(question, limits={**question.limits, self.limit: value})
+
+
+@dataclass(frozen=True)
+class DropLimit(Edit):
+    """Take a limit away; where the deck gives one of its kind, that one holds again.
+
+    Parameters
+    ----------
+    limit
+        Name of its kind.
+
+    Raises
+    ------
+    ValueRangeError
+        If it was not set: limits that follow from the deck are changed, not dropped.
+    """
+
+    limit: str
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question without it."""
+        if self.limit not in question.limits:
+            raise ValueRangeError(
+                f"limit '{self.limit:.80}'", "was not set here, so it cannot be dropped",
+                next_step="a limit that follows from the deck can be changed to another number",
+            )  # fmt: skip
+        rest = {name: value for name, value in question.limits.items() if name != self.limit}
+        return replace(question, limits=rest)
+
+
+@dataclass(frozen=True)
+class SetNumber(Edit):
+    """Give a number, for instance pretension or a size of the rubber; it is held from then on.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    value
+        In SI.
+    """
+
+    name: str
+    value: float
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with that number held."""
+        question.number(self.name)
+        variable = question.machine.model.variable(self.name)
+        value = finite_in(self.name, self.value, variable.minimum, variable.maximum)
+        held = without_free(question, self.name)
+        return replace(held, given={**question.given, self.name: value})
+
+
+@dataclass(frozen=True)
+class FreeNumber(Edit):
+    """Let the design choose a number, or the contour.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    minimum, maximum
+        Range in SI; that of the part where it is left out.
+    """
+
+    name: str
+    minimum: float | None = None
+    maximum: float | None = None
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with that number free."""
+        free = (*(each for each in question.free if each != self.name), self.name)
+        if self.name == question.contour:
+            return replace(question, free=free)
+        question.number(self.name)
+        if self.name == question.cam.anchor_distance and question.contour not in free:
+            raise ValueRangeError(
+                f"free '{self.name}'", "the anchor shapes the contour, so it is free only together with it",
+                next_step=f"free '{question.contour}' first",
+            )  # fmt: skip
+        variable = question.machine.model.variable(self.name)
+        low = variable.minimum if self.minimum is None else self.minimum
+        high = variable.maximum if self.maximum is None else self.maximum
+        if self.minimum is None and self.maximum is None:
+            ranges = {name: each for name, each in question.ranges.items() if name != self.name}
+            return replace(question, free=free, ranges=ranges)
+        finite_in(f"least {self.name}", low, variable.minimum, variable.maximum)
+        finite_in(f"largest {self.name}", high, low, variable.maximum)
+        return replace(question, free=free, ranges={**question.ranges, self.name: (low, high)})
+
+
+@dataclass(frozen=True)
+class HoldNumber(Edit):
+    """Hold a number, or the contour, where the design has it now.
+
+    Parameters
+    ----------
+    name
+        Full name.
+    """
+
+    name: str
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with that number held."""
+        held = without_free(question, self.name)
+        if self.name == question.contour:
+            if question.cam.anchor_distance in held.free:
+                raise ValueRangeError(
+                    f"hold '{self.name}'", "the anchor shapes the contour, so it is held first",
+                    next_step=f"hold '{question.cam.anchor_distance}'",
+                )  # fmt: skip
+            return held if shown is None else replace(held, machine=_with_cam_of(question.machine, shown))
+        value = question.number(self.name).value
+        if shown is not None:
+            value = {each.name: each.value for each in shown.view.numbers}.get(self.name, value)
+        return replace(held, given={**question.given, self.name: value})
+
+
+@dataclass(frozen=True)
+class ChooseMaterial(Edit):
+    """Take another rubber of the library; sizes stay.
+
+    Parameters
+    ----------
+    material
+        Its name.
+    """
+
+    material: str
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with that rubber."""
+        pieces = question.cam.specimens
+        if not pieces:
+            raise ArrangementError(
+                f"spring '{question.cam.drive}'", "has no piece of rubber", next_step="choose another deck"
+            )
+        changed = question.machine.assembly
+        for piece in pieces:
+            changed = with_rubber(changed, material(self.material), piece=piece.name)
+        return kept_names(replace(question, machine=Machine(changed, self.material)))
+
+
+@dataclass(frozen=True)
+class ChooseDeck(Edit):
+    """Begin from another actuator of the gallery.
+
+    Parameters
+    ----------
+    name
+        Of the deck or template.
+    """
+
+    name: str
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with which that actuator begins."""
+        return gallery_question(self.name)
+
+
+def kept_names(question: LiveQuestion) -> LiveQuestion:
+    """Return a question without numbers that its machine no longer has.
+
+    Parameters
+    ----------
+    question
+        With a changed machine.
+    """
+    names = {*question.machine.sizes, question.contour}
+    return replace(
+        question,
+        free=tuple(name for name in question.free if name in names),
+        ranges={name: each for name, each in question.ranges.items() if name in names},
+        given={name: each for name, each in question.given.items() if name in names},
+    )
+
+
+def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
+    """Return a question in which a number, or the contour, is not free.
+
+    Parameters
+    ----------
+    question
+        Before.
+    name
+        Full name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such number.
+    ValueRangeError
+        If nothing would be left that may change.
+    """
+    if name != question.contour:
+        question.number(name)
+    free = tuple(each for each in question.free if each != name)
+    if not free:
+        raise ValueRangeError(
+            f"hold '{name}'", "leaves nothing that may change",
+            next_step=f"free '{question.contour}' first",
+        )  # fmt: skip
+    return replace(question, free=free)
+
+
+def _with_cam_of(machine: Machine, shown: AngleView) -> Machine:
+    """Return the machine with the cam of a design."""
+    cam = machine.cam
+    finished = shown.machine.quantities()
+    names = [name for name in finished if name.startswith(f"{cam.name}.")]
+    changed = machine.assembly.with_values({name: finished[name] for name in names})
+    return replace(machine, assembly=changed)
+
+
+def edit_from(message: Mapping[str, Any]) -> Edit:
+    """Return the edit of a message: ``{"edit": "MovePoint", "index": 1, "angle": 0.4, "torque": 2.0}``.
+
+    Parameters
+    ----------
+    message
+        Name of the edit and its fields.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such edit or field.
+    ValueRangeError
+        If a field is missing or of the wrong kind.
+    """
+    kinds = {kind.__name__: kind for kind in Edit.__subclasses__()}
+    name = message.get("edit")
+    if not isinstance(name, str) or name not in kinds:
+        raise unknown_name("edit", str(name)[:80], kinds)
+    kind = kinds[name]
+    hints = typing.get_type_hints(kind)
+    fields = {each.name: each for each in dataclasses.fields(kind)}
+    given = {key: value for key, value in message.items() if key != "edit"}
+    for key, value in given.items():
+        if key not in fields:
+            raise unknown_name(f"{name}: field", str(key)[:80], fields)
+        _require_kind(f"{name}: {key}", value, hints[key])
+    missing = [
+        key for key, each in fields.items() if key not in given and each.default is dataclasses.MISSING
+    ]
+    if missing:
+        raise ValueRangeError(name, f"lacks {', '.join(missing)}", next_step=f"fields: {', '.join(fields)}")
+    return kind(**given)
+
+
+def _require_kind(what: str, value: object, hint: Any) -> None:
+    allowed = typing.get_args(hint) or (hint,)
+    if value is None and type(None) in allowed:
+        return
+    if str in allowed and isinstance(value, str) and len(value) <= _LONGEST_NAME:
+        return
+    if int in allowed and isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1_000_000:
+        return
+    if float in allowed:
+        finite_in(what, value, -1e300, 1e300)
+        return
+    raise ValueRangeError(
+        f"{what} = {brief(value)}", "is of the wrong kind", next_step="see the edit's fields"
+    )
+
+
+def _index(index: int, count: int) -> int:
+    if not 1 <= index < count:
+        raise ValueRangeError(
+            f"point {index} of the target", f"cannot be changed; those that can are 1 to {count - 1}",
+            next_step="point 0 stays at angle zero",
+        )  # fmt: skip
+    return index

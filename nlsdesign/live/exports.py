@@ -1,0 +1,188 @@
+"""A design as files: deck, drawing, C, FMU; made in a process of its own, given back as bytes."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..components.assembly.deck_writer import deck_text
+from ..components.assembly.named_parts import Assembly
+from ..design import Contour, MachinedOneSidedCam, MachinedTwoSidedCam, write_drawings
+from ..errors import ValueRangeError, unknown_name
+from ..model import flatten
+from ..model.roles import measured_motion, series_cam, series_spring
+from ..model.transform import with_outputs
+from .at_angle import AngleView
+from .question import LiveQuestion
+from .work import Task
+
+_SAMPLE_TIME = 1e-3
+_OLD = (1980, 1, 1, 0, 0, 0)
+"""Date of files in an archive, so that the same design gives the same bytes."""
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """One file.
+
+    Parameters
+    ----------
+    name
+        Of the file.
+    media_type
+        For browsers.
+    content
+        Bytes.
+    """
+
+    name: str
+    media_type: str
+    content: bytes
+
+
+@dataclass(frozen=True)
+class ExportDesign(Task):
+    """The design as a file: :class:`ExportedFile`.
+
+    Parameters
+    ----------
+    what
+        ``"deck"``, ``"svg"``, ``"dxf"``, ``"c"`` or ``"fmu"``.
+    """
+
+    what: str
+
+    def call(
+        self, question: LiveQuestion, shown: AngleView | None
+    ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """Return the export of the last good design, if it answers the question that is asked."""
+        if self.what not in EXPORTS:
+            raise unknown_name("export", self.what[:80], EXPORTS)
+        if shown is None:
+            raise ValueRangeError("export", "there is no design yet", next_step="widen a limit first")
+        return EXPORTS[self.what], (shown.machine, shown.contour)
+
+
+def exported_deck(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+    """Return the machine as a deck.
+
+    Parameters
+    ----------
+    stage
+        Called with what is done now.
+    machine
+        Changed.
+    contour
+        Of its cam.
+    """
+    return ExportedFile(f"{machine.name}.toml", "application/toml", deck_text(machine).encode())
+
+
+def exported_svg(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+    """Return the drawing of the cam as SVG.
+
+    Parameters
+    ----------
+    stage, machine, contour
+        As for :func:`exported_deck`.
+    """
+    return _drawing(machine, contour, "svg", "image/svg+xml")
+
+
+def exported_dxf(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+    """Return the drawing of the cam as DXF.
+
+    Parameters
+    ----------
+    stage, machine, contour
+        As for :func:`exported_deck`.
+    """
+    return _drawing(machine, contour, "dxf", "image/vnd.dxf")
+
+
+def exported_c(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+    """Return cascade observer and PID controller as C, in an archive.
+
+    Parameters
+    ----------
+    stage, machine, contour
+        As for :func:`exported_deck`.
+
+    Raises
+    ------
+    NlsError
+        If the machine has no observer or controller.
+    """
+    from ..control import joined, torque_controller
+    from ..export import export_c
+    from ..observer import CascadeGain, design_observer
+
+    whole = flatten(machine)
+    plant = with_outputs(whole, [measured_motion(whole), series_spring(whole).effort])
+    stage("designs observer and controller")
+    observer = design_observer(plant, sample_time=_SAMPLE_TIME, gain=CascadeGain())
+    both = joined(observer, torque_controller(plant, sample_time=_SAMPLE_TIME))
+    stage("writes C")
+    with tempfile.TemporaryDirectory() as folder:
+        files = export_c(both, folder, name="observer_and_controller")
+        content = _archive([files.header, files.source, files.selftest])
+    return ExportedFile("observer_and_controller.zip", "application/zip", content)
+
+
+def exported_fmu(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+    """Return the plant as an FMU for co-simulation.
+
+    Parameters
+    ----------
+    stage, machine, contour
+        As for :func:`exported_deck`.
+
+    Raises
+    ------
+    NlsError
+        If it cannot be compiled here.
+    """
+    from ..export import export_fmu
+
+    stage("compiles the plant")
+    with tempfile.TemporaryDirectory() as folder:
+        file = export_fmu(flatten(machine), Path(folder) / "plant.fmu")
+        return ExportedFile("plant.fmu", "application/zip", file.read_bytes())
+
+
+EXPORTS: dict[str, Callable[..., ExportedFile]] = {
+    "deck": exported_deck,
+    "svg": exported_svg,
+    "dxf": exported_dxf,
+    "c": exported_c,
+    "fmu": exported_fmu,
+}
+"""What a design can be saved as."""
+
+
+def _drawing(machine: Assembly, contour: Contour, ending: str, media_type: str) -> ExportedFile:
+    names = series_cam(flatten(machine))
+    machined = None
+    if names.cable is not None:
+        diameter = machine.quantities()[names.cable.diameter]
+        half = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
+        kind = MachinedOneSidedCam if contour.anchor_distance == float("inf") else MachinedTwoSidedCam
+        machined = kind(cable_radius=half)
+    note = "" if machined else "the cable is not declared: this is the curve of its centre line"
+    with tempfile.TemporaryDirectory() as folder:
+        files = write_drawings(Path(folder), contour, machined=machined, note=note, formats=(ending,))
+        content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
+    return ExportedFile(f"cam.{ending}", media_type, content)
+
+
+def _archive(files: list[Path]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in files:
+            archive.writestr(zipfile.ZipInfo(file.name, _OLD), file.read_bytes())
+    return buffer.getvalue()

@@ -1,0 +1,143 @@
+"""The whole design of a question: several starts, the finish, the check on the finished assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ..components.assembly.named_parts import Assembly
+from ..design import CamDesign, DesignSettings, Limit, Target, design_cam
+from ..errors import ConvergenceError, InfeasibleError
+from .answers import DesignView, LiveAnswer
+from .at_angle import AngleView
+from .question import LiveQuestion
+from .quick_design import QuickDesign
+from .views import view_of
+
+STARTS = 8
+_DEARER = 1e-3
+"""Relative difference of costs, and cost, from which two solutions are different optima."""
+_DIFFERS = 1e-3
+"""Difference of two rms errors relative to the largest torque from which it is stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class FullDesign:
+    """What the whole design came to.
+
+    Parameters
+    ----------
+    state
+        ``"solved"``, ``"infeasible"`` or ``"not solved"``.
+    design
+        Where it is solved.
+    message
+        Otherwise.
+    """
+
+    state: str
+    design: CamDesign | None
+    message: str = ""
+
+
+def whole_design(
+    stage: Callable[[str], None],
+    actuator: Assembly,
+    target: Target,
+    free: tuple[str, ...],
+    keep: tuple[Limit, ...],
+) -> FullDesign:
+    """Return the whole design.
+
+    Parameters
+    ----------
+    stage
+        Called with what is done now.
+    actuator, target, free, keep
+        As for :func:`~nlsdesign.design.design_cam`; the limits are all that hold.
+    """
+    done = 0
+
+    def progress() -> None:
+        nonlocal done
+        done += 1
+        stage(f"start {done} of {STARTS} is solved")
+
+    stage(f"solves from {STARTS} starts")
+    settings = DesignSettings(
+        starts=STARTS, defaults=(), look_for_size_ranges=False, look_for_remedies=False, draws=0,
+        progress=progress,
+    )  # fmt: skip
+    try:
+        return FullDesign(
+            "solved", design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
+        )
+    except InfeasibleError as error:
+        return FullDesign("infeasible", None, str(error))
+    except ConvergenceError as error:
+        return FullDesign("not solved", None, str(error))
+
+
+def full_answer(
+    full: FullDesign, question: LiveQuestion, quick: LiveAnswer, solved: QuickDesign | None
+) -> LiveAnswer:
+    """Return the answer that replaces the quick one, with what differs between the two in its message.
+
+    Parameters
+    ----------
+    full
+        Of the same question.
+    question
+        That was asked.
+    quick
+        The quick answer.
+    solved
+        Its design; ``None`` where it had none of its own.
+    """
+    if full.design is None:
+        remark = "; the quick answer had a design, which is not confirmed" if solved else ""
+        return replace(quick, state=full.state, source="full", message=full.message + remark)
+    view = view_of(question, quick.revision, full.design)
+    sentences = [*([] if full.design.miss is None else [str(full.design.miss)])]
+    if solved is not None and quick.design is not None:
+        sentences += _differences(full.design, solved, quick.design)
+    elif quick.state != "solved":
+        sentences.append("the quick answer had no design for this question")
+    sentences += full.design.remarks
+    return replace(
+        quick, state="solved", source="full", message="; ".join(sentences), design=view, conflicts=()
+    )
+
+
+def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> list[str]:
+    """Return in words where the quick answer was another optimum, or the finished assembly is another."""
+    cost, largest, sentences = design.starts[design.taken].cost, design.target.largest, []
+    was, there = f"{1e3 * quick.rms_error:.3g} mN·m rms", f"{1e3 * design.predicted_rms:.3g} mN·m rms"
+    if solved.cost > cost * (1.0 + _DEARER) + _DEARER:
+        sentences.append(f"the quick answer was a worse local optimum: {was} against {there} now")
+    elif cost > solved.cost * (1.0 + _DEARER) + _DEARER:
+        sentences.append(
+            f"the quick answer was a better local optimum that none of {STARTS} starts reaches: {was} "
+            f"against {there} now; undo and redo bring it back"
+        )
+    if abs(design.rms - quick.rms_error) > _DIFFERS * largest:
+        sentences.append(
+            f"the finished assembly gives {1e3 * design.rms:.3g} mN·m rms where the quick answer gave "
+            f"{1e3 * quick.rms_error:.3g}: its cam sets in over an angle, and knots of its rubber are sharp"
+        )
+    return sentences
+
+
+def angle_view_of(view: DesignView, design: CamDesign, question: LiveQuestion) -> AngleView:
+    """Return a finished design as it is looked at angle by angle.
+
+    Parameters
+    ----------
+    view
+        What is shown of it.
+    design
+        Finished.
+    question
+        That it answers.
+    """
+    return AngleView(view, design.contour, question.cam, lambda: design.actuator)

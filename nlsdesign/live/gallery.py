@@ -1,0 +1,150 @@
+"""The actuators to begin from: decks and templates of the project, and those that a designer brings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..components.assembly.deck_template import load_template, template_names
+from ..components.assembly.deck_writer import declare
+from ..components.assembly.named_parts import Assembly
+from ..deck import Deck, deck_names, load_deck, read_deck
+from ..design import contour_of_cam
+from ..design.statics.declared_cam import declared_cam
+from ..design.statics.equilibrium import equilibrium_torque
+from ..errors import NlsError, ValueRangeError, unknown_name
+from ..model import flatten
+from ..model.roles import series_cam
+from .question import LiveQuestion, Machine, TargetPoint
+
+MOST_DECK_BYTES = 400_000
+"""Largest deck that is read."""
+_POINTS = 6
+"""Of the target with which an actuator begins."""
+
+
+@dataclass(frozen=True)
+class GalleryCard:
+    """One actuator to begin from.
+
+    Parameters
+    ----------
+    name
+        By which it is chosen.
+    kind
+        ``"deck"`` or ``"template"``.
+    line
+        What it is, in one line.
+    reason
+        Why no cam can be designed for it; empty where it can.
+    """
+
+    name: str
+    kind: str
+    line: str
+    reason: str
+
+
+def gallery() -> tuple[GalleryCard, ...]:
+    """Return the actuators that come with the project, also those without a cam, with the reason."""
+    cards = []
+    for kind, names in (("deck", deck_names()), ("template", template_names())):
+        for name in names:
+            deck = _deck(name)
+            cards.append(GalleryCard(name, kind, deck.description, _objection(deck)))
+    return tuple(cards)
+
+
+def gallery_question(name: str) -> LiveQuestion:
+    """Return the question with which an actuator of the gallery begins: its own curve as the target.
+
+    Parameters
+    ----------
+    name
+        Of a deck or template.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of that name.
+    ArrangementError
+        If it has no cam to design.
+    """
+    return question_of(declare(_deck(name)), name)
+
+
+def question_of_deck(text: str, name: str) -> LiveQuestion:
+    """Return the question with which a deck of one's own begins.
+
+    Parameters
+    ----------
+    text
+        TOML.
+    name
+        Of the file, for messages.
+
+    Raises
+    ------
+    NlsError
+        If the deck is too large, cannot be read, or has no cam to design.
+    """
+    size = len(text.encode())
+    if size > MOST_DECK_BYTES:
+        raise ValueRangeError(
+            f"deck '{name:.80}' of {size / 1e3:.0f} kB", f"is larger than {MOST_DECK_BYTES / 1e3:.0f} kB",
+            next_step="take measured tables out of it",
+        )  # fmt: skip
+    assembly = declare(read_deck(text, Path(f"{name[:80]}")))
+    return question_of(assembly, assembly.name)
+
+
+def question_of(actuator: Assembly, title: str) -> LiveQuestion:
+    """Return the question with which an actuator begins.
+
+    The target is its own torque curve, contour and pretension are free.
+
+    Parameters
+    ----------
+    actuator
+        With a cam spring.
+    title
+        For people.
+
+    Raises
+    ------
+    ArrangementError
+        If it has no cam spring, or none whose contour can be designed, or one that gives no torque.
+    """
+    blank = LiveQuestion(title, Machine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
+    cam = blank.cam
+    if cam.last_angle is not None:
+        last = blank.machine.model.values[cam.last_angle]
+    else:
+        last = float(contour_of_cam(actuator[cam.name]).angles[-1])
+    angles = np.linspace(0.0, last, _POINTS)
+    torques = np.maximum(equilibrium_torque(blank.machine.model, cam.drive, angles), 0.0)
+    torques[0] = 0.0
+    points = tuple(
+        TargetPoint(float(f"{a:.4g}"), float(f"{t:.4g}")) for a, t in zip(angles, torques, strict=True)
+    )
+    question = replace(blank, points=points, free=(blank.contour, cam.pretension))
+    return question.with_points(points)
+
+
+def _deck(name: str) -> Deck:
+    if name in template_names():
+        return load_template(name).deck
+    if name in deck_names():
+        return load_deck(name)
+    raise unknown_name("actuator of the gallery", name[:80], [*deck_names(), *template_names()])
+
+
+def _objection(deck: Deck) -> str:
+    try:
+        machine = declare(deck)
+        declared_cam(machine[series_cam(flatten(machine)).name])
+    except NlsError as error:
+        return error.rule
+    return ""

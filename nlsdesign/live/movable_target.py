@@ -1,0 +1,83 @@
+"""A target curve whose points are symbols, so that one program answers all of its shapes."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from ..design import TabulatedTorque
+from ..symbolic import Expression
+
+Floats = NDArray[np.float64]
+
+
+class MovableTarget:
+    """The curve of :class:`~nlsdesign.design.TabulatedTorque` with its pieces as symbols.
+
+    It has what the design problem asks of a target, and is none itself: it has no numbers.
+
+    Parameters
+    ----------
+    pieces
+        Number of pieces between the points.
+    last_angle
+        In rad, from which bounds and starts of variables follow.
+    """
+
+    def __init__(self, pieces: int, last_angle: float) -> None:
+        self.symbols = ca.SX.sym("target", 5 * pieces + 3)
+        self._breaks = self.symbols[: pieces + 1]
+        self._rows = ca.reshape(self.symbols[pieces + 1 : 5 * pieces + 1], 4, pieces)
+        self.largest: Expression = self.symbols[5 * pieces + 1]
+        self.whole_energy: Expression = self.symbols[5 * pieces + 2]
+        self._pieces = pieces
+        self.last_angle = last_angle
+
+    def end_law(self) -> Expression:
+        """Return the last angle."""
+        return self._breaks[self._pieces]
+
+    def torque_law(self, angle: Expression) -> Expression:
+        """Return the torque; beyond the ends the outer pieces go on.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        passed = [angle >= self._breaks[k] for k in range(1, self._pieces)]
+
+        def picked(row: Expression) -> Expression:
+            steps = [there * (row[k + 1] - row[k]) for k, there in enumerate(passed)]
+            return sum(steps, start=row[0])
+
+        local, result = angle - picked(self._breaks), ca.SX(0)
+        for row in range(4):
+            result = result * local + picked(self._rows[row, :])
+        return result
+
+    def weight_law(self, angle: Expression) -> Expression:
+        """Return one: the error counts alike everywhere.
+
+        Parameters
+        ----------
+        angle
+            In rad.
+        """
+        return 0.0 * angle + 1.0
+
+    def numbers(self, target: TabulatedTorque) -> Floats:
+        """Return the numbers of the symbols for a curve with as many pieces.
+
+        Parameters
+        ----------
+        target
+            The curve.
+        """
+        curve = PchipInterpolator(target.angles, target.torques)
+        # The curve is monotone between its points, so the largest torque is that of a point.
+        ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
+        numbers: Floats = np.concatenate([curve.x, curve.c.T.ravel(), ends])
+        return numbers

@@ -1,0 +1,243 @@
+// One panel with axes, lines and a cursor that all panels share. Drawn once; then only paths change.
+
+import { draw, make, set, text } from "./elements.js";
+import { factorOf, plain, scaled, unitOf, withUnit } from "./units.js";
+
+const LEFT = 56, RIGHT = 10, TOP = 10, BOTTOM = 30;
+
+export function ticks(low, high, count) {
+  const span = high - low;
+  const power = 10 ** Math.floor(Math.log10(span / count));
+  const step = [1, 2, 2.5, 5, 10].map((k) => k * power).find((k) => span / k <= count) ?? 10 * power;
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * span; k += 1) found.push(Number((k * step).toPrecision(12)));
+  return found;
+}
+
+// A range that holds all numbers with some room; never empty.
+export function range(rows, { zero = false } = {}) {
+  let low = Infinity, high = -Infinity;
+  for (const row of rows) for (const value of row) {
+    if (value !== null && Number.isFinite(value)) { low = Math.min(low, value); high = Math.max(high, value); }
+  }
+  if (low > high) return [0, 1];
+  if (zero) { low = Math.min(low, 0); high = Math.max(high, 0); }
+  const room = high - low > 1e-12 * Math.max(1, Math.abs(high)) ? 0.06 * (high - low) : Math.max(0.1 * Math.abs(high), 1e-9);
+  return [zero && low === 0 ? 0 : low - room, zero && high === 0 ? 0 : high + room];
+}
+
+export class Chart {
+  // x and y: { name, unit }; the unit in SI. log: the abscissa.
+  constructor(host, { title, x, y, height = 190, width = 420, log = false, zero = false, symlog = false }) {
+    Object.assign(this, { title, x, y, width, height, log, zero, symlog });
+    this.svg = draw("svg", { role: "img", class: "chart", viewBox: `0 0 ${width} ${height}`, "aria-label": title });
+    this.grid = draw("g", { class: "grid" });
+    this.lines = draw("g", { class: "lines" });
+    this.over = draw("g", { class: "over" });
+    this.cursorLine = draw("line", { class: "cursor", y1: TOP, y2: height - BOTTOM, x1: 0, x2: 0, visibility: "hidden" });
+    this.dots = draw("g", { class: "dots" });
+    this.svg.append(this.grid, this.lines, ...(log || symlog ? [] : [this.cursorLine]), this.dots, this.over);
+    this.svg.classList.add("empty");
+    this.heading = make("h3", {}, title);
+    this.key = make("ul", { class: "key" });
+    this.value = make("p", { class: "now" });
+    host.append(make("div", { class: "head" }, this.heading, this.value), this.svg, this.key);
+    this.paths = [];
+    this.series = [];
+    this.limits = { x: log ? [0.1, 10] : [0, 1], y: [0, 1] };
+    this.at = null;
+    this.fit(host);
+  }
+
+  // The picture has the size of its place, so that letters have theirs on every screen.
+  fit(host) {
+    const observer = new ResizeObserver(([entry]) => {
+      const width = Math.round(entry.contentRect.width);
+      if (width < 60 || width === this.width) return;
+      this.width = width;
+      set(this.svg, { viewBox: `0 0 ${width} ${this.height}` });
+      this.drawn = "";
+      this.redraw();
+    });
+    observer.observe(host);
+    set(this.svg, { height: this.height });
+  }
+
+  px(value) {
+    const [low, high] = this.symlog ? this.limits.x.map(folded) : this.limits.x;
+    if (this.symlog) value = folded(value);
+    const share = this.log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+    return LEFT + share * (this.width - LEFT - RIGHT);
+  }
+
+  py(value) {
+    const [low, high] = this.symlog ? this.limits.y.map(folded) : this.limits.y;
+    if (this.symlog) value = folded(value);
+    return TOP + (high - value) / (high - low) * (this.height - TOP - BOTTOM);
+  }
+
+  // From a place in the picture back to numbers in SI.
+  place(event) {
+    const box = this.svg.getBoundingClientRect();
+    const [a, b] = this.limits.x, [low, high] = this.limits.y;
+    const sx = (event.clientX - box.left) * this.width / box.width, sy = (event.clientY - box.top) * this.height / box.height;
+    return [a + (sx - LEFT) / (this.width - LEFT - RIGHT) * (b - a), high - (sy - TOP) / (this.height - TOP - BOTTOM) * (high - low)];
+  }
+
+  // series: [{ name, x, y, tone, dash, points }]; frozen: keep the axes, as while a point is dragged.
+  show(series, { frozen = false, limits = null } = {}) {
+    this.series = series;
+    this.svg.classList.toggle("empty", series.length === 0);
+    if (!frozen) {
+      const next = limits ?? {};
+      this.limits = {
+        x: next.x ?? (this.symlog ? around(series.map((s) => s.x)) : this.log ? logRange(series) : tight(series.map((s) => s.x))),
+        y: next.y ?? (this.symlog ? around(series.map((s) => s.y)) : range(series.map((s) => s.y), { zero: this.zero })),
+      };
+    }
+    this.redraw();
+  }
+
+  redraw() {
+    if (this.series.length === 0) return;
+    this.axes();
+    while (this.paths.length < this.series.length) this.paths.push(this.lines.appendChild(draw("path", { fill: "none" })));
+    while (this.paths.length > this.series.length) this.paths.pop().remove();
+    this.series.forEach((s, k) => {
+      set(this.paths[k], { d: s.points ? this.marks(s) : s.area ? this.area(s) : this.path(s), class: `line ${s.tone} ${s.dash ?? ""} ${s.points ? "points" : ""} ${s.area ? "area" : ""}` });
+    });
+    this.entries();
+    this.cursor(this.at);
+  }
+
+  path({ x, y }) {
+    let d = "", pen = "M";
+    for (let k = 0; k < x.length; k += 1) {
+      if (y[k] === null || !Number.isFinite(y[k])) { pen = "M"; continue; }
+      d += `${pen}${this.px(x[k]).toFixed(1)} ${this.clipped(y[k]).toFixed(1)}`;
+      pen = "L";
+    }
+    return d || "M-9 -9";
+  }
+
+  area({ x, y, lower }) {
+    const up = x.map((v, k) => `${this.px(v).toFixed(1)} ${this.clipped(y[k]).toFixed(1)}`);
+    const down = x.map((v, k) => `${this.px(v).toFixed(1)} ${this.clipped(lower[k]).toFixed(1)}`).reverse();
+    return `M${[...up, ...down].join("L")}Z`;
+  }
+
+  marks({ x, y }) {
+    return x.map((v, k) => {
+      const a = this.px(v), b = this.clipped(y[k]);
+      return `M${a - 4} ${b - 4}L${a + 4} ${b + 4}M${a - 4} ${b + 4}L${a + 4} ${b - 4}`;
+    }).join("") || "M-9 -9";
+  }
+
+  clipped(value) {
+    return Math.min(this.height, Math.max(0, this.py(value)));
+  }
+
+  axes() {
+    const code = JSON.stringify([this.limits, this.width]);
+    if (code === this.drawn) return;
+    this.drawn = code;
+    this.grid.replaceChildren();
+    const fx = factorOf(this.x.unit), [unitUp, fy] = scaled(this.y.unit, Math.max(...this.limits.y.map(Math.abs)));
+    const bottom = this.height - BOTTOM, right = this.width - RIGHT;
+    const across = this.symlog ? powers(this.limits.x) : this.log ? decades(this.limits.x) : ticks(...this.limits.x.map((v) => v * fx), this.width / 70).map((v) => v / fx);
+    for (const value of across) {
+      const a = this.px(value);
+      this.grid.append(draw("line", { x1: a, x2: a, y1: TOP, y2: bottom }), draw("text", { x: a, y: bottom + 13, "text-anchor": "middle" }, plain(value * fx)));
+    }
+    const up = this.symlog ? powers(this.limits.y) : ticks(...this.limits.y.map((v) => v * fy), this.height / 38).map((v) => v / fy);
+    for (const value of up) {
+      const b = this.py(value);
+      this.grid.append(draw("line", { x1: LEFT, x2: right, y1: b, y2: b }), draw("text", { x: LEFT - 6, y: b + 3.5, "text-anchor": "end" }, plain(value * fy)));
+    }
+    const named = (axis, unit) => (unit ? `${axis.name} in ${unit}` : axis.name);
+    this.grid.append(
+      draw("text", { class: "axis", x: right, y: this.height - 4, "text-anchor": "end" }, named(this.x, unitOf(this.x.unit))),
+      draw("text", { class: "axis", x: 11, y: TOP + (bottom - TOP) / 2, "text-anchor": "middle", transform: `rotate(-90 11 ${TOP + (bottom - TOP) / 2})` }, named(this.y, unitUp)),
+    );
+  }
+
+  entries() {
+    const named = this.series.filter((s) => s.name);
+    const code = named.map((s) => s.name + s.tone + s.dash).join("|");
+    if (code === this.keyed) return;
+    this.keyed = code;
+    this.key.replaceChildren(...(named.length > 1 ? named.map((s) => make("li", {}, sample(s), s.name)) : []));
+  }
+
+  // The common cursor: a line, a dot on each curve, and its number in words.
+  cursor(at) {
+    this.at = at;
+    this.dots.replaceChildren();
+    if (at === null || this.log || this.symlog || this.series.length === 0) return;
+    set(this.cursorLine, { x1: this.px(at), x2: this.px(at), visibility: "visible" });
+    const now = [];
+    for (const s of this.series) {
+      if (s.points || s.area || s.flat) continue;
+      const value = interpolated(s.x, s.y, at);
+      if (value === null) continue;
+      this.dots.append(draw("circle", { cx: this.px(at), cy: this.clipped(value), r: 3.2, class: s.tone }));
+      now.push([s.name, withUnit(value, this.y.unit)]);
+    }
+    const words = now.length > 1 ? now.slice(0, 2).map(([name, number]) => `${name} ${number}`) : now.map(([, number]) => number);
+    text(this.value, words.join(" · "));
+    this.svg.setAttribute("aria-label", `${this.title} over ${this.x.name}; at ${withUnit(at, this.x.unit, 3)}: ${words.join(", ") || "no number"}`);
+  }
+}
+
+export function interpolated(x, y, at) {
+  if (x.length === 0 || at < x[0] - 1e-9 || at > x[x.length - 1] + 1e-9) return null;
+  let k = 1;
+  while (k < x.length - 1 && x[k] < at) k += 1;
+  if (x.length === 1) return y[0];
+  if (y[k - 1] === null || y[k] === null) return null;
+  const share = x[k] > x[k - 1] ? Math.min(1, Math.max(0, (at - x[k - 1]) / (x[k] - x[k - 1]))) : 0;
+  return y[k - 1] + share * (y[k] - y[k - 1]);
+}
+
+function tight(rows) {
+  const all = rows.flat().filter((v) => Number.isFinite(v));
+  if (all.length === 0) return [0, 1];
+  let low = Math.min(...all), high = Math.max(...all);
+  if (low === high) { low -= 0.5; high += 0.5; }
+  return [low, high];
+}
+
+// Zero inside, room on both sides.
+function around(rows) {
+  const [low, high] = tight(rows);
+  return [Math.min(3 * low, -12), Math.max(3 * high, 12)];
+}
+
+function logRange(series) {
+  const [low, high] = tight(series.map((s) => s.x.filter((v) => v > 0)));
+  return low > 0 ? [low, high] : [0.1, 10];
+}
+
+function decades([low, high]) {
+  const found = [];
+  for (let power = Math.floor(Math.log10(low)); 10 ** power <= high * 1.001; power += 1) if (10 ** power >= low * 0.999) found.push(10 ** power);
+  return found.length > 1 ? found : [low, high];
+}
+
+// Poles lie between one per minute and ten thousand per second, on both sides of zero.
+function folded(value) {
+  return Math.sign(value) * Math.log10(1 + Math.abs(value));
+}
+
+function powers([low, high]) {
+  const found = [0];
+  const most = Math.ceil(Math.max(folded(high), -folded(low)));
+  const step = Math.max(1, Math.ceil(most / 4));
+  for (let power = step; power <= most; power += step) for (const value of [10 ** power, -(10 ** power)]) if (value >= low && value <= high) found.push(value);
+  return found;
+}
+
+function sample({ tone, dash, points, area }) {
+  const mark = points ? "M8 2L16 10M8 10L16 2" : area ? "M0 2H24V10H0Z" : "M0 6H24";
+  return draw("svg", { viewBox: "0 0 24 12", width: 24, height: 12, "aria-hidden": "true" }, draw("path", { d: mark, fill: "none", class: `line ${tone} ${dash ?? ""} ${area ? "area" : ""}` }));
+}

@@ -1,0 +1,377 @@
+// The page of one design: what is asked, what is shown, and how sure it is.
+
+import { Compare } from "./compare.js";
+import { Connection, download, upload } from "./connection.js";
+import { PointTable, Rows } from "./controls.js";
+import { announce, byId, make, text } from "./elements.js";
+import { MechanismPicture } from "./mechanism.js";
+import { AtAngle, Panels } from "./panels.js";
+import { Questions } from "./questions.js";
+import { TargetEditor, torqueRange } from "./target_editor.js";
+import { interpolated } from "./chart.js";
+import { factorOf, plain, withUnit } from "./units.js";
+import { Diagnosis, Tolerance } from "./work.js";
+
+let answer = null;
+let cards = [];
+let materials = [];
+let kinds = [];
+let angle = null;
+let full = null;
+let shownNumber = 0;
+
+const connection = { send: (message) => live?.send(message) ?? false };
+const questions = new Questions((message) => connection.send(message), (busy) => { document.body.dataset.busy = String(busy); });
+window.addEventListener("pagehide", () => questions.flush());
+const ask = (message, begin) => { const number = questions.ask(message, begin); later(); return number; };
+const edit = (fields, { drag = null, last = true, begin } = {}) => ask({ what: "edit", edit: fields, drag, last, angle }, begin);
+
+const act = {
+  move: (k, at, torque, last, begin) => edit({ edit: "MovePoint", index: k, angle: at, torque }, { drag: `point ${k}`, last, begin }),
+  add: (at, torque) => edit({ edit: "AddPoint", angle: at, torque: Math.max(0, torque) }),
+  remove: (k) => (k > 0 ? edit({ edit: "RemovePoint", index: k }) : announce("The first point stays.")),
+};
+
+const editor = new TargetEditor(byId("torque"), act);
+const table = new PointTable(byId("points"), act);
+const picture = new MechanismPicture(byId("mechanism"));
+const panels = new Panels(byId("panels"));
+const atAngle = new AtAngle(byId("linear-row"), ask);
+const compare = new Compare(ask);
+const tolerance = new Tolerance(ask);
+const diagnosis = new Diagnosis(ask);
+const limits = new Rows(byId("limits"), "limit", {
+  change: (limit, value, last) => edit({ edit: "ChangeLimit", limit, value }, { drag: `limit ${limit}`, last }),
+  drop: (limit) => edit({ edit: "DropLimit", limit }),
+});
+byId("limit-add").addEventListener("click", () => {
+  const limit = byId("limit-kind").value;
+  if (limit && answer) edit({ edit: "ChangeLimit", limit, value: startOf(limit) });
+});
+const sizes = new Rows(byId("sizes"), "size", {
+  change: (name, value, last) => edit({ edit: "SetNumber", name, value }, { drag: `number ${name}`, last }),
+  free: (name, yes) => edit({ edit: yes ? "FreeNumber" : "HoldNumber", name }),
+});
+const laws = new Rows(byId("laws"), "law", sizes.actions);
+const material = make("select", { id: "material" });
+const contourBox = make("input", { type: "checkbox", id: "contour" });
+byId("choice").append(
+  make("label", { for: "material" }, "rubber of the library"), material,
+  make("label", { class: "contour", for: "contour" }, contourBox, "free: the contour of the cam"),
+);
+material.addEventListener("change", () => { if (material.value) edit({ edit: "ChooseMaterial", material: material.value }); });
+contourBox.addEventListener("change", () => edit({ edit: contourBox.checked ? "FreeNumber" : "HoldNumber", name: answer.controls.contour }));
+
+const live = new Connection(receive, (words, lost) => {
+  byId("connection").hidden = !words;
+  text(byId("connection"), words);
+  document.body.classList.toggle("lost", lost);
+  fade();
+  if (!lost) questions.again();
+});
+
+// --- what comes -----------------------------------------------------------------------------------
+
+function receive(message) {
+  const kinds = {
+    gallery: () => showGallery(message), answer: () => takeAnswer(message), at: () => takeAngle(message),
+    refused: () => refuse(message), work: () => takeWork(message.work), kept: () => compare.show(message.kept, answer?.design),
+  };
+  kinds[message.what]?.();
+  if (typeof message.number === "number") questions.answered(message.number);
+}
+
+function takeAnswer(message) {
+  if (message.number !== null && message.number < shownNumber) return;
+  shownNumber = message.number ?? shownNumber;
+  answer = message.answer;
+  if (message.number !== null) byId("notice").hidden = true;
+  clearTimeout(waiting);
+  waiting = 0;
+  requestAnimationFrame(() => {
+    showAnswer();
+    if (message.at) showAngle(message.at);
+    const number = message.number;
+    if (number !== null) afterPaint(() => questions.drawn(number, "drag to drawn"));
+  });
+  if (message.answer.seconds !== undefined && message.number !== null) performance.measure("computed", { start: 0, duration: 1e3 * message.answer.seconds });
+}
+
+function takeAngle(message) {
+  requestAnimationFrame(() => {
+    showAngle(message.at);
+    if (message.number !== null) afterPaint(() => questions.drawn(message.number, "slide to drawn"));
+  });
+}
+
+function afterPaint(then) {
+  const channel = new MessageChannel();
+  channel.port1.onmessage = then;
+  requestAnimationFrame(() => channel.port2.postMessage(0));
+}
+
+function refuse(message) {
+  text(byId("notice"), message.reason);
+  byId("notice").hidden = false;
+  announce(message.reason);
+  if (answer) requestAnimationFrame(showAnswer);
+}
+
+function takeWork(work) {
+  if (work.name === "SettleDesign") { full = work; showState(); fade(); }
+  if (work.name === "ToleranceCloud") { lastCloud = work; tolerance.show(work, answer); }
+  if (work.name === "DiagnoseRecords") diagnosis.show(work);
+  if (work.name === "TorqueLoop") atAngle.showLoopWork(work);
+}
+
+let lastCloud = null;
+
+// --- what is shown --------------------------------------------------------------------------------
+
+function showAnswer() {
+  const { controls, design } = answer;
+  const frozen = editor.moving;
+  table.show(controls.points.map((each) => [each[0], each[1]]));
+  showCurve(frozen);
+  limits.show(controls.limits.map(limitRow));
+  showKinds();
+  const lengths = (each) => /^m(\^2)?$/.test(each[2]) && each[1] < 1e3;
+  sizes.show(controls.numbers.filter(lengths).map(numberRow));
+  laws.show(controls.numbers.filter((each) => !lengths(each)).map(numberRow));
+  if (document.activeElement !== material) material.value = controls.material;
+  contourBox.checked = controls.contour_free;
+  byId("undo").disabled = !controls.can_undo;
+  byId("redo").disabled = !controls.can_redo;
+  byId("keep").disabled = !design;
+  tolerance.run.disabled = !design || lastCloud?.state === "computing";
+  if (lastCloud && !frozen) tolerance.show(lastCloud, answer);
+  if (design) {
+    panels.show(design, frozen);
+    showNumbers(design);
+    slider(design.columns[0].values);
+    if (!frozen) compare.show(null, design);
+  }
+  const card = byId("gallery");
+  if (document.activeElement !== card) card.value = cards.some((each) => each.name === controls.title) ? controls.title : "";
+  showState();
+  fade();
+  cursor();
+  editor.say(design ? `rms error ${withUnit(design.rms_error, "N*m", 3)}` : "no design", byId("state-name").textContent);
+}
+
+function showCurve(frozen) {
+  const { controls, design } = answer;
+  const points = controls.points.map((each) => [each[0], each[1]]);
+  const last = points.at(-1)[0];
+  const series = [];
+  const column = (name) => design.columns.find((each) => each.name === name).values;
+  if (design) {
+    // The target belongs to the question, so an old design does not bring its own.
+    series.push({ name: answer.stale ? "target of the design shown" : "target", x: column("angle"), y: column("target"), tone: "ink", dash: "dashed" });
+    series.push({ name: answer.stale ? "last good design" : "design", x: column("angle"), y: column("torque"), tone: "blue" });
+  }
+  const wanted = torqueRange([points.map((each) => each[1]), ...series.map((each) => each.y)]);
+  const room = { x: [0, 1.08 * Math.max(last, ...series.map((each) => each.x.at(-1)))], y: [wanted[0], wanted[1] * 1.15] };
+  editor.bounds = { angle: [0, 6.28], torque: [0, 1e5], firstHeld: true };
+  editor.show(series, { frozen, limits: room });
+  editor.showTarget(points);
+}
+
+function limitRow([name, words, value, si, shown, upper, byDefault]) {
+  const unit = shown === "%" ? "%" : si;
+  const margin = answer.design?.margins.find((each) => each.limit === name);
+  const from = byDefault ? "from the deck" : "set here";
+  return { name, path: name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
+    margin: margin ? `${from}; ${margin.active ? "the design sits on it" : `now ${withUnit(margin.value, unit, 3)}`}` : from };
+}
+
+// A new limit begins where the design is, so that nothing changes before it is moved.
+function startOf(limit) {
+  const ends = { MaximumStrain: /\.strain$/, MaximumStress: /\.stress$/, MaximumCableTension: /^tension$/, MaximumCamRadius: /^radius$/, MinimumRadiusOfCurvature: /^radius_of_curvature$/, PositiveStiffness: /^stiffness$/ };
+  const kind = kinds.find((each) => each.name === limit);
+  const rows = (answer.design?.columns ?? []).filter((each) => ends[limit]?.test(each.name)).flatMap((each) => each.values).filter((value) => value !== null && value > 0);
+  if (rows.length === 0) return 1;
+  const value = kind.upper ? Math.max(...rows) * 1.01 : Math.min(...rows) * 0.99;
+  return Number(value.toPrecision(3));
+}
+
+// Kinds of limits that do not hold yet.
+function showKinds() {
+  const held = new Set(answer.controls.limits.map((each) => each[0]));
+  const left = kinds.filter((each) => !held.has(each.name));
+  const code = left.map((each) => each.name).join(" ");
+  const select = byId("limit-kind");
+  byId("limit-add").disabled = left.length === 0;
+  select.parentElement.hidden = left.length === 0;
+  if (select.dataset.code === code) return;
+  select.dataset.code = code;
+  select.replaceChildren(...left.map((each) => make("option", { value: each.name }, `${each.upper ? "largest" : "least"} ${each.words}`)));
+}
+
+// Names of limits as people call them.
+function wordsOf(names) {
+  const words = new Map((answer?.controls.limits ?? []).map((each) => [each[0], each[1]]));
+  return names.map((name) => words.get(name) ?? name).join(", ");
+}
+
+function numberRow([name, value, unit, , free, , , source]) {
+  const chosen = answer.design?.numbers.find((each) => each.name === name);
+  return { name, path: `${name} (${source})`, label: name, value: free && chosen ? chosen.value : value, unit, free,
+    margin: free && chosen ? `chosen: ${withUnit(chosen.value, unit)}` : "" };
+}
+
+function showNumbers(design) {
+  const rows = [
+    ["torque error, rms", `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`],
+    ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
+    ["limits it sits on", wordsOf(design.active) || "none"],
+    ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
+    ["answered in", `${plain(1e3 * answer.seconds, 2)} ms`],
+  ];
+  byId("numbers").replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
+}
+
+// One of: computing, quick answer, checked answer, infeasible, failed; always in words too.
+function showState() {
+  if (!answer) return;
+  const { design, conflicts } = answer;
+  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.");
+  const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
+  const checking = full?.state === "computing" && full.revision === answer.revision ? `The check runs: ${full.message}. ` : "";
+  const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
+  const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
+  const sits = design?.active.length ? `It sits on: ${wordsOf(design.active)}. ` : "No limit binds. ";
+  const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
+  let name, kind, words;
+  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${wordsOf(conflicts)}. ` : ""}${message} `];
+  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
+  else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
+  else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
+  else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer: ${message || missed} `];
+  showWords(name, kind, words + shown + checking + failed);
+}
+
+function showWords(name, kind, words) {
+  byId("state").className = `state ${kind}`;
+  text(byId("state-name"), name);
+  text(byId("state-words"), words.trim());
+}
+
+// Computing is worth a word only where it takes longer than a glance.
+let waiting = 0;
+function later() {
+  if (waiting) return;
+  waiting = setTimeout(() => {
+    waiting = 0;
+    if (questions.busy) { showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
+  }, 250);
+}
+
+function fade(old = false) {
+  const stale = old || document.body.classList.contains("lost") || answer === null || answer.stale || answer.state !== "solved";
+  for (const name of ["torque", "mechanism", "panels", "linear", "numbers"]) byId(name).classList.toggle("stale", stale);
+}
+
+// --- the angle ------------------------------------------------------------------------------------
+
+const angleInput = byId("angle");
+angleInput.addEventListener("input", () => turn(Number(angleInput.value)));
+
+function slider(angles) {
+  const last = angles.at(-1);
+  if (angle === null) angle = 0.6 * last;
+  angleInput.min = 0;
+  angleInput.max = last;
+  angleInput.step = last / 400;
+  angleInput.disabled = false;
+  angle = Math.min(angle, last);
+  if (document.activeElement !== angleInput) angleInput.value = angle;
+}
+
+function turn(next) {
+  angle = next;
+  cursor();
+  ask({ what: "angle", angle, drag: "angle" });
+}
+
+function cursor() {
+  if (angle === null || !answer?.design) return;
+  const columns = answer.design.columns;
+  editor.cursor(angle);
+  panels.cursor(angle);
+  tolerance.cursor(angle);
+  compare.cursor(angle);
+  const at = (name) => interpolated(columns[0].values, columns.find((each) => each.name === name).values, angle);
+  const words = `${withUnit(angle, "rad", 3)}: torque ${withUnit(at("torque"), "N*m", 3)}, tension ${withUnit(at("tension"), "N", 3)}, lever arm ${withUnit(at("lever_arm"), "m", 3)}, stiffness ${withUnit(at("stiffness"), "N*m/rad", 3)}`;
+  text(byId("angle-words"), words);
+  angleInput.setAttribute("aria-valuetext", words);
+  text(byId("linear-angle"), `θ = ${withUnit(angle, "rad", 3)}`);
+}
+
+// The mechanism comes at once; what takes longer to compute comes when the hand rests.
+function showAngle(at) {
+  if (at.mechanism) picture.show(at.mechanism);
+  if (at.poles) atAngle.show(at);
+}
+
+// --- gallery, files, keys -------------------------------------------------------------------------
+
+function showGallery(message) {
+  ({ cards, materials, limits: kinds } = message);
+  if (answer) showKinds();
+  const select = byId("gallery");
+  const group = (kind, label) => make("optgroup", { label }, ...cards.filter((each) => each.kind === kind).map((each) =>
+    make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.reason ? `${each.name} (${each.reason})` : each.name)));
+  select.replaceChildren(make("option", { value: "", disabled: true }, "own deck"), group("deck", "decks"), group("template", "templates"));
+  select.disabled = false;
+  if (answer) select.value = cards.some((each) => each.name === answer.controls.title) ? answer.controls.title : "";
+  material.replaceChildren(make("option", { value: "" }, "that of the deck"), ...materials.map((name) => make("option", { value: name }, name)));
+  if (answer) material.value = answer.controls.material;
+  diagnosis.ready();
+}
+
+byId("gallery").addEventListener("change", (event) => { angle = null; edit({ edit: "ChooseDeck", name: event.target.value }); event.target.blur(); });
+byId("undo").addEventListener("click", () => ask({ what: "step", back: true, angle }));
+byId("redo").addEventListener("click", () => ask({ what: "step", back: false, angle }));
+byId("keep").addEventListener("click", () => ask({ what: "keep", name: keptName() }));
+
+function keptName() {
+  const taken = new Set(compare.kept.map((each) => each.name));
+  let number = compare.kept.length + 1;
+  while (taken.has(`design ${number}`)) number += 1;
+  return `design ${number}`;
+}
+
+for (const button of document.querySelectorAll("[data-file]")) {
+  button.addEventListener("click", async () => {
+    byId("files").open = false;
+    announce(`${button.textContent} is being made`, 0);
+    button.disabled = true;
+    const wrong = await download(button.dataset.file);
+    button.disabled = false;
+    if (wrong) refuse({ reason: wrong });
+    else announce(`${button.textContent} is saved`);
+  });
+}
+
+byId("open").addEventListener("change", async (event) => {
+  const [file] = event.target.files;
+  event.target.value = "";
+  byId("files").open = false;
+  if (!file) return;
+  const wrong = await upload("/api/open", file);
+  if (wrong) refuse({ reason: wrong });
+  else angle = null;
+});
+
+document.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+  const key = event.key.toLowerCase();
+  const typing = event.target instanceof HTMLInputElement && event.target.type === "text";
+  if (typing || !["z", "y"].includes(key)) return;
+  event.preventDefault();
+  ask({ what: "step", back: key === "z" && !event.shiftKey, angle });
+});
+
+document.addEventListener("click", (event) => { if (!event.target.closest("#files")) byId("files").open = false; });
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") byId("files").open = false; });

@@ -1,0 +1,280 @@
+"""The quick answer: the design beside the previous one, from a program that is kept."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..components.assembly.named_parts import Assembly
+from ..design import CamDesign, Contour, LimitState, cam_from_profile, contour_from_curvature, contour_of_cam
+from ..design.optimisation.result import DesignCurves
+from ..model.derived_deck import derived
+from ..quantity import Quantity
+from .answers import DesignView
+from .question import LiveQuestion
+from .quick_program import QuickOutcome, QuickPoint, QuickProgram, structure_of
+from .views import ALLOWED, curve_columns, margins_of, shown_numbers
+
+Floats = NDArray[np.float64]
+
+_MOST_PROGRAMS = 4
+_ACTIVE = 1e-3
+_CONTROL_VALUES = 64
+_SOURCE = "designed, quick answer"
+_PER_INTERVAL = 8
+"""Points of a contour per interval of its program."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuickDesign:
+    """A solved question.
+
+    Parameters
+    ----------
+    program
+        Of its structure.
+    question
+        That was asked.
+    point
+        Where the program was solved.
+    cost
+        Sum of the goals there.
+    """
+
+    program: QuickProgram
+    question: LiveQuestion
+    point: QuickPoint
+    cost: float
+
+    @cached_property
+    def _numbers(self) -> dict[str, Floats]:
+        outputs = self.program.outputs
+        columns = outputs(self.point.unknowns, self.program.numbers_of(self.question))
+        names = self.program.output_names
+        return {name: np.array(c, dtype=float).ravel() for name, c in zip(names, columns, strict=True)}
+
+    @cached_property
+    def contour(self) -> Contour:
+        """Contour of the cam."""
+        anchor = self.question.cam.anchor_distance
+        rows = self._numbers
+        if self.program.problem.contour is None:
+            cam = self.question.machine.assembly[self.question.cam.name]
+            return contour_of_cam(cam, last_angle=self.question.target.last_angle)
+        return contour_from_curvature(
+            rows["direction"],
+            rows["radius_of_curvature"],
+            first_slope=float(rows["first_slope"][0]),
+            first_lever_arm=float(rows["lever_arm"][0]),
+            anchor_distance=np.inf if anchor is None else self.values[anchor],
+            refine=_PER_INTERVAL,
+        )
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Sizes of the design in SI by name."""
+        names = [v.name for v in self.program.problem.scalars]
+        found = dict(zip(names, self._numbers["sizes"].tolist(), strict=True))
+        return {name: found.get(name, n.value) for name, n in self.question.numbers.items()}
+
+    def machine(self) -> Assembly:
+        """Return the changed assembly: the numbers of the design, and a cam fitted to its contour."""
+        cam, machine = self.question.cam.name, self.question.actuator
+        known = machine.quantities()
+        changes: dict[str, Quantity] = {
+            name: known[name].with_value(value, _SOURCE)
+            for name, value in self.values.items()
+            if name in self.question.free
+        }
+        if self.program.problem.contour is not None:
+            anchor = None if self.question.cam.anchor_distance is None else self.contour.anchor_distance
+            fit = cam_from_profile(
+                self.contour.angles, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
+                anchor_distance=anchor,
+            )  # fmt: skip
+            changes |= {f"{cam}.{field}": given for field, given in fit.changes().items()}
+        return derived(machine.with_values(changes), self.question.machine.assembly, "designed")
+
+    def si_values(self) -> dict[str, float]:
+        """Return sizes and variables of the contour in SI by name, to begin another program with."""
+        chosen = self.program.chosen_values(self.point.unknowns)
+        return chosen | self.values
+
+    def view(self, revision: int) -> DesignView:
+        """Return what is shown of it.
+
+        Parameters
+        ----------
+        revision
+            Of the question.
+        """
+        rows = self._numbers
+        pieces = list(self.program.problem.design.strains)
+        strains, stresses = (rows[key].reshape(len(pieces), -1) for key in ("strains", "stresses"))
+        curves = DesignCurves(
+            angles=rows["angle"], lever_arms=rows["lever_arm"], radii=rows["radius"],
+            radii_of_curvature=rows["radius_of_curvature"], torques=rows["torque"],
+            stiffnesses=rows["stiffness"], extensions=rows["extension"], forces=rows["force"],
+            strains=dict(zip(pieces, strains, strict=True)),
+            stresses=dict(zip(pieces, stresses, strict=True)),
+        )  # fmt: skip
+        states = self._limits(rows)
+        rms, largest = float(np.sqrt(max(rows["mean_square"][0], 0.0))), self.question.target_size
+        return DesignView(
+            revision=revision,
+            checked=False,
+            columns=curve_columns(curves, rows["wanted"]),
+            rms_error=rms,
+            largest_error=float(np.max(np.abs(rows["torque"] - rows["wanted"]))),
+            relative_error=rms / largest,
+            met=rms <= ALLOWED * largest,
+            margins=margins_of(states),
+            active=tuple(dict.fromkeys(each.limit for each in states if each.active)),
+            numbers=shown_numbers(self.question, self.values),
+            contour=self.contour.points,
+            rubber_volume=float(rows["volume"][0]),
+        )
+
+    def _limits(self, rows: dict[str, Floats]) -> list[LimitState]:
+        states = []
+        for i, (bound, wanted) in enumerate(
+            zip(self.program.shown_bounds, self.program.values_of(self.question), strict=True)
+        ):
+            values = rows[f"bound {i}"]
+            value = float(values.max() if bound.upper else values.min())
+            active = abs(value - wanted) <= _ACTIVE * (abs(wanted) or 1.0)
+            states.append(LimitState(bound.limit, bound.of, value, wanted, bound.upper, bound.unit, active))
+        return states
+
+
+class QuickSolver:
+    """The programs of one session, the latest first out last."""
+
+    def __init__(self) -> None:
+        self._programs: OrderedDict[tuple[Any, ...], QuickProgram] = OrderedDict()
+        self._contradicted: QuickProgram | None = None
+
+    def program(self, question: LiveQuestion) -> QuickProgram:
+        """Return the program of a question, made where there is none yet.
+
+        Parameters
+        ----------
+        question
+            Any.
+        """
+        key = structure_of(question)
+        if key not in self._programs:
+            self._programs[key] = QuickProgram(question)
+            self._programs[key].prepare()
+        self._programs.move_to_end(key)
+        while len(self._programs) > _MOST_PROGRAMS:
+            self._programs.popitem(last=False)
+        return self._programs[key]
+
+    def answer(
+        self, question: LiveQuestion, last: QuickDesign | None
+    ) -> tuple[QuickDesign | None, QuickOutcome]:
+        """Return the design for a question, and how it was come by.
+
+        Parameters
+        ----------
+        question
+            Any.
+        last
+            The last good design, to begin beside.
+        """
+        program = self.program(question)
+        begin = self._begin(program, question, last)
+        contradicted, self._contradicted = self._contradicted is program, None
+        if contradicted:
+            # Limits that contradicted each other a moment ago are asked first.
+            kept = program.conflict(question, begin)
+            if kept.state == "infeasible":
+                self._contradicted = program
+                return None, kept
+        outcome = self._tried(program, question, last)
+        if outcome.state != "solved" and not contradicted:
+            kept = program.conflict(question, begin)
+            if kept.state == "infeasible":
+                self._contradicted = program
+                return None, kept
+            if kept.point is not None:
+                outcome = program.from_point(question, kept.point)
+        if outcome.state != "solved":
+            outcome = program.from_starts(question)
+        if outcome.state != "solved" or outcome.point is None:
+            return None, replace(outcome, state="not solved", words=f"not solved yet: {outcome.words}")
+        return QuickDesign(program, question, outcome.point, outcome.cost), outcome
+
+    def _begin(self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None) -> Floats:
+        values = {} if last is None else program.scaled_values(last.si_values())
+        return program.completed(question, values)
+
+    def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
+        """Return the quick design at a finished one, for the next drag to begin from.
+
+        Parameters
+        ----------
+        question
+            That both answer.
+        design
+            Finished.
+        """
+        return self.beside_values(question, values_of_design(self.program(question), design))
+
+    def beside_values(self, question: LiveQuestion, values: dict[str, float]) -> QuickDesign | None:
+        """Return the quick design at numbers of another; ``None`` where there is none.
+
+        Parameters
+        ----------
+        question
+            Any.
+        values
+            In SI by name.
+        """
+        program = self.program(question)
+        outcome = program.from_values(question, program.scaled_values(values))
+        if outcome.state != "solved" or outcome.point is None:
+            return None
+        return QuickDesign(program, question, outcome.point, outcome.cost)
+
+    def _tried(self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None) -> QuickOutcome:
+        if last is None:
+            return program.from_starts(question)
+        if last.program is program:
+            outcome = program.beside(question, last.point)
+            if outcome.state in ("solved", "infeasible"):
+                return outcome
+        outcome = program.from_values(question, program.scaled_values(last.si_values()))
+        if outcome.state == "solved" or last.program is program:
+            return outcome
+        return program.from_starts(question)
+
+
+def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:
+    """Return the variables of a finished design in SI by name.
+
+    Parameters
+    ----------
+    program
+        Of the question.
+    design
+        Finished.
+    """
+    values = {name: given.number for name, given in design.changes if len(given.values) == 1}
+    problem, contour = program.problem, design.contour
+    if problem.contour is None:
+        return values
+    for radius, value in zip(
+        problem.contour.radii_of_curvature, contour.radii_of_curvature[::_PER_INTERVAL], strict=True
+    ):
+        values[radius.name] = float(value)
+    values[problem.contour.first_slope.name] = float(contour.slopes[0])
+    last = problem.contour.last.name
+    values[last] = float(contour.directions[-1] if last == "last_direction" else contour.lever_arms[0])
+    return values

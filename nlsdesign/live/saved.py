@@ -1,0 +1,158 @@
+"""A live design as text: a deck and a design file that every command reads, and where the search stood."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..components.assembly.deck_writer import deck_text, declare
+from ..deck import read_deck
+from ..design import NumberRange, TabulatedTorque, job_of
+from ..design.curves.numbers import plain
+from ..errors import DeckError, ValueRangeError
+from .gallery import MOST_DECK_BYTES
+from .limit_kinds import LIMIT_KINDS
+from .question import LiveQuestion, Machine, TargetPoint
+
+_DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
+_MOST_VALUES = 200
+_HEAD = "# Asked on the live page. `nlsdesign design --deck deck.toml --job design.toml` designs it anew."
+
+
+@dataclass(frozen=True)
+class SavedDesign:
+    """A live design as three TOML texts.
+
+    Parameters
+    ----------
+    deck
+        The actuator with the numbers that were given.
+    job
+        Target, limits and what is free: a design file.
+    begin
+        Title, points and the numbers at which the last design stood, so that it is found again.
+    """
+
+    deck: str
+    job: str
+    begin: str = ""
+
+
+def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
+    """Return a question as text.
+
+    Parameters
+    ----------
+    question
+        As it stands.
+    values
+        Numbers of the last design in SI by name; empty before the first.
+    """
+    lines = [_HEAD, f"free = {json.dumps(list(question.free))}", "", "[target]"]
+    rows = (question.target.angles, question.target.torques)
+    angles, torques = (json.dumps([float(v) for v in row]) for row in rows)
+    lines += [f"TabulatedTorque = {{angles = {angles}, torques = {torques}}}", "", "[limits]"]
+    for name, value in question.limits.items():
+        kind = LIMIT_KINDS[name]
+        lines.append(f'{name} = {{{kind.field} = "{float(value)!r} {kind.unit}"}}')
+    ranges = [
+        f'{{name = {json.dumps(name)}, minimum = "{float(low)!r} {question.numbers[name].unit}", '
+        f'maximum = "{float(high)!r} {question.numbers[name].unit}"}}'
+        for name, (low, high) in question.ranges.items()
+    ]
+    lines += [f"NumberRange = [{', '.join(ranges)}]"] if ranges else []
+    begin = [
+        f"title = {json.dumps(question.title)}",
+        f"material = {json.dumps(question.machine.material)}",
+        f"points = {json.dumps([[float(v) for v in point] for point in question.points])}",
+        "",
+        "[values]",
+        *(f"{json.dumps(name)} = {float(value)!r}" for name, value in values.items()),
+    ]
+    return SavedDesign(deck_text(question.actuator), "\n".join(lines) + "\n", "\n".join(begin) + "\n")
+
+
+def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
+    """Return the question of a saved design, and the numbers at which its design stood.
+
+    Parameters
+    ----------
+    texts
+        As :func:`saved` made them; the third may be empty.
+
+    Raises
+    ------
+    ValueRangeError
+        If a text is too large, or asks for something that the live design does not have.
+    NlsError
+        If a text cannot be read.
+    """
+    for name, text in ((_DECK, texts.deck), (_JOB, texts.job), (_BEGIN, texts.begin)):
+        if len(text.encode()) > MOST_DECK_BYTES:
+            raise ValueRangeError(
+                name,
+                f"is larger than {MOST_DECK_BYTES / 1e3:.0f} kB",
+                next_step="give the file that was saved",
+            )
+    actuator = declare(read_deck(texts.deck, Path(_DECK)))
+    job = job_of(texts.job, Path(_JOB))
+    begin = _table(texts.begin)
+    target = job.target
+    if not isinstance(target, TabulatedTorque) or target.weights or target.slopes:
+        raise ValueRangeError(
+            f"{_JOB}: target", "is no table of angles and torques without weights",
+            next_step="write TabulatedTorque = {angles = [...], torques = [...]} in rad and N·m",
+        )  # fmt: skip
+    points = tuple(
+        TargetPoint(float(a), float(t)) for a, t in zip(target.angles, target.torques, strict=True)
+    )
+    limits, ranges = _limits_of(job.keep)
+    machine = Machine(actuator, str(begin.get("material", ""))[:100])
+    question = LiveQuestion(str(begin.get("title", actuator.name))[:100], machine, points, limits, (), ranges)
+    given = [each for each in begin.get("points", []) if isinstance(each, list) and len(each) == 2]
+    if len(given) == 2 and len(points) == 3:
+        question = replace(question, points=(points[0], points[2]))
+    free = (question.contour,) if job.free is None else tuple(str(each) for each in job.free)
+    for name in (*free, *ranges):
+        if name != question.contour:
+            question.number(name)
+    return replace(question, free=free).with_points(question.points), _values(begin)
+
+
+def _limits_of(keep: tuple[Any, ...]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    limits: dict[str, float] = {}
+    ranges: dict[str, tuple[float, float]] = {}
+    for limit in keep:
+        name = type(limit).__name__
+        if isinstance(limit, NumberRange):
+            ranges[limit.name] = (plain(limit.minimum), plain(limit.maximum))
+        elif name in LIMIT_KINDS and name not in limits:
+            limits[name] = LIMIT_KINDS[name].value_of(limit)
+        else:
+            raise ValueRangeError(
+                f"{_JOB}: limit {name}", "is twice there, or is none of the live design",
+                next_step=f"those are: {', '.join([*LIMIT_KINDS, 'NumberRange'])}",
+            )  # fmt: skip
+    return limits, ranges
+
+
+def _table(text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DeckError(_BEGIN, f"is no TOML: {error}", next_step="leave it out, or save again") from None
+
+
+def _values(begin: dict[str, Any]) -> dict[str, float]:
+    table = begin.get("values", {})
+    if not isinstance(table, dict):
+        return {}
+    return {
+        str(name): float(value)
+        for name, value in list(table.items())[:_MOST_VALUES]
+        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    }

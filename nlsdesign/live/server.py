@@ -1,0 +1,132 @@
+"""The server of the live page: one port of this machine, until it is interrupted."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+from ..errors import NlsError, missing_library
+from .access import Access, loopback
+from .application import LONGEST_MESSAGE, application
+from .session_process import SessionProcess
+from .sessions import Sessions
+
+_PAUSE = 20.0
+"""Seconds between two looks for sessions whose time is over."""
+
+
+def serve(
+    deck: str = "",
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    packages: tuple[str, ...] = (),
+    ready: Callable[[str], None] = print,
+) -> None:
+    """Serve the live page to this machine until the program is interrupted.
+
+    Parameters
+    ----------
+    deck
+        That each tab begins with; empty for the first of the gallery.
+    host
+        A loopback address.
+    port
+        Zero for one that is free.
+    packages
+        Names of packages that decks may take parts from.
+    ready
+        Called with the address of the page once it answers.
+
+    Raises
+    ------
+    ValueRangeError
+        If the host is no loopback address.
+    NlsError
+        If the port cannot be had.
+    MissingLibraryError
+        If the server's library is not installed.
+    """
+    try:
+        import starlette
+        import uvicorn
+        import websockets
+    except ImportError as error:
+        raise missing_library("the live page", error.name or "starlette", "live") from None
+    del starlette, websockets
+    host = loopback(host)
+    listener = _listener(host, port)
+    access = Access(host, listener.getsockname()[1])
+    sessions = Sessions(lambda: SessionProcess(deck, packages))
+
+    class Server(uvicorn.Server):
+        """Says when it answers."""
+
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            ready(access.address)
+            await sessions.prepare()
+
+    @contextlib.asynccontextmanager
+    async def kept_in_bounds() -> AsyncIterator[None]:
+        async def look() -> None:
+            while True:
+                await asyncio.sleep(_PAUSE)
+                sessions.end_the_idle()
+                if sessions.quiet:
+                    await sessions.prepare()
+
+        looking = asyncio.create_task(look())
+        try:
+            yield
+        finally:
+            looking.cancel()
+            await asyncio.gather(*(process.gone() for process in sessions.end_all()))
+
+    async def run() -> None:
+        async with kept_in_bounds():
+            await Server(_settings(application(sessions, access))).serve(sockets=[listener])
+
+    with contextlib.closing(listener):
+        asyncio.run(run())
+
+
+def _settings(app: Any) -> Any:
+    import uvicorn
+
+    return uvicorn.Config(
+        app, loop="asyncio", http="h11", ws="websockets-sansio", lifespan="off", log_level="critical",
+        access_log=False, server_header=False, date_header=False, proxy_headers=False,
+        ws_max_size=LONGEST_MESSAGE, ws_per_message_deflate=False, h11_max_incomplete_event_size=1 << 15,
+        timeout_graceful_shutdown=0, limit_concurrency=200,
+    )  # fmt: skip
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    """Return a socket that listens at a port.
+
+    Raises
+    ------
+    NlsError
+        If the port is taken or not allowed.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # elsewhere two programs may share a port on Windows
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+        else:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(64)
+    except OSError as error:
+        listener.close()
+        words = (error.strerror or str(error)).lower()
+        raise NlsError(
+            f"port {port} of {host}", f"cannot be had: {words}",
+            next_step="end what listens there, or leave --port out: a free one is taken then",
+        ) from error  # fmt: skip
+    return listener

@@ -1,0 +1,138 @@
+"""Files that a page hands over: of a bounded size and number, under names of our own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..errors import NlsError
+
+FILE_BYTES = 64 << 20
+"""Most bytes of one file of records."""
+DECK_BYTES = 1 << 20
+"""Most bytes of a deck or of a design that was saved."""
+ALL_BYTES = 256 << 20
+"""Most bytes of all files of one session."""
+FILES = 40
+"""Most files of one session."""
+ENDINGS = (".csv", ".parquet", ".mat", ".h5", ".hdf5", ".toml")
+"""What :func:`nlsdesign.identification.load_records` reads, and ``records.toml``."""
+
+
+class TooLargeError(NlsError):
+    """More was handed over than is taken."""
+
+
+@dataclass
+class Uploads:
+    """The files that one session was handed.
+
+    Parameters
+    ----------
+    folder
+        Where they stand.
+    """
+
+    folder: Path
+    _sizes: dict[str, int] = field(default_factory=dict)
+
+    async def keep(self, name: str, parts: AsyncIterator[bytes], announced: int | None) -> str:
+        """Write one file and return the name under which it stands.
+
+        Parameters
+        ----------
+        name
+            As the page calls it; letters that a name of ours may not have are replaced, and no path is left.
+        parts
+            The content as it comes.
+        announced
+            Its length in bytes, where the page says it.
+
+        Raises
+        ------
+        TooLargeError
+            If the file, or all together, or their number is too large; nothing of the file is kept.
+        NlsError
+            If its ending is none of records.
+        """
+        kept = plain_name(name)
+        others = sum(size for each, size in self._sizes.items() if each != kept)
+        if kept not in self._sizes and len(self._sizes) >= FILES:
+            raise TooLargeError("files", f"{FILES} of them are there, which is the most", next_step="remove some")
+        most = min(FILE_BYTES, ALL_BYTES - others)
+        if announced is not None and announced > most:
+            raise too_large(kept, most)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        place, size = self.folder / kept, 0
+        # Counted from its first byte on, so that several files at once keep to the same limit.
+        try:
+            with place.open("wb") as stream:
+                async for part in parts:
+                    size += len(part)
+                    self._sizes[kept] = size
+                    if size > FILE_BYTES or sum(self._sizes.values()) > ALL_BYTES:
+                        raise too_large(kept, most)
+                    stream.write(part)
+        except BaseException:
+            place.unlink(missing_ok=True)
+            self._sizes.pop(kept, None)
+            raise
+        self._sizes[kept] = size
+        return kept
+
+    def clear(self) -> None:
+        """Remove all files."""
+        for name in self._sizes:
+            (self.folder / name).unlink(missing_ok=True)
+        self._sizes.clear()
+
+
+def too_large(name: str, most: int) -> TooLargeError:
+    """Return the error of a file that is too large.
+
+    Parameters
+    ----------
+    name
+        Of the file.
+    most
+        Bytes that are taken.
+    """
+    return TooLargeError(
+        name, f"is larger than {most / 2**20:.4g} MiB, the most that the live page takes",
+        next_step="shorten the record, or diagnose from the command line: nlsdesign diagnose",
+    )  # fmt: skip
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a file of records without any path, in letters that every system takes.
+
+    Parameters
+    ----------
+    name
+        As somebody calls it.
+
+    Raises
+    ------
+    NlsError
+        If its ending is none of records.
+    """
+    last = re.split(r"[/\\]", name)[-1]
+    _, dot, ending = last.rpartition(".")
+    if dot + ending.lower() not in ENDINGS:
+        raise NlsError(f"file '{last}'", "is no table of records", next_step=f"take one of {', '.join(ENDINGS)}")
+    return "records.toml" if ending.lower() == "toml" else plain_letters(last)
+
+
+def plain_letters(name: str) -> str:
+    """Return the name of a file in letters that every system takes, and that end no header.
+
+    Parameters
+    ----------
+    name
+        With its ending.
+    """
+    stem, dot, ending = name.rpartition(".")
+    kept = (re.sub(r"[^A-Za-z0-9_-]+", "_", part).strip("_")[:80] for part in (stem, ending.lower()))
+    return f"{next(kept) or 'record'}{dot}{next(kept)}"

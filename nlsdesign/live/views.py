@@ -1,0 +1,152 @@
+"""From designs to what is shown of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..design import CamDesign, LimitState
+from ..design.optimisation.result import DesignCurves
+from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
+from .question import LiveQuestion
+
+Floats = NDArray[np.float64]
+
+ALLOWED = 0.01
+"""Rms error over the largest torque above which a design misses its target."""
+_SI = {"mm": "m", "mm^2": "m^2", "MPa": "Pa", "mN*m": "N*m"}
+_MOST_CHECKED = 161
+"""Angles at which the torque of a finished assembly is shown."""
+
+
+def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> LiveControls:
+    """Return what a designer can move.
+
+    Parameters
+    ----------
+    question
+        As it stands.
+    can_undo, can_redo
+        Whether there is a step back or forth.
+    """
+    limits = tuple(
+        (name, each.kind.words, each.value, each.kind.unit, each.kind.shown_unit, each.kind.upper,
+         each.by_default)
+        for name, each in question.limit_values.items()
+    )  # fmt: skip
+    return LiveControls(
+        title=question.title,
+        material=question.machine.material,
+        points=tuple(tuple(point) for point in question.points),
+        limits=limits,
+        numbers=tuple(tuple(each) for each in question.numbers.values()),
+        contour=question.contour,
+        contour_free=question.contour in question.free,
+        can_undo=can_undo,
+        can_redo=can_redo,
+    )
+
+
+def curve_columns(curves: DesignCurves, targets: Floats) -> tuple[LiveColumn, ...]:
+    """Return what cam and rubber do over the angle as columns.
+
+    Parameters
+    ----------
+    curves
+        At the nodes of the contour.
+    targets
+        Torque that is wanted there.
+    """
+    rows = [
+        LiveColumn("angle", "rad", "cam angle", curves.angles),
+        LiveColumn("torque", "N*m", "torque of the spring", curves.torques),
+        LiveColumn("target", "N*m", "torque that is wanted", targets),
+        LiveColumn("error", "N*m", "torque minus target", curves.torques - targets),
+        LiveColumn("lever_arm", "m", "lever arm of the cable", curves.lever_arms),
+        LiveColumn("stiffness", "N*m/rad", "slope of the torque", curves.stiffnesses),
+        LiveColumn("radius_of_curvature", "m", "of the contour under the cable", curves.radii_of_curvature),
+        LiveColumn("radius", "m", "distance of the contour from the centre", curves.radii),
+        LiveColumn("extension", "m", "of one element, pretension included", curves.extensions),
+        LiveColumn("tension", "N", "force of one element and its cable", curves.forces),
+    ]
+    rows += [LiveColumn(f"{p}.strain", "1", f"nominal strain of {p}", v) for p, v in curves.strains.items()]
+    rows += [LiveColumn(f"{p}.stress", "Pa", f"nominal stress of {p}", v) for p, v in curves.stresses.items()]
+    return tuple(rows)
+
+
+def margins_of(states: Iterable[LimitState]) -> tuple[LimitMargin, ...]:
+    """Return how a design stands to its limits.
+
+    Parameters
+    ----------
+    states
+        Of a finished design.
+    """
+    return tuple(
+        LimitMargin(
+            each.limit, each.of, each.value, each.bound,
+            each.bound - each.value if each.upper else each.value - each.bound,
+            _SI.get(each.unit, each.unit),
+            each.unit, each.upper, each.active,
+        )
+        for each in states
+    )  # fmt: skip
+
+
+def shown_numbers(question: LiveQuestion, values: Mapping[str, float]) -> tuple[ShownNumber, ...]:
+    """Return the numbers of a design.
+
+    Parameters
+    ----------
+    question
+        That it answers.
+    values
+        In SI by name, in place of those of the question.
+    """
+    return tuple(
+        ShownNumber(n.name, values.get(n.name, n.value), n.unit, n.shown_unit, n.free)
+        for n in question.numbers.values()
+    )
+
+
+def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignView:
+    """Return what is shown of a finished design: its torque is that of the assembly, flattened anew.
+
+    Parameters
+    ----------
+    question
+        That it answers.
+    revision
+        Of the question.
+    design
+        Of the whole search.
+    """
+    check, largest = design.check, design.target.largest
+    columns = list(curve_columns(design.curves, design.target.torque(design.curves.angles)))
+    every = max(1, len(check.angles) // _MOST_CHECKED)
+    at = np.interp
+    angles = check.angles[::every]
+    columns = [LiveColumn(c.name, c.unit, c.description, at(angles, design.curves.angles, c.values))
+               for c in columns]  # fmt: skip
+    measured = {"torque": check.torques, "target": check.targets, "error": check.errors}
+    columns = [
+        LiveColumn(c.name, c.unit, c.description, measured[c.name][::every]) if c.name in measured else c
+        for c in columns
+    ]
+    values = {name: given.number for name, given in design.changes if len(given.values) == 1}
+    return DesignView(
+        revision=revision,
+        checked=True,
+        columns=tuple(columns),
+        rms_error=design.rms,
+        largest_error=check.largest,
+        relative_error=design.rms / largest,
+        met=design.met,
+        margins=margins_of(design.limits),
+        active=design.active_limits,
+        numbers=shown_numbers(question, values),
+        contour=design.contour.points,
+        rubber_volume=design.rubber_volume,
+    )

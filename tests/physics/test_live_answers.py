@@ -1,0 +1,311 @@
+"""The quick answers of the live design against whole designs, geometry, and the analyses of other rooms."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from nlsdesign.analysis import Observability, over_angle
+from nlsdesign.components import Assembly
+from nlsdesign.components.assembly.deck_writer import declare
+from nlsdesign.deck import load_deck
+from nlsdesign.design import CamDesign, DesignSettings, design_cam
+from nlsdesign.errors import ValueRangeError
+from nlsdesign.live import (
+    AddPoint,
+    ChangeLimit,
+    ChooseDeck,
+    ChooseMaterial,
+    DropLimit,
+    FreeNumber,
+    HoldNumber,
+    LiveAnswer,
+    LiveDesign,
+    LiveQuestion,
+    MovePoint,
+    SetNumber,
+    SettleDesign,
+    gallery_question,
+    question_of,
+    reopened,
+)
+from nlsdesign.live.background import BackgroundWork
+from nlsdesign.live.full_design import full_answer, whole_design
+from tests.renamed import in_words, renamed
+
+SAME = 2e-4
+"""Difference of two rms errors relative to the largest torque: a flat optimum is left at a tolerance of the
+solver of 1e-9 in a cost in which 1e-3 of the largest torque counts as one."""
+
+
+def whole(question: LiveQuestion, starts: int = 4) -> CamDesign:
+    settings = DesignSettings(
+        starts=starts, defaults=(), look_for_size_ranges=False, look_for_remedies=False, draws=0
+    )
+    return design_cam(
+        question.actuator, target=question.target, free=question.free, keep=question.keep, settings=settings
+    )
+
+
+def require_same(answer: LiveAnswer, question: LiveQuestion) -> None:
+    """The quick answer is the whole design: torque error, sizes, limits that bind."""
+    assert answer.state == "solved"
+    assert answer.design is not None
+    assert not answer.stale
+    design, largest = whole(question), question.target.largest
+    assert answer.design.rms_error == pytest.approx(design.predicted_rms, abs=SAME * largest)
+    for state, margin in zip(design.limits, answer.design.margins, strict=False):
+        assert (state.limit, state.of) == (margin.limit, margin.of)
+        assert margin.value == pytest.approx(state.value, rel=5e-3, abs=5e-3 * abs(state.bound))
+        assert margin.margin >= -1e-6 * abs(margin.bound)
+
+
+@pytest.fixture(scope="module")
+def session() -> Iterator[LiveDesign]:
+    live = LiveDesign(gallery_question("cam-actuator"))
+    yield live
+    live.work.close()
+
+
+@pytest.fixture
+def template(session: LiveDesign) -> Iterator[LiveDesign]:
+    """The session as it began."""
+    yield session
+    session.work.close()
+    while session.answer.controls.can_undo:
+        session.undo()
+
+
+def drag(live: LiveDesign, draw: np.random.Generator, size: float = 0.03) -> LiveAnswer:
+    """One step of a mouse: a random point moves by a share of its torque and of its room."""
+    points = live.question.points
+    k = int(draw.integers(1, len(points)))
+    room = points[k].angle - points[k - 1].angle
+    angle = points[k].angle + 0.1 * room * draw.uniform(-1.0, 1.0)
+    torque = points[k].torque * (1.0 + size * draw.standard_normal())
+    return live.apply(MovePoint(k, float(angle), float(max(torque, 0.0))))
+
+
+def test_quick_answer_of_a_template_is_the_whole_design(template: LiveDesign) -> None:
+    require_same(template.answer, template.question)
+    point = template.question.points[3]
+    answer = template.apply(MovePoint(3, point.angle * 1.02, point.torque * 1.1))
+    require_same(answer, template.question)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "deck", ["one_sided_cable_drive", "one-sided-finger", "austin2015_figure_consistent", "test_rig"]
+)
+def test_quick_answers_of_other_decks_are_whole_designs(deck: str) -> None:
+    live = LiveDesign(gallery_question(deck))
+    require_same(live.answer, live.question)
+    draw = np.random.default_rng(5)
+    for _ in range(3):
+        answer = drag(live, draw)
+    require_same(answer, live.question)
+
+
+@pytest.mark.slow
+def test_a_machine_with_other_names_gives_the_same_answers() -> None:
+    machine: Assembly = declare(load_deck("test_rig"))
+    one, other = (
+        LiveDesign(question_of(each, "x")) for each in (machine, renamed(machine, in_words).assembly)
+    )
+    for draw in (np.random.default_rng(1), None):
+        if draw is not None:
+            answers = [drag(each, np.random.default_rng(1)) for each in (one, other)]
+            assert answers[0].design is not None
+            assert answers[1].design is not None
+            assert answers[0].design.rms_error == pytest.approx(answers[1].design.rms_error, rel=1e-6)
+
+
+def path(deck: str, drags: int) -> None:
+    """A path of drags ends at the design of a fresh session, or the whole design says that it did not."""
+    live, draw = LiveDesign(gallery_question(deck)), np.random.default_rng(3)
+    for _ in range(drags):
+        answer = drag(live, draw)
+    fresh = LiveDesign(live.question)
+    assert answer.design is not None
+    assert fresh.answer.design is not None
+    largest = live.question.target.largest
+    if abs(answer.design.rms_error - fresh.answer.design.rms_error) > SAME * largest:
+        solved = live._now.solved
+        full = whole_design(lambda _: None, live.question.actuator, live.question.target,
+                            live.question.free, live.question.keep)  # fmt: skip
+        assert "local optimum" in full_answer(full, live.question, answer, solved).message
+
+
+def test_a_path_of_drags_ends_where_a_fresh_session_begins() -> None:
+    path("cam-actuator", 12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("deck", ["cam-actuator", "one-sided-finger", "one_sided_cable_drive", "test_rig"])
+def test_fifty_drags_end_where_a_fresh_session_begins(deck: str) -> None:
+    path(deck, 50)
+
+
+def test_undo_and_redo_give_the_same_numbers(template: LiveDesign) -> None:
+    before = template.answer
+    edits = [
+        MovePoint(2, 0.42, 0.17),
+        ChangeLimit("MaximumStrain", 1.2),
+        SetNumber("spring.rubber.area", 55e-6),
+    ]
+    answers = [template.apply(edit) for edit in edits]
+    for expected in (*reversed(answers[:-1]), before):
+        there = template.undo()
+        assert there.revision > expected.revision
+        assert there.design is not None
+        assert expected.design is not None
+        assert there.design.rms_error == expected.design.rms_error
+        assert not there.stale
+        np.testing.assert_array_equal(there.design.contour, expected.design.contour)
+        assert there.controls.points == expected.controls.points
+    assert there.controls.can_redo
+    for expected in answers:
+        there = template.redo()
+    assert there.design is not None
+    assert answers[-1].design is not None
+    assert there.design.numbers == answers[-1].design.numbers
+    assert not there.controls.can_redo
+    # Steps of one drag are taken back together.
+    for torque in (0.171, 0.172, 0.173):
+        template.apply(MovePoint(2, 0.42, torque), drag="point 2")
+    assert template.undo().controls.points == answers[-1].controls.points
+    for _ in edits:
+        template.undo()
+    assert template.answer.controls.points == before.controls.points
+
+
+def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(template: LiveDesign) -> None:
+    good = template.answer.design
+    template.apply(ChangeLimit("MaximumCamRadius", 0.002))
+    answer = template.answer
+    assert answer.state == "infeasible"
+    assert answer.stale
+    assert answer.design is not None
+    assert good is not None
+    assert answer.design.rms_error == good.rms_error
+    assert set(answer.conflicts) == {"MaximumCamRadius", "MinimumRadiusOfCurvature"}
+    assert "contradict each other" in answer.message
+    # A disc as small as the cable bends is the smallest cam there is: 2.25 mm.
+    assert "MaximumCamRadius 2 mm to about 2.25 mm" in answer.message
+    back = template.apply(DropLimit("MaximumCamRadius"))
+    assert back.state == "solved"
+    assert not back.stale
+    assert back.design is not None
+    assert back.design.rms_error == pytest.approx(good.rms_error, abs=SAME * template.question.target.largest)
+
+
+def test_another_rubber_and_a_held_contour(template: LiveDesign) -> None:
+    softer = template.apply(ChooseMaterial("Dragon_Skin_30"))
+    require_same(softer, template.question)
+    template.undo()
+    contour = template.answer.design.contour if template.answer.design else None
+    held = template.apply(HoldNumber(template.question.contour))
+    assert held.state == "solved"
+    assert "is shown and not kept" in held.message
+    assert held.design is not None
+    assert contour is not None
+    assert held.design.rms_error < 1e-3 * template.question.target.largest
+    np.testing.assert_allclose(held.design.contour[-1], contour[-1], atol=1e-4)
+    template.undo()
+
+
+def test_what_is_saved_is_designed_to_the_same_numbers(template: LiveDesign) -> None:
+    template.apply(FreeNumber("spring.rubber.area", 4e-5, 7e-5))
+    answer = template.apply(AddPoint(0.5, 0.21))
+    again = LiveDesign(*reopened(template.saved()))
+    assert answer.design is not None
+    assert again.answer.design is not None
+    assert again.answer.controls.points == answer.controls.points
+    for there, here in zip(again.answer.design.numbers, answer.design.numbers, strict=True):
+        assert there.name == here.name
+        assert there.value == pytest.approx(here.value, rel=1e-6)
+    assert again.answer.design.rms_error == pytest.approx(answer.design.rms_error, rel=1e-4)
+
+
+def test_mechanism_is_to_scale_and_analyses_are_those_of_the_other_rooms(template: LiveDesign) -> None:
+    """The free cable passes the centre at the distance of the lever arm; the rubber grows by the extension."""
+    design = template.answer.design
+    assert design is not None
+    assert template.shown is not None
+    shapes = [template.shown.mechanism(angle) for angle in (0.0, 0.3, 0.9)]
+    angles = design.columns[0].values
+    for angle, shape in zip((0.3, 0.9), shapes[1:], strict=True):
+        (x1, y1), (x2, y2) = shape.contacts[0], shape.guides[0]
+        distance = abs(x1 * y2 - x2 * y1) / np.hypot(x2 - x1, y2 - y1)
+        arm = np.interp(angle, angles, design.column("lever_arm").values)
+        assert distance == pytest.approx(arm, rel=2e-3)
+    grown = np.interp(0.9, angles, design.column("extension").values) - design.column("extension").values[0]
+    length = [shape.rubbers[0][1, 0] - shape.rubbers[0][0, 0] for shape in shapes]
+    assert length[2] - length[0] == pytest.approx(grown, rel=1e-9)
+    answer = template.at(0.3)
+    seen, poles = answer.observability.value, answer.poles.value
+    chart = over_angle(template.shown.model, [Observability(measured=(seen.measured,))],
+                       angles=np.array([*np.linspace(0.0, angles[-1], 21), 0.3]))  # fmt: skip
+    assert seen.rank == chart["observability.rank"][-1] == seen.states
+    assert seen.condition == pytest.approx(chart["observability.condition"][-1], rel=1e-9)
+    assert all(np.all(group.real < 0.0) for group in poles)
+    assert answer.loop.state == "asked for later"
+    torque = next(each for each in answer.readings if each.name == "torque")
+    assert torque.values[0] == pytest.approx(float(template.question.target.torque(0.3)), rel=1e-2)
+    with pytest.raises(ValueRangeError):
+        template.at(float("nan"))
+
+
+def test_the_whole_design_replaces_the_quick_answer_and_can_be_cancelled(template: LiveDesign) -> None:
+    state = template.start(SettleDesign())
+    assert state.state == "computing"
+    state = template.work.wait("SettleDesign", 120.0) or state
+    assert state.state == "done", state.message
+    template.poll()
+    answer = template.answer
+    assert answer.source == "full"
+    assert answer.design is not None
+    assert answer.design.checked
+    assert not answer.stale
+    next_one = drag(template, np.random.default_rng(0))
+    assert next_one.source == "quick"
+    assert next_one.state == "solved"
+    template.poll()
+    assert template.answer.source == "quick", "an answer to another question replaced this one"
+    template.undo()
+
+
+def test_work_that_is_cancelled_or_fails_leaves_no_process() -> None:
+    work = BackgroundWork("sleep", 1, _sleeping, (60.0,))
+    time.sleep(0.2)
+    assert work.state().state == "computing"
+    assert work.cancel().state == "cancelled"
+    assert not work._process.is_alive()
+    failed = BackgroundWork("fail", 1, _sleeping, ("no number",)).wait(60.0)
+    assert failed.state == "failed"
+    assert "TypeError" in failed.message
+    gone = BackgroundWork("die", 1, _dying, ())
+    assert gone.wait(60.0).state == "failed"
+    assert "without an answer" in gone.state().message
+
+
+def _sleeping(stage: object, seconds: float) -> None:
+    time.sleep(seconds)
+
+
+def _dying(stage: object) -> None:
+    import os
+
+    os._exit(3)
+
+
+def test_a_deck_without_a_torque_loop_says_so_and_another_deck_begins_anew(template: LiveDesign) -> None:
+    answer = template.apply(ChooseDeck("one-sided-finger"))
+    assert answer.state == "solved"
+    assert answer.controls.title == "one-sided-finger"
+    assert template.shown is not None
+    assert len(template.shown.mechanism(0.2).cables) == 1
+    assert template.undo().controls.title == "cam-actuator"

@@ -1,0 +1,299 @@
+"""The live page in a browser: by mouse, by keys alone, on a small screen, beside others, and under attack."""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser import Tab, browser, chromium
+from tests.live_server import Server, running
+from tests.unit.test_report_in_a_browser import WIDEST
+
+pytest.importorskip("uvicorn")
+pytest.importorskip("starlette")
+pytest.importorskip("websockets")
+pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+
+STATE = "document.getElementById('state-name').textContent"
+ANSWERED = f"['quick answer', 'checked answer', 'checked, with remarks', 'misses its target'].includes({STATE}) && {STATE}"
+POINT = "document.querySelectorAll('.point:not(.names)')[{0}].querySelectorAll('input')[1].value"
+HANDLE = """(() => {{
+  window.scrollTo(0, 0);
+  const box = document.querySelectorAll('.handle')[{0}].querySelector('.knob').getBoundingClientRect();
+  return [box.x + box.width / 2, box.y + box.height / 2];
+}})()"""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with running() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def opened(server: Server) -> Iterator[Tab]:
+    """A browser whose first tab shows the page; what it asked for and wrote is kept."""
+    with browser() as tab:
+        tab.look(1400)
+        tab.visit(server.address)
+        tab.until(f"{ANSWERED} && !document.getElementById('gallery').disabled")
+        yield tab
+
+
+@pytest.fixture
+def tab(opened: Tab) -> Tab:
+    opened.look(1400)
+    opened.until(f"{ANSWERED} && !document.querySelector('#torque.stale')")
+    return opened
+
+
+def settled(tab: Tab, change: str, before: object) -> object:
+    """Wait until something on the page is another than before."""
+    return tab.until(f"(() => {{ const now = {change}; return now !== {before!r} && now; }})()".replace("None", "null"))
+
+
+def resting(tab: Tab) -> None:
+    """Wait until everything that was asked is answered and shown."""
+    tab.until("document.body.dataset.busy === 'false'")
+    tab.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
+
+
+def session_of(tab: Tab) -> str:
+    return str(tab.evaluate("sessionStorage.getItem('session')"))
+
+
+# --- what a designer does -------------------------------------------------------------------------
+
+
+def test_the_page_shows_a_design_asks_nobody_else_and_says_nothing_on_the_console(
+    tab: Tab, server: Server
+) -> None:
+    assert tab.evaluate("document.querySelectorAll('#panels .card:not([hidden]) path.line').length") >= 7
+    assert tab.evaluate("document.querySelectorAll('.mechanism .cable').length") >= 1
+    foreign = [each for each in tab.requests if not each.startswith((server.origin, server.origin.replace("http", "ws")))]
+    assert foreign == []
+    assert tab.messages == []
+    assert tab.evaluate("location.href") == f"{server.origin}/", "the token stays in the address"
+    words = tab.evaluate("document.getElementById('angle-words').textContent")
+    assert all(unit in words for unit in ("°", "N·m", "mm", "N·m/rad"))
+
+
+def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back(tab: Tab) -> None:
+    point = POINT.format(3)
+    before, curve = tab.evaluate(point), tab.evaluate("document.querySelector('#torque .line.blue').getAttribute('d')")
+    x, y = tab.evaluate(HANDLE.format(3))
+    tab.mouse("Pressed", x, y)
+    for step in range(1, 13):
+        tab.mouse("Moved", x, y - step)
+    tab.mouse("Released", x, y - 12)
+    resting(tab)
+    after = settled(tab, point, before)
+    assert float(str(after)) > float(before)
+    settled(tab, "document.querySelector('#torque .line.blue').getAttribute('d')", curve)
+    tab.until(ANSWERED)
+    assert tab.evaluate("performance.getEntriesByName('drag to drawn').length") >= 1
+    tab.evaluate("document.activeElement.blur()")
+    tab.press("z", control=True)
+    assert settled(tab, point, after) == before, "one drag is one step back"
+    tab.press("z", control=True, shift=True)
+    assert settled(tab, point, before) == after
+    tab.press("z", control=True)
+    settled(tab, point, after)
+
+
+def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
+    reached: list[str] = []
+    tab.evaluate("document.querySelector('.skip').focus()")
+    for _ in range(90):
+        tab.press("Tab")
+        reached.append(
+            tab.evaluate("(() => { const e = document.activeElement; return `${e.getAttribute('class') ?? ''}#${e.id}`; })()")
+        )
+        if reached[-1] == "#angle":
+            break
+    assert [each for each in reached if each.startswith("handle")], reached
+    for name in ("#gallery", "#keep", "#material", "#tolerance-run", "#angle"):
+        assert name in reached, name
+    tab.evaluate("document.querySelectorAll('.handle')[2].focus()")
+    assert tab.evaluate("getComputedStyle(document.activeElement.querySelector('.ring')).stroke") != "none"
+    value = "document.querySelectorAll('.handle')[2].getAttribute('aria-valuetext')"
+    before = tab.evaluate(value)
+    tab.press("ArrowUp")
+    fine = settled(tab, value, before)
+    tab.press("ArrowUp", shift=True)
+    coarse = settled(tab, value, fine)
+    numbers = [float(str(each).split()[0]) * (1e-3 if " mN" in str(each) else 1.0) for each in (before, fine, coarse)]
+    assert numbers[2] - numbers[1] == pytest.approx(10.0 * (numbers[1] - numbers[0]), rel=0.1)
+    words = tab.until("document.getElementById('said').textContent.includes('rms') && document.getElementById('said').textContent")
+    assert str(coarse).split()[0] in words
+    count = tab.evaluate("document.querySelectorAll('.handle').length")
+    tab.press("Insert")
+    tab.until(f"document.querySelectorAll('.handle').length === {count + 1}")
+    tab.evaluate("document.querySelectorAll('.handle')[3].focus()")
+    tab.press("Delete")
+    tab.until(f"document.querySelectorAll('.handle').length === {count}")
+    tab.evaluate("document.getElementById('angle').focus()")
+    at = tab.evaluate("document.getElementById('linear-angle').textContent")
+    tab.press("ArrowLeft")
+    settled(tab, "document.getElementById('linear-angle').textContent", at)
+
+
+@pytest.mark.parametrize("width", [375, 320])
+def test_nothing_is_wider_than_a_small_screen_and_points_are_large_enough_to_touch(tab: Tab, width: int) -> None:
+    tab.look(width)
+    tab.until("document.querySelector('#torque svg').getBoundingClientRect().width < 400")
+    assert tab.evaluate(WIDEST) == []
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width
+    reach = tab.evaluate("document.querySelector('.handle:not(.fixed) .reach').getBoundingClientRect().width")
+    assert reach >= 36.0
+
+
+def test_a_number_that_is_none_is_answered_beside_its_field(tab: Tab) -> None:
+    field = "document.querySelector('#limits input[type=text]')"
+    before = tab.evaluate(f"{field}.value")
+    tab.evaluate(f"{field}.focus(); {field}.value = 'a lot'; {field}.dispatchEvent(new Event('change'))")
+    assert "no number" in tab.evaluate("document.querySelector('#limits .wrong').textContent")
+    tab.evaluate(f"{field}.value = '-5'; {field}.dispatchEvent(new Event('change'))")
+    tab.until("!document.getElementById('notice').hidden")
+    assert "MaximumCableTension" in tab.evaluate("document.getElementById('notice').textContent")
+    tab.evaluate(f"{field}.value = {before!r}; {field}.dispatchEvent(new Event('change')); {field}.blur()")
+    tab.until("document.getElementById('notice').hidden")
+
+
+def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab: Tab) -> None:
+    session, point = session_of(tab), POINT.format(4)
+    before = tab.evaluate(point)
+    x, y = tab.evaluate(HANDLE.format(4))
+    tab.mouse("Pressed", x, y)
+    tab.mouse("Moved", x, y - 9)
+    tab.mouse("Released", x, y - 9)
+    tab.happened.clear()
+    tab.ask("Page.reload")
+    tab.until("document.readyState === 'complete' && document.querySelectorAll('.point').length > 3")
+    assert settled(tab, point, before)
+    assert session_of(tab) == session
+    tab.until(ANSWERED)
+    tab.press("z", control=True)
+    tab.until(f"{point} === {before!r}")
+    assert tab.messages == []
+
+
+# --- others ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_another_tab_and_another_person_have_designs_of_their_own(tab: Tab, server: Server) -> None:
+    point = POINT.format(2)
+    before = tab.evaluate(point)
+    for another_person in (False, True):
+        other = tab.beside(another_person=another_person)
+        other.look(1400)
+        other.visit(server.address)
+        other.until(ANSWERED)
+        assert session_of(other) != session_of(tab)
+        x, y = other.evaluate(HANDLE.format(2))
+        other.mouse("Pressed", x, y)
+        other.mouse("Moved", x, y - 8)
+        other.mouse("Released", x, y - 8)
+        settled(other, point, before)
+        assert tab.evaluate(point) == before
+        assert other.messages == []
+    stranger = tab.beside(another_person=True)
+    stranger.visit(server.origin + "/")
+    stranger.until("document.getElementById('connection').textContent.includes('token')")
+    assert stranger.evaluate("document.querySelectorAll('.point:not(.names)').length") == 0
+
+
+HOSTILE = """
+(async () => {{
+  const origin = "{origin}", told = [];
+  const socket = (protocols) => new Promise((done) => {{
+    const one = new WebSocket(origin.replace("http", "ws") + "/api/design", protocols);
+    one.onopen = () => done("open"); one.onerror = () => done("refused");
+  }});
+  told.push(await socket(["nlsdesign", "{token}"]), await socket(["nlsdesign", "x"]));
+  for (const path of ["/api/open", "/api/records?name=a.csv", "/api/file/deck"])
+    for (const headers of [{{}}, {{ Authorization: "Bearer {token}" }}])
+      told.push(await fetch(origin + path, {{ method: "POST", headers, body: "x" }}).then(() => "answered", () => "refused"));
+  told.push(await fetch(origin + "/", {{ mode: "no-cors" }}).then((r) => (r.type === "opaque" ? "refused" : "answered"), () => "refused"));
+  told.push(await new Promise((done) => {{
+    const script = document.createElement("script");
+    script.type = "module"; script.src = origin + "/page/units.js";
+    script.onload = () => done("loaded"); script.onerror = () => done("refused");
+    document.head.append(script);
+  }}));
+  const frame = document.createElement("iframe");
+  frame.src = origin + "/";
+  document.body.append(frame);
+  await new Promise((done) => {{ frame.onload = done; setTimeout(done, 3000); }});
+  try {{ told.push(frame.contentDocument === null ? "refused" : "framed"); }} catch {{ told.push("refused"); }}
+  return told;
+}})()"""
+
+
+def test_a_hostile_page_drives_nothing_even_if_it_knew_the_token(
+    opened: Tab, server: Server, tmp_path: Path
+) -> None:
+    (tmp_path / "index.html").write_text("<!doctype html><title>hostile</title><p>hostile</p>")
+    quiet = type("Quiet", (http.server.SimpleHTTPRequestHandler,), {"log_message": lambda *_: None})
+    elsewhere = http.server.ThreadingHTTPServer(
+        ("127.0.0.1", 0), functools.partial(quiet, directory=str(tmp_path))
+    )
+    threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+    try:
+        other = opened.beside()
+        other.visit(f"http://127.0.0.1:{elsewhere.server_address[1]}/")
+        outcome = other.evaluate(HOSTILE.format(origin=server.origin, token=server.token))
+        assert set(outcome) == {"refused"}, outcome
+        assert len(outcome) == 11
+    finally:
+        elsewhere.shutdown()
+        elsewhere.server_close()
+
+
+ASK = """fetch("{path}", {{
+  method: "POST", body: {body},
+  headers: {{ Authorization: "Bearer " + sessionStorage.getItem("token"), "X-Session": sessionStorage.getItem("session") }},
+}}).then(async (answer) => [answer.status, await answer.text()])"""
+
+
+def test_hostile_names_stay_words(tab: Tab) -> None:
+    name = "<img src=x onerror=window.hit=1>"
+    text = f"[deck]\\nname = '{name}'\\n['{name}']\\ncomponent = '{name}'\\n"
+    status, words = tab.evaluate(ASK.format(path="/api/open", body=f'"{text}"'))
+    assert status == 422
+    assert "onerror" in words
+    tab.evaluate(
+        f"""(() => {{
+          const files = new DataTransfer(), input = document.getElementById("open");
+          files.items.add(new File(["{text}"], "{name}.toml"));
+          input.files = files.files;
+          input.dispatchEvent(new Event("change"));
+        }})()"""
+    )
+    tab.until("document.getElementById('notice').textContent.includes('onerror')")
+    tab.evaluate(
+        f"""(() => {{
+          const files = new DataTransfer(), input = document.getElementById("records");
+          files.items.add(new File(["time [s]\\n0\\n"], "{name}.csv"));
+          input.files = files.files;
+          input.dispatchEvent(new Event("change"));
+        }})()"""
+    )
+    tab.until("document.getElementById('diagnosis-state').textContent.includes('onerror')")
+    assert tab.evaluate("[document.querySelectorAll('img').length, window.hit ?? null]") == [0, None]
+
+
+def test_uploads_that_are_too_large_are_refused_in_words_and_the_page_lives_on(tab: Tab) -> None:
+    status, words = tab.evaluate(ASK.format(path="/api/open", body='"x".repeat(1100000)'))
+    assert status == 413
+    assert "1 MiB" in words
+    status, words = tab.evaluate(ASK.format(path="/api/records?name=run.exe", body='"x"'))
+    assert status == 422
+    assert ".csv" in words
+    assert tab.evaluate(ANSWERED)
