@@ -56,7 +56,7 @@ def table(points: int) -> str:
     after = one("yardstick", YARDSTICK)["cost"]
     cost = 0.5 * (before + after)
     lines = [
-        f"{points} points of {1e3 * cost:.1f} ms each ({1e3 * before:.1f} before and {1e3 * after:.1f} after; "
+        f"{points} points of {1e3 * cost:.1f} ms each ({1e3 * before:.1f} before, {1e3 * after:.1f} after; "
         f"the changed deck is written and read back), {WORKERS} workers, {os.cpu_count()} cores, load at the "
         f"start {load:.1f}; `python -m benchmarks.sweeps --points {points}`.",
         "",
@@ -181,7 +181,7 @@ def memory_of_driver(points: int, out: Path) -> dict[str, Any]:
     wheel = nls.assembly("wheel", wheel=nls.Inertia(inertia=quantity(1e-3, "kg*m^2", source="assumed")))
     begin = time.perf_counter()
     nls.sweep(
-        wheel, axes=[nls.sweeps.Grid("wheel.inertia", 1e-3, 2e-3, points)],
+        wheel, axes=[nls.sweeps.GridAxis("wheel.inertia", 1e-3, 2e-3, points)],
         ask=nls.sweeps.FunctionQuestion(doubled, {"doubled": "kg*m^2"}), out=out,
     )  # fmt: skip
     wall, size = time.perf_counter() - begin, (out / "results.parquet").stat().st_size

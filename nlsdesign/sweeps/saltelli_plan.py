@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Plan(NamedTuple):
+class SweepPlan(NamedTuple):
     """The form of a Saltelli plan.
 
     Parameters
@@ -27,7 +27,7 @@ class Plan(NamedTuple):
     second_order: bool
 
 
-def saltelli_plan(points: NDArray[np.float64]) -> Plan | None:
+def saltelli_plan(points: NDArray[np.float64]) -> SweepPlan | None:
     """Return the form of the plan, none where the points are not one; a last block that is cut is left out.
 
     Parameters
@@ -41,7 +41,7 @@ def saltelli_plan(points: NDArray[np.float64]) -> Plan | None:
         blocks = count // rows
         # Two of four axes and one of ten may have blocks of the same length: the exchanges decide.
         if blocks >= 2 and _exchanged(points[: blocks * rows].reshape(blocks, rows, axes), second_order):
-            return Plan(blocks, rows, second_order)
+            return SweepPlan(blocks, rows, second_order)
     return None
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import missing_library
 from .axis_dependence import codes, dependent_axes
-from .saltelli_plan import Plan, saltelli_plan
+from .saltelli_plan import SweepPlan, saltelli_plan
 
 Floats = NDArray[np.float64]
 FEWEST_POINTS: Final = 200
@@ -103,7 +103,11 @@ def sensitivity(
 
 
 def _of_answer(
-    name: str, axes: Mapping[str, NDArray[Any]], values: Floats, done: NDArray[np.bool_], plan: Plan | None
+    name: str,
+    axes: Mapping[str, NDArray[Any]],
+    values: Floats,
+    done: NDArray[np.bool_],
+    plan: SweepPlan | None,
 ) -> AnswerSensitivity:
     values = np.asarray(values, dtype=float)
     good = done & np.isfinite(values)
@@ -182,7 +186,7 @@ def _by_grid(axes: Mapping[str, NDArray[Any]], values: Floats) -> list[Sensitivi
 
 
 def _by_plan(
-    name: str, axes: list[str], values: Floats, good: NDArray[np.bool_], plan: Plan
+    name: str, axes: list[str], values: Floats, good: NDArray[np.bool_], plan: SweepPlan
 ) -> AnswerSensitivity:
     """Return Sobol indices of the whole blocks of a Saltelli plan."""
     blocks = good[: plan.blocks * plan.rows].reshape(plan.blocks, plan.rows)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.sweeps.parts import Parts
+from nlsdesign.sweeps.sweep_parts import Parts
 from nlsdesign.sweeps.sweep_table import about_text, read_sweep
 from tests.command_line import Run, run
 from tests.sweep_tables import AREA, DECK, spread_table
