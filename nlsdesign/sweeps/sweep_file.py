@@ -117,7 +117,7 @@ def _axes_tables(deck: Deck) -> list[Any]:
     if not isinstance(given, list) or not given:
         raise DeckError(
             deck.place("axes"), "no axes are given",
-            next_step='write [[axes]] and below it GridAxis = {name = "...", lower = 1, upper = 2, count = 5}',
+            next_step='write [[axes]] and then GridAxis = {name = "...", lower = 1, upper = 2, count = 5}',
         )  # fmt: skip
     return given
 
