@@ -95,7 +95,5 @@ from .simulation import Trace as Trace
 from .simulation import measure as measure
 from .simulation import simulate as simulate
 from .simulation import sine as sine
-from .sweeps import read_sweep as read_sweep
-from .sweeps import sweep as sweep
 
 __version__: str

@@ -9,7 +9,7 @@ import numpy as np
 
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.deck import load_deck
-from nlsdesign.sweeps.columns import STATE_COLUMNS, Column
+from nlsdesign.sweeps.sweep_columns import STATE_COLUMNS, SweepColumn
 from nlsdesign.sweeps.sweep_table import SweepTable
 
 DECK = "austin2015_as_printed"
@@ -37,11 +37,11 @@ def table_of(
         values[name] = np.asarray(given, dtype=object if words else float)
         ends = (None, None) if words else (float(np.min(values[name], initial=1.0)), 2.0)
         columns.append(
-            Column(name, units.get(name, ""), "of the part", "axis", "list" if words else kind, *ends)
+            SweepColumn(name, units.get(name, ""), "of the part", "axis", "list" if words else kind, *ends)
         )
     for name, given in answers.items():
         values[name] = np.where(done, np.asarray(given, dtype=float), np.nan)
-        columns.append(Column(name, "N*m", "an answer", "answer"))
+        columns.append(SweepColumn(name, "N*m", "an answer", "answer"))
     values["status"] = np.where(done, "done", "failed").astype(object)
     values["reason"] = np.where(done, "", reason).astype(object)
     return SweepTable(

@@ -19,7 +19,7 @@ from nlsdesign.components.assembly.named_parts import Assembly
 from nlsdesign.deck import load_deck
 from nlsdesign.sweeps import (
     FunctionQuestion,
-    Grid,
+    GridAxis,
     SobolSample,
     SweepSettings,
     SweepTable,
@@ -58,7 +58,7 @@ def run(out: Path, count: int, executor: Executor, *, settings: SweepSettings | 
     """Sweep ``2 count`` points."""
     axes = [
         SobolSample({AREA: ("0.1 cm^2", "0.4 cm^2")}, count, seed=3),
-        Grid(INERTIA, "1e-6 kg*m^2", "2e-6 kg*m^2", 2),
+        GridAxis(INERTIA, "1e-6 kg*m^2", "2e-6 kg*m^2", 2),
     ]
     return sweep(
         actuator(), axes=axes, ask=question(), out=out, executor=executor,
@@ -75,7 +75,7 @@ def rows_in_parts(out: Path) -> list[int]:
     return points
 
 
-def wait_for_rows(out: Path, count: int, seconds: float = 60.0) -> int:
+def wait_for_rows(out: Path, count: int, seconds: float = 180.0) -> int:
     """Wait until that many points stand on disk; return how many do."""
     end = time.monotonic() + seconds
     while (standing := len(rows_in_parts(out))) < count:

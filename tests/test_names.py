@@ -54,7 +54,7 @@ DIALECT = frozenset(
 
 SAME_NAME = {
     # A command has the name of the room or module that it runs.
-    "cli": {"cosimulate", "design", "diagnose", "export", "materials"},
+    "cli": {"cosimulate", "design", "diagnose", "export", "materials", "sweep"},
     # An effect of the catalogue has the name of the part that it adds.
     "discrepancy/effects": {"friction"},
 }

@@ -13,7 +13,7 @@ from ..errors import NlsError
 from .access import PROTOCOL, Access, Application, gate
 from .session_process import content_of
 from .sessions import MOST, Session, Sessions
-from .uploads import DECK_BYTES, TooLargeError, Uploads, too_large
+from .uploads import DECK_BYTES, TooLargeError, too_large
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -97,7 +97,9 @@ class _Answers:
         kept = socket.query_params.get("session", "")
         session = self._sessions.get(kept) or await self._sessions.new()
         if session is None:
-            words = f"{MOST} designs are open, which is the most: close one of their tabs, then load this again."
+            words = (
+                f"{MOST} designs are open, which is the most: close one of their tabs, then load this again."
+            )
             await socket.send_json({"what": "refused", "reason": words})
             await socket.close(4429)
             return

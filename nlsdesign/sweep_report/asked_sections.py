@@ -9,7 +9,7 @@ import numpy as np
 
 from ..quantity import three_digits, typeset_unit, with_unit
 from ..report import KeyNumber, NumbersSection, Section, TableSection
-from ..sweeps import Column, SweepTable
+from ..sweeps import SweepColumn, SweepTable
 from ..sweeps.ranked_points import RankedPoints
 from .shown_points import shown_column, shown_unit
 
@@ -79,7 +79,7 @@ def _axes(table: SweepTable) -> Section:
     )
 
 
-def _range(table: SweepTable, axis: Column) -> tuple[str, str]:
+def _range(table: SweepTable, axis: SweepColumn) -> tuple[str, str]:
     """Return how many different values an axis has, and from where to where."""
     column = shown_column(table, axis)
     distinct = np.unique(column.values[~_missing(column.values)])
@@ -150,7 +150,7 @@ def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
-def unit_of(column: Column) -> str:
+def unit_of(column: SweepColumn) -> str:
     """Return the unit of a column as people read it, with a word before it, or nothing.
 
     Parameters

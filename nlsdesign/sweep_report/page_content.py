@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..sweeps import Column, SweepTable
+from ..sweeps import SweepColumn, SweepTable
 from ..sweeps.ranked_points import RankedPoints
 from ..sweeps.sensitivity import AnswerSensitivity
 from .shown_points import Shown
@@ -52,15 +52,15 @@ class PageContent(NamedTuple):
     sensitivities: dict[str, AnswerSensitivity]
     points_file: Path
 
-    def varies(self, column: Column) -> bool:
+    def varies(self, column: SweepColumn) -> bool:
         """Tell whether a column has two different values."""
         return self.distinct(column) > 1
 
-    def distinct(self, column: Column) -> int:
+    def distinct(self, column: SweepColumn) -> int:
         """Return how many different values a column has, those that are finite or words."""
         values = np.asarray(self.table.values[column.name])
         return len(np.unique(values[np.isfinite(values)] if values.dtype.kind == "f" else values.astype(str)))
 
-    def varying_axes(self) -> list[Column]:
+    def varying_axes(self) -> list[SweepColumn]:
         """Return the axes that have two different values."""
         return [axis for axis in self.table.axes if self.varies(axis)]

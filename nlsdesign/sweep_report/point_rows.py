@@ -9,14 +9,14 @@ import numpy as np
 
 from ..errors import visible
 from ..quantity import typeset_unit
-from ..sweeps import Column, SweepTable
+from ..sweeps import SweepColumn, SweepTable
 from ..sweeps.ranked_points import RankedPoints
 from .shown_points import Shown, shown_column
 
 _DIGITS, _LONGEST = 6, 300
 
 
-def row_columns(table: SweepTable) -> list[Column]:
+def row_columns(table: SweepTable) -> list[SweepColumn]:
     """Return the columns of a row: axes, then answers.
 
     Parameters
@@ -70,7 +70,7 @@ def point_rows(table: SweepTable, ranked: RankedPoints, shown: Shown) -> dict[in
     return rows
 
 
-def _texts(table: SweepTable, column: Column, shown: Shown) -> list[Any]:
+def _texts(table: SweepTable, column: SweepColumn, shown: Shown) -> list[Any]:
     """Return the values of one column as JSON holds them; nothing where an answer is missing."""
     values = shown_column(table, column, shown.rows).values
     if values.dtype.kind not in "fiub":

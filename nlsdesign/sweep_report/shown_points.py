@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..figures import PointKinds, ShownColumn
-from ..sweeps import Column, SweepTable
+from ..sweeps import SweepColumn, SweepTable
 from ..sweeps.ranked_points import RankedPoints
 
 MOST_OTHERS: Final = 1500
@@ -47,7 +47,7 @@ def shown_unit(unit: str) -> tuple[str, float]:
 
 
 def shown_column(
-    table: SweepTable, column: Column, rows: NDArray[np.intp] | slice = slice(None)
+    table: SweepTable, column: SweepColumn, rows: NDArray[np.intp] | slice = slice(None)
 ) -> ShownColumn:
     """Return a column as figures show it.
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..figures import ShownColumn, SurfacePanel, response_surfaces
 from ..quantity import three_digits, with_unit
 from ..report import FigureSection, Section
-from ..sweeps import Column
+from ..sweeps import SweepColumn
 from ..sweeps.answer_surface import AnswerSurface, answer_surface
 from .page_content import PageContent
 from .shown_points import shown_column
@@ -63,7 +63,9 @@ def surface_sections(content: PageContent) -> list[Section]:
     ]
 
 
-def _axes_for(content: PageContent, answer: str, numbers: list[Column]) -> tuple[Column, Column, str]:
+def _axes_for(
+    content: PageContent, answer: str, numbers: list[SweepColumn]
+) -> tuple[SweepColumn, SweepColumn, str]:
     """Return the two axes of numbers that cause most of an answer, and how they were chosen."""
     if len(numbers) == 2:
         return numbers[0], numbers[1], ""

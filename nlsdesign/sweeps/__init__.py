@@ -3,28 +3,27 @@
 The report of a sweep and the command import it. It decides no physics: questions ask the rooms below.
 """
 
-from .axes import AxisSet, BoundAxes, Grid, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axes import AxisSet, BoundAxes, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .axis_values import Subject
 from .design_question import DesignQuestion
 from .diagnosis_question import DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
-from .plan import Plan
 from .preferences import LargerIsBetter, NearIsBetter, NotAbove, NotBelow, SmallerIsBetter
-from .question import FunctionQuestion, SweepQuestion
 from .run_sweep import SweepSettings, SweepTask, sweep, sweep_task
 from .saltelli_sample import SaltelliSample
 from .sweep_file import read_sweep_file
-from .sweep_table import Column, SweepTable, read_sweep
+from .sweep_plan import PointPlan
+from .sweep_question import FunctionQuestion, SweepQuestion
+from .sweep_table import SweepColumn, SweepTable, read_sweep
 
 __all__ = [
     "AngleQuestion",
     "AxisSet",
     "BoundAxes",
-    "Column",
     "DesignQuestion",
     "DiagnosisQuestion",
     "FunctionQuestion",
-    "Grid",
+    "GridAxis",
     "LargerIsBetter",
     "LatinHypercube",
     "Listed",
@@ -32,13 +31,14 @@ __all__ = [
     "NearIsBetter",
     "NotAbove",
     "NotBelow",
-    "Plan",
+    "PointPlan",
     "RandomDraws",
     "SaltelliSample",
     "SmallerIsBetter",
     "SobolSample",
     "SpreadQuestion",
     "Subject",
+    "SweepColumn",
     "SweepQuestion",
     "SweepSettings",
     "SweepTable",

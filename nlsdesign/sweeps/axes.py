@@ -20,7 +20,7 @@ from ..errors import ValueRangeError, unknown_name
 from ..model import flatten
 from ..simulation.prior import LONGEST_ROW, declared_prior
 from .axis_values import Given, Subject
-from .columns import Column
+from .sweep_columns import SweepColumn
 
 _BLOCK: Final = 1024
 _MOST_SOBOL: Final = 2**30
@@ -40,7 +40,7 @@ class BoundAxes:
         The values of one row, by its number.
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[SweepColumn, ...]
     count: int
     row: Callable[[int], tuple[Any, ...]]
 
@@ -71,7 +71,7 @@ def _count(name: str, count: int, least: int = 1, most: float = math.inf) -> Non
 
 
 @dataclass(frozen=True)
-class Grid(AxisSet):
+class GridAxis(AxisSet):
     """One axis with even steps, or with steps of an even ratio.
 
     Parameters
@@ -261,7 +261,7 @@ class RandomDraws(AxisSet):
             column, _ = subject.column(name, (float(value),), "random")
             ends = sorted((float(value * np.exp(-3.0 * each)), float(value * np.exp(3.0 * each))))
             words = "drawn over its spread; range of three deviations"
-            columns.append(Column(column.name, column.unit, words, "axis", "random", *ends))
+            columns.append(SweepColumn(column.name, column.unit, words, "axis", "random", *ends))
         return BoundAxes(tuple(columns), self.count, row)
 
 
@@ -279,7 +279,7 @@ def _chosen(name: str, places: Mapping[str, tuple[int, bool]]) -> tuple[int, boo
     return places[name]
 
 
-def _ends(column: Column, ends: tuple[Any, ...]) -> tuple[float, float]:
+def _ends(column: SweepColumn, ends: tuple[Any, ...]) -> tuple[float, float]:
     if column.lower is None:
         raise ValueRangeError(f"axis '{column.name}'", "takes words, which have no range",
                               next_step="list them: Listed")  # fmt: skip
@@ -292,7 +292,7 @@ def _ends(column: Column, ends: tuple[Any, ...]) -> tuple[float, float]:
 
 def _box(
     subject: Subject, ranges: Mapping[str, tuple[Given, Given]], kind: str
-) -> tuple[tuple[Column, ...], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[tuple[SweepColumn, ...], NDArray[np.float64], NDArray[np.float64]]:
     if not ranges:
         raise ValueRangeError(
             "sample", "has no ranges", next_step='write ranges = {"NAME" = ["1 mm", "2 mm"]}'

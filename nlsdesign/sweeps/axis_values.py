@@ -16,7 +16,7 @@ from ..errors import UnitError, ValueRangeError, brief, unknown_name
 from ..quantity import BASE, Quantity, parse_unit, same_dimension
 from ..written_numbers import split_number
 from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
-from .columns import Column
+from .sweep_columns import SweepColumn
 
 Given = float | int | str | Quantity
 _KNOWN_UNITS: Final = (
@@ -89,9 +89,9 @@ class Subject:
         numbers = self.base.quantities()
         rows = [f"{name}[1]" for name, q in numbers.items() if isinstance(q.value, tuple)]
         single = [name for name, q in numbers.items() if not isinstance(q.value, tuple)]
-        return [DECK, *pieces_of_rubber(self.base), *single, *rows, *settings_of(self.question)]
+        return [DECK, *pieces_of_rubber(self.base), *single, *rows, *question_settings(self.question)]
 
-    def column(self, name: str, values: Sequence[Given], kind: str) -> tuple[Column, tuple[Any, ...]]:
+    def column(self, name: str, values: Sequence[Given], kind: str) -> tuple[SweepColumn, tuple[Any, ...]]:
         """Return the column of an axis, and its values: words, or numbers in SI.
 
         Parameters
@@ -118,12 +118,12 @@ class Subject:
             for each in given:
                 if words and each not in words:
                     raise unknown_name(f"axis {name}", each, words)
-            return Column(name, "", "words of the sweep", "axis", kind), given
+            return SweepColumn(name, "", "words of the sweep", "axis", kind), given
         unit = self._unit_of(name, values)
         numbers = tuple(_number(name, each, unit) for each in values)
         text = "" if unit == "1" else unit
         described = "asked of the point" if name.startswith(f"{ASK}.") else "number of the deck"
-        return Column(name, text, described, "axis", kind, min(numbers), max(numbers)), numbers
+        return SweepColumn(name, text, described, "axis", kind, min(numbers), max(numbers)), numbers
 
     def _words_for(self, name: str) -> list[str] | None:
         """Return the words that an axis may have; an empty list for any, ``None`` for an axis of numbers."""
@@ -131,12 +131,12 @@ class Subject:
             return list(self.assemblies)
         if name in pieces_of_rubber(self.base):
             return list(materials())
-        return [] if isinstance(settings_of(self.question).get(name), str) else None
+        return [] if isinstance(question_settings(self.question).get(name), str) else None
 
     def _unit_of(self, name: str, values: Sequence[Given]) -> str:
         """Return the unit in SI; that of the question's own fields is the one that is written."""
-        if name in settings_of(self.question):
-            present = settings_of(self.question)[name]
+        if name in question_settings(self.question):
+            present = question_settings(self.question)[name]
             units = [u for u in (_written_unit(name, v) for v in (*values, present)) if u]
             return si_unit(units[0]) if units else "1"
         row = row_of_factor(name)
@@ -195,7 +195,7 @@ def _number(name: str, given: Given, unit: str) -> float:
     return float(value)
 
 
-def settings_of(question: Any, prefix: str = ASK) -> dict[str, Any]:
+def question_settings(question: Any, prefix: str = ASK) -> dict[str, Any]:
     """Return what an axis can change in a question: single numbers and words, by name.
 
     Parameters
@@ -206,16 +206,16 @@ def settings_of(question: Any, prefix: str = ASK) -> dict[str, Any]:
     prefix
         Of the names.
     """
-    found: dict[str, Any] = {}
+    known: dict[str, Any] = {}
     for name, value in _inner(question).items():
         full = f"{prefix}.{name}"
         if isinstance(value, str | Quantity) or (
             isinstance(value, int | float) and not isinstance(value, bool)
         ):
-            found[full] = value
+            known[full] = value
         elif dataclasses.is_dataclass(value) or isinstance(value, tuple):
-            found |= settings_of(value, full)
-    return found
+            known |= question_settings(value, full)
+    return known
 
 
 def _inner(holder: Any) -> dict[str, Any]:

@@ -79,14 +79,14 @@ def changed_assembly(bases: Mapping[str, Assembly], values: Mapping[str, Any]) -
     return made.with_values(numbers) if numbers else made
 
 
-def _with_rubber(base: Assembly, piece: str, word: str) -> Assembly:
+def _with_rubber(base: Assembly, piece: str, rubber: str) -> Assembly:
     """Return the assembly with another rubber; kept, since the fit of its law takes long."""
-    key = (id(base), piece, word)
+    key = (id(base), piece, rubber)
     if key not in _kept:
         while len(_kept) >= _MOST_KEPT:
             _kept.pop(next(iter(_kept)))
         # The base is kept beside it, so that its number stands for nothing else.
-        _kept[key] = base, with_rubber(base, material(word), piece=piece)
+        _kept[key] = base, with_rubber(base, material(rubber), piece=piece)
     return _kept[key][1]
 
 

@@ -9,8 +9,8 @@ from ..components.assembly.named_parts import Assembly
 from ..design import DesignSettings, Goal, Limit, Target, design_cam
 from ..design.optimisation.solve import GOALS
 from .axis_values import si_unit
-from .columns import Column
-from .question import SweepQuestion, answer
+from .sweep_columns import SweepColumn
+from .sweep_question import SweepQuestion, answer
 
 QUICK = DesignSettings(starts=4, draws=0, look_for_size_ranges=False, look_for_remedies=False)
 """Four starts, no draws, no remedies: what a sweep of designs asks of each by default."""
@@ -59,7 +59,7 @@ class DesignQuestion(SweepQuestion):
     spring: str = ""
     settings: DesignSettings = QUICK
 
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return error, sizes, strain, force and energy, and each free single number."""
         known = assembly.quantities()
         chosen = [n for n in self.free or () if n in known and not isinstance(known[n].value, tuple)]

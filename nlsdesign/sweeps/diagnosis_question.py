@@ -14,8 +14,8 @@ from ..discrepancy.effects import catalogue
 from ..errors import MeasurementError
 from ..identification import load_records
 from ..model import flatten
-from .columns import Column
-from .question import SweepQuestion, answer
+from .sweep_columns import SweepColumn
+from .sweep_question import SweepQuestion, answer
 
 _VERDICTS = ("none", "named", "unknown", "undecidable", "data_suspect")
 
@@ -35,7 +35,7 @@ class DiagnosisQuestion(SweepQuestion):
     records: str
     effects: tuple[str, ...] = ()
 
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return which verdict it is, errors, and of each effect whether it is named and how probable."""
         del assembly
         verdicts = (answer(f"verdict.{name}", "", "1 where that is the verdict") for name in _VERDICTS)

@@ -18,8 +18,8 @@ from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from ..observer import CascadeGain, design_observer, observer_bench, observer_errors
-from .columns import Column
-from .question import SweepQuestion, answer, worst
+from .sweep_columns import SweepColumn
+from .sweep_question import SweepQuestion, answer, worst
 
 _HALF_POWER = math.sqrt(0.5)
 _FREQUENCIES = 200
@@ -52,7 +52,7 @@ class AngleQuestion(SweepQuestion):
     spring: str = ""
     measured: str = ""
 
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return two columns for each number of the analysis of the assembly that is swept."""
         return tuple(
             answer(f"{end}.{v.name}", v.unit, f"{end} over the angle: {v.description}")
@@ -96,7 +96,7 @@ class SpreadQuestion(SweepQuestion):
     sample_time: float = 1e-3
     adaptive: bool = False
 
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return errors in the unit of the torque."""
         model, torque, _ = _plant(assembly, "", "")
         unit = model.variable(torque).unit
@@ -156,7 +156,7 @@ class LoopQuestion(SweepQuestion):
     frequency: float = 2.0
     gains: TorqueGains | None = None
 
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return stability, margins, bandwidth and, where a sine is asked for, how it went."""
         del assembly
         run = (

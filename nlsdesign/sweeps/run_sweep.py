@@ -16,11 +16,11 @@ from ..progress import Progress, Quiet
 from ..work_sharing import Executor, PointOutcome, Processes, shared_map
 from .axes import AxisSet
 from .axis_values import Subject
-from .columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, Column
-from .parts import Parts, libraries
-from .plan import Plan
-from .question import PointWork, SweepQuestion
+from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn
 from .sweep_folder import about_sweep, only_run, opened, written_about
+from .sweep_parts import Parts, libraries
+from .sweep_plan import PointPlan
+from .sweep_question import PointWork, SweepQuestion
 from .sweep_table import SweepTable, read_sweep
 
 _FIRST_PART: Final = 2.0
@@ -67,9 +67,9 @@ class SweepTask:
     """
 
     assemblies: Mapping[str, Assembly]
-    plan: Plan
+    plan: PointPlan
     question: SweepQuestion
-    columns: tuple[Column, ...]
+    columns: tuple[SweepColumn, ...]
     about: Mapping[str, Any]
 
     @property
@@ -79,7 +79,7 @@ class SweepTask:
         return PointWork(self.assemblies, self.question, axes, _answers(self.columns))
 
 
-def _answers(columns: Sequence[Column]) -> tuple[str, ...]:
+def _answers(columns: Sequence[SweepColumn]) -> tuple[str, ...]:
     return tuple(column.name for column in columns if column.role == "answer")
 
 
@@ -103,7 +103,7 @@ def sweep_task(
     assemblies = {actuator.name: actuator} if isinstance(actuator, Assembly) else dict(actuator)
     if not assemblies:
         raise ArrangementError("sweep", "has no deck", next_step="give an assembly")
-    plan = Plan(axes, Subject(assemblies, ask))
+    plan = PointPlan(axes, Subject(assemblies, ask))
     base = next(iter(assemblies.values()))
     answers = ask.answers(base)
     taken = {c.name for c in (*plan.columns, *STATE_COLUMNS)}

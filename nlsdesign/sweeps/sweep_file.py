@@ -17,17 +17,18 @@ from ..errors import DeckError, NlsError, brief, unknown_name
 from ..quantity import parse_unit
 from ..reading import text_of
 from ..written_numbers import split_number
-from .axes import AxisSet, Grid, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .design_question import QUICK, DesignQuestion
 from .diagnosis_question import DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
-from .question import SweepQuestion
 from .run_sweep import SweepTask, sweep_task
 from .saltelli_sample import SaltelliSample
+from .sweep_question import SweepQuestion
 
 _TABLES: Final = ("decks", "axes", "ask")
 _AXES: Final = {
-    each.__name__: each for each in (Grid, Listed, SobolSample, LatinHypercube, RandomDraws, SaltelliSample)
+    each.__name__: each
+    for each in (GridAxis, Listed, SobolSample, LatinHypercube, RandomDraws, SaltelliSample)
 }
 _QUESTIONS: Final = {
     each.__name__: each
@@ -73,7 +74,7 @@ def read_sweep_file(path: Path | str) -> SweepTask:
         decks = "austin2015_figure_consistent"
 
         [[axes]]
-        Grid = {name = "spring.rubber.area", lower = "0.2 cm^2", upper = "0.8 cm^2", count = 7}
+        GridAxis = {name = "spring.rubber.area", lower = "0.2 cm^2", upper = "0.8 cm^2", count = 7}
 
         [[axes]]
         Listed = {values = {"spring.rubber" = ["PMC-770", "Dragon_Skin_30"]}}
@@ -116,7 +117,7 @@ def _axes_tables(deck: Deck) -> list[Any]:
     if not isinstance(given, list) or not given:
         raise DeckError(
             deck.place("axes"), "no axes are given",
-            next_step='write [[axes]] and below it Grid = {name = "...", lower = 1, upper = 2, count = 5}',
+            next_step='write [[axes]] and then GridAxis = {name = "...", lower = 1, upper = 2, count = 5}',
         )  # fmt: skip
     return given
 

@@ -20,9 +20,9 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ExportError, MeasurementError
 from ..work_sharing import CodeIdentity, code_identity
 from ..writing import make_folder, write_text
-from .columns import RESULTS_FILE, Column
-from .parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
-from .plan import Plan
+from .sweep_columns import RESULTS_FILE, SweepColumn
+from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
+from .sweep_plan import PointPlan
 from .sweep_table import ABOUT_FILE, DECK_FILE, DECKS_FOLDER, about_text, read_about
 
 CODE_FILE: Final = "code.json"
@@ -33,7 +33,7 @@ _SHOWN: Final = 4
 
 
 def about_sweep(
-    assemblies: Mapping[str, Assembly], plan: Plan, *, question: str, asked: str, seeds: list[int]
+    assemblies: Mapping[str, Assembly], plan: PointPlan, *, question: str, asked: str, seeds: list[int]
 ) -> dict[str, Any]:
     """Return what ``sweep.json`` says of a sweep; the same wherever it is computed.
 
@@ -117,7 +117,7 @@ def _lock(handle: int, folder: Path) -> None:
 
 
 def opened(
-    folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...], plan: Plan, *, again: bool
+    folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...], plan: PointPlan, *, again: bool
 ) -> Parts:
     """Return the parts of a sweep that goes on, or begins; points of other axes that fit are taken over.
 
@@ -158,7 +158,7 @@ def opened(
     return parts
 
 
-def _standing(folder: Path) -> tuple[dict[str, Any], tuple[Column, ...]]:
+def _standing(folder: Path) -> tuple[dict[str, Any], tuple[SweepColumn, ...]]:
     try:
         return read_about(folder)
     except MeasurementError as error:
@@ -168,7 +168,10 @@ def _standing(folder: Path) -> tuple[dict[str, Any], tuple[Column, ...]]:
 
 
 def written_about(
-    folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...], assemblies: Mapping[str, Assembly]
+    folder: Path,
+    about: Mapping[str, Any],
+    columns: tuple[SweepColumn, ...],
+    assemblies: Mapping[str, Assembly],
 ) -> None:
     """Write what is asked, the decks and the digests of the code.
 
@@ -189,7 +192,7 @@ def written_about(
     write_text(folder / ABOUT_FILE, about_text(about, columns))
 
 
-def _names(columns: tuple[Column, ...]) -> list[str]:
+def _names(columns: tuple[SweepColumn, ...]) -> list[str]:
     return [column.name for column in columns if column.role != "state"]
 
 
@@ -239,7 +242,7 @@ def _emptied(folder: Path) -> None:
         shutil.rmtree(folder / name, ignore_errors=True)
 
 
-def _adopted(folder: Path, axes: list[str], plan: Plan) -> Iterator[Any]:
+def _adopted(folder: Path, axes: list[str], plan: PointPlan) -> Iterator[Any]:
     """Yield the parts of other axes with the numbers that their points have now; -1 for those that left."""
     import pyarrow
     from pyarrow import parquet
@@ -259,7 +262,7 @@ def _mark(values: tuple[Any, ...]) -> int:
     return int.from_bytes(hashlib.blake2b(repr(values).encode(), digest_size=8).digest(), "big")
 
 
-def _place(values: tuple[Any, ...], plan: Plan, ranked: Any, order: Any) -> int:
+def _place(values: tuple[Any, ...], plan: PointPlan, ranked: Any, order: Any) -> int:
     """Return the number of a point by its values; the mark only says where to look."""
     mark = np.uint64(_mark(values))
     place = int(np.searchsorted(ranked, mark))
@@ -270,7 +273,7 @@ def _place(values: tuple[Any, ...], plan: Plan, ranked: Any, order: Any) -> int:
     return -1
 
 
-def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...]) -> int:
+def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> int:
     """Return how many points of a sweep stand in a folder; nothing is written.
 
     Parameters

@@ -17,10 +17,10 @@ from ..deck import read_deck
 from ..errors import DeckError, MeasurementError, unknown_name
 from ..reading import is_there, text_of
 from .changes import changed_assembly
-from .columns import DONE, RESULTS_FILE, STATE_COLUMNS, Column
-from .parts import libraries, rows_in_order
+from .sweep_columns import DONE, RESULTS_FILE, STATE_COLUMNS, SweepColumn
+from .sweep_parts import libraries, rows_in_order
 
-__all__ = ["STATE_COLUMNS", "Column", "SweepTable", "about_text", "read_about", "read_sweep"]
+__all__ = ["STATE_COLUMNS", "SweepColumn", "SweepTable", "about_text", "read_about", "read_sweep"]
 
 FORMAT: Final = "nlsdesign sweep 1"
 ABOUT_FILE: Final = "sweep.json"
@@ -45,7 +45,7 @@ class SweepTable:
         Text of the decks behind the points by name; the first is the one that was swept.
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[SweepColumn, ...]
     values: Mapping[str, NDArray[Any]]
     about: Mapping[str, Any] = field(default_factory=dict)
     decks: Mapping[str, str] = field(default_factory=dict)
@@ -54,12 +54,12 @@ class SweepTable:
         return len(self.values["point"])
 
     @property
-    def axes(self) -> tuple[Column, ...]:
+    def axes(self) -> tuple[SweepColumn, ...]:
         """Columns that were chosen."""
         return tuple(column for column in self.columns if column.role == "axis")
 
     @property
-    def answers(self) -> tuple[Column, ...]:
+    def answers(self) -> tuple[SweepColumn, ...]:
         """Columns that were answered."""
         return tuple(column for column in self.columns if column.role == "answer")
 
@@ -69,7 +69,7 @@ class SweepTable:
         result: NDArray[np.bool_] = self.values["status"] == DONE
         return result
 
-    def column(self, name: str) -> Column:
+    def column(self, name: str) -> SweepColumn:
         """Return one column.
 
         Parameters
@@ -132,7 +132,7 @@ class SweepTable:
         return {name: declare(read_deck(text, Path(f"{name}.toml"))) for name, text in self.decks.items()}
 
 
-def about_text(about: Mapping[str, Any], columns: tuple[Column, ...]) -> str:
+def about_text(about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> str:
     """Return what stands in ``sweep.json``.
 
     Parameters
@@ -146,7 +146,7 @@ def about_text(about: Mapping[str, Any], columns: tuple[Column, ...]) -> str:
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
-def read_about(folder: Path) -> tuple[dict[str, Any], tuple[Column, ...]]:
+def read_about(folder: Path) -> tuple[dict[str, Any], tuple[SweepColumn, ...]]:
     """Return what ``sweep.json`` says, and the columns.
 
     Parameters
@@ -165,7 +165,7 @@ def read_about(folder: Path) -> tuple[dict[str, Any], tuple[Column, ...]]:
                                next_step="name the folder that 'nlsdesign sweep' wrote")  # fmt: skip
     try:
         content = json.loads(text_of(path, MeasurementError))
-        columns = tuple(Column(**each) for each in content["columns"])
+        columns = tuple(SweepColumn(**each) for each in content["columns"])
     except (ValueError, KeyError, TypeError, RecursionError):
         content, columns = {}, ()
     if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -195,7 +195,7 @@ def read_sweep(folder: Path | str) -> SweepTable:
     return SweepTable(columns, values, about, _decks(place, about))
 
 
-def _columns_of(path: Path, columns: tuple[Column, ...]) -> dict[str, NDArray[Any]]:
+def _columns_of(path: Path, columns: tuple[SweepColumn, ...]) -> dict[str, NDArray[Any]]:
     pyarrow, parquet = libraries()
     try:
         table = parquet.read_table(path, memory_map=True)

@@ -5,12 +5,12 @@ room that may import ``distributed``, ``dask`` and ``mpi4py``.
 """
 
 from .chunks import PointOutcome
-from .crew import Executor
 from .dask_scheduler import DaskScheduler
 from .identity import CodeIdentity, code_identity
 from .in_this_process import InThisProcess
 from .mpi_ranks import MpiRanks
 from .shared_map import ChunkSizes, shared_map
+from .team import Executor
 from .worker_processes import Processes
 
 __all__ = [

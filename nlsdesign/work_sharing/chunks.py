@@ -61,7 +61,7 @@ class PointOutcome:
 
 
 @dataclass(frozen=True)
-class Loss:
+class ChunkLoss:
     """A chunk that came to no end.
 
     Parameters
@@ -77,7 +77,7 @@ class Loss:
 
 
 @dataclass(frozen=True)
-class Refusal:
+class WorkerRefusal:
     """A worker whose code is another one.
 
     Parameters
@@ -167,7 +167,7 @@ def _unpickled(payload: bytes) -> Callable[[Any], Any]:
     return work
 
 
-def computed_elsewhere(payload: bytes, chunk: Chunk, expected: CodeIdentity) -> bytes | Refusal:
+def computed_elsewhere(payload: bytes, chunk: Chunk, expected: CodeIdentity) -> bytes | WorkerRefusal:
     """Return the outcomes of a chunk from a process that may run other code.
 
     Parameters
@@ -181,6 +181,6 @@ def computed_elsewhere(payload: bytes, chunk: Chunk, expected: CodeIdentity) -> 
     """
     own = own_identity()
     if own != expected:
-        return Refusal(here(), own)
+        return WorkerRefusal(here(), own)
     with _one_at_a_time, alone():
         return pickled(computed(_unpickled(payload), chunk))

@@ -22,10 +22,10 @@ from typing import Any, Final
 
 from ..errors import ValueRangeError, WorkSharingError, missing_library
 from ..reading import is_there
-from .chunks import Chunk, Loss, Refusal, computed_elsewhere, reason_of
-from .crew import Crew, Finished
+from .chunks import Chunk, ChunkLoss, WorkerRefusal, computed_elsewhere, reason_of
 from .identity import CodeIdentity, own_identity
 from .refusals import refused, sendable
+from .team import Finished, Team
 
 _CHUNKS_PER_WORKER: Final = 2
 _AGAIN: Final = 0.5
@@ -71,7 +71,7 @@ class DaskScheduler:
         return self.address or str(self.file)
 
     @contextmanager
-    def crew(self, work: Callable[[Any], Any]) -> Iterator[Crew]:
+    def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
         """Yield the workers of the scheduler; their processes go on after the block, without our work.
 
         Parameters
@@ -87,11 +87,11 @@ class DaskScheduler:
             If the scheduler does not answer, or a worker runs other code.
         """
         payload = sendable(work)
-        crew = _Crew(self, payload)
+        team = _Team(self, payload)
         try:
-            yield crew
+            yield team
         finally:
-            crew.end()
+            team.end()
 
     def connected(self, seconds: float) -> Any:
         """Return a client of ``distributed``.
@@ -130,7 +130,7 @@ class DaskScheduler:
             ) from None  # fmt: skip
 
 
-class _Crew:
+class _Team:
     def __init__(self, scheduler: DaskScheduler, payload: bytes) -> None:
         self._scheduler, self._payload = scheduler, payload
         self._expected = own_identity()
@@ -155,7 +155,7 @@ class _Crew:
                     next_step=f"install {self._expected} at the workers and start them again",
                 )  # fmt: skip
             elif identity != self._expected:
-                wrong = refused(Refusal(worker, identity))
+                wrong = refused(WorkerRefusal(worker, identity))
             if wrong is not None:
                 client.close()
                 raise wrong
@@ -192,7 +192,7 @@ class _Crew:
         for future in ended:
             if future.key in self._flying:
                 outcome = _outcome(future)
-                if isinstance(outcome, Loss) and not self._alive():
+                if isinstance(outcome, ChunkLoss) and not self._alive():
                     return finished + self._connected_again()
                 finished.append((self._flying.pop(future.key)[1], outcome))
         self._look_for_workers(bool(finished))
@@ -241,7 +241,7 @@ class _Crew:
             time.sleep(_AGAIN)
         lost = [chunk for _, chunk in self._flying.values()]
         self._flying, self._ended = {}, queue.SimpleQueue()
-        return [(chunk, Loss("its scheduler was lost", deaths=0)) for chunk in lost]
+        return [(chunk, ChunkLoss("its scheduler was lost", deaths=0)) for chunk in lost]
 
     def _close(self) -> None:
         with contextlib.suppress(Exception):  # a client without a scheduler complains while it closes
@@ -254,7 +254,7 @@ class _Crew:
         self._close()
 
 
-def _outcome(future: Any) -> list[Any] | Loss:
+def _outcome(future: Any) -> list[Any] | ChunkLoss:
     """Return the outcomes of a chunk, or what became of it."""
     from distributed import KilledWorker
 
@@ -263,15 +263,15 @@ def _outcome(future: Any) -> list[Any] | Loss:
     except KilledWorker as error:
         # The scheduler has tried it on several workers by itself.
         deaths = 1 + int(getattr(error, "allowed_failures", 3))
-        return Loss("each died over it, says the scheduler", deaths=deaths)
+        return ChunkLoss("each died over it, says the scheduler", deaths=deaths)
     except Exception as error:
         if future.status == "error":
             raise WorkSharingError(
                 "workers", f"cannot do the work: {reason_of(error)}",
                 next_step="make sure that they can import whatever the question uses",
             ) from None  # fmt: skip
-        return Loss(reason_of(error), deaths=0)
-    if isinstance(answer, Refusal):
+        return ChunkLoss(reason_of(error), deaths=0)
+    if isinstance(answer, WorkerRefusal):
         raise refused(answer)
     outcomes: list[Any] = pickle.loads(answer)
     return outcomes

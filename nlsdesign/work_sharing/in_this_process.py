@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .chunks import Chunk, computed
-from .crew import Crew, Finished
+from .team import Finished, Team
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class InThisProcess:
     """No worker but this process; what a point breaks here ends the whole work."""
 
     @contextmanager
-    def crew(self, work: Callable[[Any], Any]) -> Iterator[Crew]:
+    def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
         """Yield this process as the one worker.
 
         Parameters

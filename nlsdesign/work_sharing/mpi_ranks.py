@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import WorkSharingError, missing_library
-from .chunks import Chunk, Loss, Refusal, computed_elsewhere, reason_of
-from .crew import Crew, Finished
+from .chunks import Chunk, ChunkLoss, WorkerRefusal, computed_elsewhere, reason_of
 from .identity import own_identity
 from .refusals import refused, sendable
+from .team import Finished, Team
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class MpiRanks:
     """
 
     @contextmanager
-    def crew(self, work: Callable[[Any], Any]) -> Iterator[Crew]:
+    def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
         """Yield the other ranks.
 
         Parameters
@@ -50,10 +50,10 @@ class MpiRanks:
                     "MPI", "has no rank beside the one that drives",
                     next_step="start it with: mpiexec -n 3 python -m mpi4py.futures -m nlsdesign sweep ...",
                 )  # fmt: skip
-            yield FuturesCrew(pool, work, ranks)
+            yield FuturesTeam(pool, work, ranks)
 
 
-class FuturesCrew:
+class FuturesTeam:
     """Workers behind an executor of ``concurrent.futures``.
 
     Parameters
@@ -69,7 +69,7 @@ class FuturesCrew:
     def __init__(self, pool: concurrent.futures.Executor, work: Callable[[Any], Any], count: int) -> None:
         self._pool, self._count = pool, count
         self._payload = sendable(work)
-        self._flying: dict[concurrent.futures.Future[bytes | Refusal], Chunk] = {}
+        self._flying: dict[concurrent.futures.Future[bytes | WorkerRefusal], Chunk] = {}
 
     def free(self) -> int:
         """Return how many more chunks can be given now: one waits at each worker."""
@@ -109,14 +109,14 @@ class FuturesCrew:
         return [(self._flying.pop(each), _outcome(each)) for each in ended]
 
 
-def _outcome(future: concurrent.futures.Future[bytes | Refusal]) -> list[Any] | Loss:
+def _outcome(future: concurrent.futures.Future[bytes | WorkerRefusal]) -> list[Any] | ChunkLoss:
     try:
         answer = future.result()
     except concurrent.futures.BrokenExecutor as error:
         raise WorkSharingError(
             "workers", f"are gone: {reason_of(error)}", next_step="run the same command again: it resumes"
         ) from None
-    if isinstance(answer, Refusal):
+    if isinstance(answer, WorkerRefusal):
         raise refused(answer)
     outcomes: list[Any] = pickle.loads(answer)
     return outcomes

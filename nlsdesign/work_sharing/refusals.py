@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import WorkSharingError
-from .chunks import Refusal, reason_of
+from .chunks import WorkerRefusal, reason_of
 from .identity import code_identity
 
 
-def refused(refusal: Refusal) -> WorkSharingError:
+def refused(refusal: WorkerRefusal) -> WorkSharingError:
     """Return the error for a worker whose code is another one; it names both.
 
     Parameters

@@ -1,4 +1,4 @@
-"""One function asked of many points by a crew of workers; outcomes as they come, and no point lost.
+"""One function asked of many points by a team of workers; outcomes as they come, and no point lost.
 
 Points are taken from their source only when a worker is free, in chunks that take about the same time
 whatever a point costs. A chunk that is lost with its worker is tried again point by point; a point that ends
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Final
 
-from .chunks import Chunk, Loss, PointOutcome
-from .crew import Crew, Executor
+from .chunks import Chunk, ChunkLoss, PointOutcome
+from .team import Executor, Team
 
 _MOST_DEATHS: Final = 2
 _TICK: Final = 0.5
@@ -35,7 +35,7 @@ class ChunkSizes:
         Most points of a chunk.
     """
 
-    seconds: float = 0.5
+    seconds: float = 1.0
     largest: int = _LARGEST
 
 
@@ -69,19 +69,19 @@ def shared_map(
     WorkSharingError
         If workers run other code, or their scheduler is not there or does not come back.
     """
-    with executor.crew(work) as crew:
+    with executor.team(work) as team:
         queue = _Queue(iter(points), sizes or ChunkSizes(), count)
         flying = 0
         while True:
-            while crew.free() > 0 and (chunk := queue.next(crew)) is not None:
-                crew.submit(chunk)
+            while team.free() > 0 and (chunk := queue.next(team)) is not None:
+                team.submit(chunk)
                 flying += 1
             if not flying:
                 return
             outcomes: list[PointOutcome] = []
-            for chunk, outcome in crew.finished(_TICK):
+            for chunk, outcome in team.finished(_TICK):
                 flying -= 1
-                if isinstance(outcome, Loss):
+                if isinstance(outcome, ChunkLoss):
                     outcomes += queue.tried_again(chunk, outcome)
                 else:
                     queue.learn(outcome)
@@ -99,12 +99,12 @@ class _Queue:
         self._cost: float | None = None
         self._size = 1
 
-    def next(self, crew: Crew) -> Chunk | None:
+    def next(self, team: Team) -> Chunk | None:
         if self._again:
             return self._again.popleft()
         size = self._size
         if self._left is not None:  # the last ones are shared evenly
-            size = max(1, min(size, -(-self._left // (2 * max(1, crew.workers())))))
+            size = max(1, min(size, -(-self._left // (2 * max(1, team.workers())))))
         taken = tuple(islice(self._points, size))
         if self._left is not None:
             self._left -= len(taken)
@@ -117,7 +117,7 @@ class _Queue:
         fitting = self._sizes.seconds / max(self._cost, 1e-7)
         self._size = max(1, min(int(fitting), self._size * _GROWTH, self._sizes.largest))
 
-    def tried_again(self, chunk: Chunk, loss: Loss) -> list[PointOutcome]:
+    def tried_again(self, chunk: Chunk, loss: ChunkLoss) -> list[PointOutcome]:
         """Put the points of a lost chunk back, each on its own; return those that are given up."""
         if len(chunk.points) > 1 or not loss.deaths:
             # Nobody knows which of several points it was, and a lost connection is no point's fault.

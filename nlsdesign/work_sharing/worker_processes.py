@@ -19,8 +19,8 @@ from typing import Any
 
 from ..errors import ValueRangeError
 from ..processes import alone, ready_as_helper, signals_held
-from .chunks import Chunk, Loss, computed, pickled
-from .crew import Crew, Finished
+from .chunks import Chunk, ChunkLoss, computed, pickled
+from .team import Finished, Team
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Processes:
             raise ValueRangeError(f"{self.count} workers", "are none", next_step="give 1 or more")
 
     @contextmanager
-    def crew(self, work: Callable[[Any], Any]) -> Iterator[Crew]:
+    def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
         """Yield the processes; they end with the block, and with this process however it ends.
 
         Parameters
@@ -53,11 +53,11 @@ class Processes:
         work
             Asked of each point; it is forked where the system can, so it need not be picklable there.
         """
-        crew = _Crew(work, self.count or usable_cores())
+        team = _Team(work, self.count or usable_cores())
         try:
-            yield crew
+            yield team
         finally:
-            crew.end()
+            team.end()
 
 
 def usable_cores() -> int:
@@ -80,7 +80,7 @@ class _Worker:
             theirs.close()
         self.chunk: Chunk | None = None
 
-    def outcome(self) -> list[Any] | Loss:
+    def outcome(self) -> list[Any] | ChunkLoss:
         """Return what the worker sent, or how it ended."""
         try:
             if self.connection.poll():
@@ -89,7 +89,7 @@ class _Worker:
         except (EOFError, OSError, pickle.UnpicklingError):
             pass
         self.process.join(5.0)
-        return Loss(_ending(self.process.exitcode))
+        return ChunkLoss(_ending(self.process.exitcode))
 
     def end(self) -> None:
         """End the process, whatever it does."""
@@ -116,7 +116,7 @@ def _serve(connection: Connection, work: Callable[[Any], Any], inherited: list[C
             connection.send_bytes(pickled(computed(work, connection.recv())))
 
 
-class _Crew:
+class _Team:
     def __init__(self, work: Callable[[Any], Any], count: int) -> None:
         self._work, self._count = work, count
         self._idle: list[_Worker] = []
@@ -151,7 +151,7 @@ class _Crew:
             outcome, chunk = worker.outcome(), worker.chunk
             assert chunk is not None
             self._busy.remove(worker)
-            if isinstance(outcome, Loss):
+            if isinstance(outcome, ChunkLoss):
                 worker.end()
             else:
                 self._idle.append(worker)

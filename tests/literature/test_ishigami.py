@@ -13,7 +13,7 @@ pytest.importorskip("SALib")
 
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
-from nlsdesign.sweeps import FunctionQuestion, Plan, SaltelliSample, Subject
+from nlsdesign.sweeps import FunctionQuestion, PointPlan, SaltelliSample, Subject
 from nlsdesign.sweeps.sensitivity import AnswerSensitivity, sensitivity
 
 PARTS = (0.5 * (1.0 + 0.1 * np.pi**4 / 5.0) ** 2, 7.0**2 / 8.0, 8.0 * 0.1**2 * np.pi**8 / 225.0)
@@ -35,7 +35,7 @@ def planned(count: int, *, second_order: bool = False) -> np.ndarray:
     names = ("motor.inertia", "motor.torque_constant", "spring.rubber.area")
     sample = SaltelliSample(dict.fromkeys(names, (1.0, 2.0)), count, second_order=second_order, seed=3)
     question = FunctionQuestion(len, {"y": "1"})  # type: ignore[arg-type]
-    plan = Plan([sample], Subject({"deck": declare(load_deck("austin2015_as_printed"))}, question))
+    plan = PointPlan([sample], Subject({"deck": declare(load_deck("austin2015_as_printed"))}, question))
     assert {column.kind for column in plan.columns} == {"saltelli"}
     return (2.0 * np.array([row for _, row in plan.points()]) - 3.0) * np.pi
 

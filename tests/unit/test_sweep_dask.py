@@ -93,14 +93,14 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(cluster: str) -> Non
 def test_workers_of_another_version_are_refused(cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
     ours = CodeIdentity("9.9.9", "a" * 64)
     real = DaskScheduler(cluster)
-    with real.crew(square) as crew:
-        monkeypatch.setattr(crew, "_expected", ours)
-        crew.submit(Chunk(((1, 1),)))
+    with real.team(square) as team:
+        monkeypatch.setattr(team, "_expected", ours)
+        team.submit(Chunk(((1, 1),)))
         with pytest.raises(WorkSharingError, match=r"runs nlsdesign .* and this program nlsdesign"):
-            next(each for _ in range(60) for each in crew.finished(1.0))
+            next(each for _ in range(60) for each in team.finished(1.0))
         # At the beginning all that are there are asked; later ones answer with their first chunk.
         with pytest.raises(WorkSharingError, match=r"worker tcp://.*: their answers must not be mixed"):
-            crew._checked(5.0)  # type: ignore[attr-defined]
+            team._checked(5.0)  # type: ignore[attr-defined]
 
 
 def test_a_scheduler_that_is_not_there_is_named_within_seconds(tmp_path: Path) -> None:

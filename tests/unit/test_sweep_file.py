@@ -21,7 +21,7 @@ from tests.command_line import Run, run
 __all__ = ["run"]
 AXES = """
 [[axes]]
-Grid = {name = "motor.inertia", lower = "1e-6 kg*m^2", upper = "2 mg*m^2", count = 3}
+GridAxis = {name = "motor.inertia", lower = "1e-6 kg*m^2", upper = "2 mg*m^2", count = 3}
 
 [[axes]]
 Listed = {values = {"ask.last" = ["30 deg", "40 deg"]}}
@@ -85,9 +85,9 @@ search.seed = 7
         (ANGLE.replace("decks", "deck"), "deck"),
         (ANGLE.replace("austin2015_figure_consistent", "austin2015_figure"), "austin2015_figure_consistent"),
         (ANGLE.replace("[[axes]]", "[[axis]]"), "sweep.toml:3:1: axis.*did you mean 'axes'"),
-        (ANGLE.replace("Grid", "Gird"), "axes, number 1.*did you mean 'Grid'"),
+        (ANGLE.replace("GridAxis", "GridAxes"), "axes, number 1.*did you mean 'GridAxis'"),
         (ANGLE.replace("count = 3}", "cuont = 3}"), "field 'cuont'.*did you mean 'count'"),
-        (ANGLE.replace(", count = 3}", "}"), "Grid lacks count"),
+        (ANGLE.replace(", count = 3}", "}"), "GridAxis lacks count"),
         (ANGLE.replace("motor.inertia", "motor.inertja"), "did you mean 'motor.inertia'"),
         (ANGLE.replace("ask.last", "ask.lats"), "did you mean 'ask.last'"),
         (ANGLE.replace("AngleQuestion", "AngelQuestion"), "did you mean 'AngleQuestion'"),

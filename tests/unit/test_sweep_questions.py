@@ -23,7 +23,7 @@ from nlsdesign.sweeps import (
     DesignQuestion,
     LatinHypercube,
     LoopQuestion,
-    Plan,
+    PointPlan,
     RandomDraws,
     SobolSample,
     SpreadQuestion,
@@ -80,7 +80,7 @@ def test_errors_over_the_spread_grow_with_the_spread() -> None:
 
 
 def test_draws_follow_the_spread_of_the_deck() -> None:
-    plan = Plan([RandomDraws(2000, seed=4)], Subject({"deck": actuator()}, question()))
+    plan = PointPlan([RandomDraws(2000, seed=4)], Subject({"deck": actuator()}, question()))
     names = [c.name for c in plan.columns]
     assert "factor(spring.cam.lever_arm)" in names, "the table of a shape has one factor"
     assert not any(name.startswith("spring.cam.lever_arm[") for name in names)
@@ -90,8 +90,8 @@ def test_draws_follow_the_spread_of_the_deck() -> None:
         place = prior.place(name)
         normal = np.log(drawn[:, names.index(name)] / prior.values[place]) / prior.deviations[place]
         assert kstest(normal, "norm").pvalue > 1e-3
-    few = Plan([RandomDraws(3, seed=4, names=(AREA,))], Subject({"deck": actuator()}, question()))
-    again = Plan([RandomDraws(9, seed=4, names=(AREA,))], Subject({"deck": actuator()}, question()))
+    few = PointPlan([RandomDraws(3, seed=4, names=(AREA,))], Subject({"deck": actuator()}, question()))
+    again = PointPlan([RandomDraws(9, seed=4, names=(AREA,))], Subject({"deck": actuator()}, question()))
     assert [few.point(k) for k in range(3)] == [again.point(k) for k in range(3)]
 
 
@@ -99,7 +99,7 @@ def test_samples_fill_their_box_evenly() -> None:
     ranges = {AREA: ("0.1 cm^2", "0.4 cm^2"), INERTIA: (1e-6, 2e-6)}
     subject = Subject({"deck": actuator()}, question())
     for axes in (SobolSample(ranges, 2048, seed=1), LatinHypercube(ranges, 2048, seed=1)):
-        plan = Plan([axes], subject)
+        plan = PointPlan([axes], subject)
         points = np.array([plan.point(k) for k in range(2048)])
         unit = (points - [1e-5, 1e-6]) / [3e-5, 1e-6]
         assert unit.min() >= 0.0

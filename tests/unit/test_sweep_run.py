@@ -19,7 +19,7 @@ from nlsdesign.errors import ExportError, UnitError, UnknownNameError, ValueRang
 from nlsdesign.progress import Quiet
 from nlsdesign.sweeps import (
     FunctionQuestion,
-    Grid,
+    GridAxis,
     LatinHypercube,
     Listed,
     RandomDraws,
@@ -208,15 +208,15 @@ def test_a_folder_that_cannot_be_written_or_is_full(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize(
     ("axes", "kind", "words"),
     [
-        ([Grid("spring.rubber.aria", 1, 2, 3)], UnknownNameError, "did you mean 'spring.rubber.area'"),
-        ([Grid(AREA, "1 mm", "2 mm", 3)], UnitError, "give it in a unit like 'm\\^2'"),
-        ([Grid(AREA, 2e-5, 1e-5, 3)], ValueRangeError, "the smaller end first"),
-        ([Grid(AREA, 0.0, 1e-5, 3, "ratio")], ValueRangeError, "steps have no ratio"),
-        ([Grid("spring.rubber", 1, 2, 3)], UnknownNameError, "axis spring.rubber '1'"),
+        ([GridAxis("spring.rubber.aria", 1, 2, 3)], UnknownNameError, "did you mean 'spring.rubber.area'"),
+        ([GridAxis(AREA, "1 mm", "2 mm", 3)], UnitError, "give it in a unit like 'm\\^2'"),
+        ([GridAxis(AREA, 2e-5, 1e-5, 3)], ValueRangeError, "the smaller end first"),
+        ([GridAxis(AREA, 0.0, 1e-5, 3, "ratio")], ValueRangeError, "steps have no ratio"),
+        ([GridAxis("spring.rubber", 1, 2, 3)], UnknownNameError, "axis spring.rubber '1'"),
         ([Listed({"spring.rubber": ["PMC-77"]})], UnknownNameError, "did you mean 'PMC-770'"),
         ([Listed({AREA: [1e-5, 2e-5, 1e-5]})], ValueRangeError, "twice: rows 1 and 3"),
         ([Listed({AREA: [1e-5], INERTIA: [1e-6, 2e-6]})], ValueRangeError, "rows of different length"),
-        ([Listed({AREA: [1e-5]}), Grid(AREA, 1e-5, 2e-5, 2)], ValueRangeError, "points collide"),
+        ([Listed({AREA: [1e-5]}), GridAxis(AREA, 1e-5, 2e-5, 2)], ValueRangeError, "points collide"),
         (
             [Listed({"factor(spring.cam.lever_arm)": [1.0]}), Listed({"spring.cam.lever_arm[2]": [1e-3]})],
             ValueRangeError, "change the same number",

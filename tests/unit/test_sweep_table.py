@@ -10,17 +10,17 @@ import pytest
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import MeasurementError, UnknownNameError
-from nlsdesign.sweeps.columns import STATE_COLUMNS
-from nlsdesign.sweeps.parts import Parts
-from nlsdesign.sweeps.sweep_table import Column, about_text, read_sweep
+from nlsdesign.sweeps.sweep_columns import STATE_COLUMNS
+from nlsdesign.sweeps.sweep_parts import Parts
+from nlsdesign.sweeps.sweep_table import SweepColumn, about_text, read_sweep
 
 DECK = "austin2015_as_printed"
 AREA, RUBBER = "spring.rubber.area", "spring.rubber"
 COLUMNS = (
     STATE_COLUMNS[0],
-    Column("motor.inertia", "kg*m^2", "of the rotor", "axis", "grid", 1e-6, 2e-6),
-    Column(RUBBER, "", "material", "axis", "list"),
-    Column("answer", "N*m", "some torque", "answer"),
+    SweepColumn("motor.inertia", "kg*m^2", "of the rotor", "axis", "grid", 1e-6, 2e-6),
+    SweepColumn(RUBBER, "", "material", "axis", "list"),
+    SweepColumn("answer", "N*m", "some torque", "answer"),
     *STATE_COLUMNS[1:],
 )
 

@@ -28,8 +28,8 @@ from nlsdesign.work_sharing import (
     code_identity,
     shared_map,
 )
-from nlsdesign.work_sharing.chunks import Chunk, Refusal, computed_elsewhere
-from nlsdesign.work_sharing.mpi_ranks import FuturesCrew
+from nlsdesign.work_sharing.chunks import Chunk, WorkerRefusal, computed_elsewhere
+from nlsdesign.work_sharing.mpi_ranks import FuturesTeam
 from nlsdesign.work_sharing.refusals import refused, sendable
 
 
@@ -135,10 +135,10 @@ def test_a_map_within_a_worker_forks_no_further_processes() -> None:
 
 def test_an_executor_of_the_standard_library_is_a_crew() -> None:
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        crew = FuturesCrew(pool, square, 2)
-        assert (crew.workers(), crew.free()) == (2, 4)
-        crew.submit(Chunk(((5, 5), (7, 7))))
-        ((chunk, outcome),) = crew.finished(10.0)
+        team = FuturesTeam(pool, square, 2)
+        assert (team.workers(), team.free()) == (2, 4)
+        team.submit(Chunk(((5, 5), (7, 7))))
+        ((chunk, outcome),) = team.finished(10.0)
     assert isinstance(outcome, list)
     assert [each.value for each in outcome] == [25, None]
     assert chunk.points == ((5, 5), (7, 7))
@@ -147,9 +147,9 @@ def test_an_executor_of_the_standard_library_is_a_crew() -> None:
 def test_other_code_is_refused_and_both_are_named() -> None:
     other = CodeIdentity("9.9.9", "f" * 64)
     answer = computed_elsewhere(pickle.dumps(square), Chunk(((1, 1),)), other)
-    assert isinstance(answer, Refusal)
+    assert isinstance(answer, WorkerRefusal)
     assert answer.identity == code_identity()
-    words = str(refused(Refusal("tcp://a:1", other)))
+    words = str(refused(WorkerRefusal("tcp://a:1", other)))
     assert "tcp://a:1" in words
     assert "nlsdesign 9.9.9 (code ffffffffffff)" in words
     assert str(code_identity()) in words

@@ -1,4 +1,4 @@
-"""What every executor offers: a crew of workers that takes chunks and gives back outcomes or losses."""
+"""What every executor offers: a team of workers that takes chunks and gives back outcomes or losses."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
-from .chunks import Chunk, Loss, PointOutcome
+from .chunks import Chunk, ChunkLoss, PointOutcome
 
-Finished = tuple[Chunk, list[PointOutcome] | Loss]
+Finished = tuple[Chunk, list[PointOutcome] | ChunkLoss]
 
 
-class Crew(Protocol):
+class Team(Protocol):
     """Workers that stand ready for one function."""
 
     def free(self) -> int:
@@ -46,7 +46,7 @@ class Crew(Protocol):
 class Executor(Protocol):
     """Where work is done; chosen by the caller."""
 
-    def crew(self, work: Callable[[Any], Any]) -> AbstractContextManager[Crew]:
+    def team(self, work: Callable[[Any], Any]) -> AbstractContextManager[Team]:
         """Return workers for one function; they end with the block.
 
         Parameters

@@ -14,12 +14,12 @@ from ..errors import ValueRangeError
 from .axes import AxisSet
 from .axis_values import Subject
 from .changes import row_of_factor
-from .columns import Column
+from .sweep_columns import SweepColumn
 
 _PROBES = 64
 
 
-class Plan:
+class PointPlan:
     """Points by number; the last set of axes changes first.
 
     Parameters
@@ -39,9 +39,11 @@ class Plan:
 
     def __init__(self, axes: Sequence[AxisSet], subject: Subject) -> None:
         if not axes:
-            raise ValueRangeError("sweep", "has no axes", next_step="give one, such as Grid or SobolSample")
+            raise ValueRangeError(
+                "sweep", "has no axes", next_step="give one, such as GridAxis or SobolSample"
+            )
         self._sets = [each.bound(subject) for each in axes]
-        self.columns: tuple[Column, ...] = tuple(c for each in self._sets for c in each.columns)
+        self.columns: tuple[SweepColumn, ...] = tuple(c for each in self._sets for c in each.columns)
         _require_apart(self.columns)
 
     def __len__(self) -> int:
@@ -77,7 +79,7 @@ class Plan:
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
-def _require_apart(columns: Sequence[Column]) -> None:
+def _require_apart(columns: Sequence[SweepColumn]) -> None:
     """Refuse axes that change the same number."""
     for name, times in Counter(column.name for column in columns).items():
         if times > 1:

@@ -19,14 +19,14 @@ from ..errors import ValueRangeError, WorkSharingError, brief
 from ..quantity import Quantity
 from .axis_values import with_settings
 from .changes import ASK, changed_assembly
-from .columns import Column
+from .sweep_columns import SweepColumn
 
 
 class SweepQuestion(ABC):
     """A pure function from an assembly to numbers by name; a frozen dataclass, so that axes can change it."""
 
     @abstractmethod
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return the columns of the answers, in SI.
 
         Parameters
@@ -70,7 +70,7 @@ class FunctionQuestion(SweepQuestion):
     function: Callable[[Assembly], Mapping[str, float]]
     units: Mapping[str, str]
 
-    def answers(self, assembly: Assembly) -> tuple[Column, ...]:
+    def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return one column for each unit."""
         name = getattr(self.function, "__name__", type(self.function).__name__)
         return tuple(answer(key, unit, f"of {name}") for key, unit in self.units.items())
@@ -84,7 +84,7 @@ class FunctionQuestion(SweepQuestion):
         return f"{type(self).__qualname__}({source_of(self.function)}, {sorted(self.units.items())})"
 
 
-def answer(name: str, unit: str, description: str) -> Column:
+def answer(name: str, unit: str, description: str) -> SweepColumn:
     """Return the column of an answer.
 
     Parameters
@@ -92,7 +92,7 @@ def answer(name: str, unit: str, description: str) -> Column:
     name, unit, description
         As for a column; the unit in SI.
     """
-    return Column(name, "" if unit == "1" else unit, description, "answer")
+    return SweepColumn(name, "" if unit == "1" else unit, description, "answer")
 
 
 @dataclass(frozen=True)

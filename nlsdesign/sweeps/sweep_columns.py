@@ -12,7 +12,7 @@ Role = Literal["axis", "answer", "state"]
 
 
 @dataclass(frozen=True)
-class Column:
+class SweepColumn:
     """One column of a sweep.
 
     Parameters
@@ -42,7 +42,7 @@ class Column:
 
 
 STATE_COLUMNS: Final = (
-    Column("point", "", "number of the point, from 0", "state"),
-    Column("status", "", "done or failed", "state"),
-    Column("reason", "", "why the point failed", "state"),
+    SweepColumn("point", "", "number of the point, from 0", "state"),
+    SweepColumn("status", "", "done or failed", "state"),
+    SweepColumn("reason", "", "why the point failed", "state"),
 )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import ExportError, MeasurementError, missing_library
 from ..writing import draft
-from .columns import DONE, RESULTS_FILE, Column
+from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
 
 PARTS_FOLDER: Final = "parts"
 TIMINGS_FILE: Final = "timings.parquet"
@@ -45,13 +45,13 @@ def libraries() -> tuple[Any, Any]:
     return pyarrow, parquet
 
 
-def _kind(pyarrow: Any, column: Column, words: bool) -> Any:
+def _kind(pyarrow: Any, column: SweepColumn, words: bool) -> Any:
     if column.name == "point":
         return pyarrow.int64()
     return pyarrow.string() if words else pyarrow.float64()
 
 
-def holds_words(column: Column) -> bool:
+def holds_words(column: SweepColumn) -> bool:
     """Tell whether a column holds words: states do, and axes without a range.
 
     Parameters
@@ -64,7 +64,7 @@ def holds_words(column: Column) -> bool:
     return column.role == "axis" and column.lower is None
 
 
-def schema(columns: Sequence[Column], *, timed: bool = False) -> Any:
+def schema(columns: Sequence[SweepColumn], *, timed: bool = False) -> Any:
     """Return the schema of the table, or of its parts.
 
     Parameters
@@ -107,7 +107,7 @@ class Parts:
         Of its table.
     """
 
-    def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[SweepColumn]) -> None:
         self._folder, self._columns = folder, tuple(columns)
         self._schema = schema(columns, timed=True)
         self._next = 1 + max((_number(path) for path in part_files(folder)), default=0)
@@ -224,7 +224,7 @@ def _number(path: Path) -> int:
 class _Order:
     """Where the row of each point stands in the parts: the last one that is done, or else the last."""
 
-    def __init__(self, folder: Path, columns: Sequence[Column]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[SweepColumn]) -> None:
         self._files = part_files(folder)
         self._schema = schema(columns, timed=True)
         self._open: dict[int, Any] = {}
@@ -272,7 +272,7 @@ class _Order:
         return self._open[number]
 
 
-def rows_in_order(folder: Path, columns: Sequence[Column]) -> dict[str, NDArray[Any]]:
+def rows_in_order(folder: Path, columns: Sequence[SweepColumn]) -> dict[str, NDArray[Any]]:
     """Return the columns of a sweep that is not finished, sorted by point.
 
     Parameters
