@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LONGEST_MESSAGE = 1 << 16
 """Most bytes of one message of a page."""
+_READ_AWAY = 1 << 30
+"""Most bytes that are read only to be dropped."""
 
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -160,6 +162,7 @@ class _Answers:
         try:
             answer: Response = await work(request, session)
         except TooLargeError as error:
+            await _read_away(request)
             return PlainTextResponse(str(error), 413, {"connection": "close"})
         except NlsError as error:
             return PlainTextResponse(str(error), 422)
@@ -198,6 +201,18 @@ class _Answers:
         )
         headers = {"content-disposition": f'attachment; filename="{name}"'}
         return Response(content, media_type="application/octet-stream", headers=headers)
+
+
+async def _read_away(request: Request) -> None:
+    """Read the rest of what is not taken: a browser that is cut off in its sentence hears no answer."""
+    from starlette.requests import ClientDisconnect
+
+    size = 0
+    with contextlib.suppress(ClientDisconnect):
+        async for part in request.stream():
+            size += len(part)
+            if size > _READ_AWAY:
+                return
 
 
 def _length(request: Request) -> int | None:

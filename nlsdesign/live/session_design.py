@@ -20,6 +20,7 @@ from .gallery import gallery, gallery_question, question_of_deck
 from .inbox import Inbox
 from .limit_kinds import LIMIT_KINDS
 from .live_design import LiveDesign
+from .page_data import angle_data, answer_data, design_data, mechanism_data
 from .question import LiveQuestion
 from .saved import reopened
 from .session_work import Outbox
@@ -31,6 +32,8 @@ FIRST = "cam-actuator"
 """With which a page begins that names no actuator."""
 _TICK = 0.1
 """Seconds between two looks at work that runs."""
+_NEWS = 0.5
+"""Seconds after which work is looked at although messages keep coming."""
 _REST = 0.4
 """Seconds without an edit after which the whole design is begun: while a hand moves it would be in its way."""
 
@@ -54,7 +57,7 @@ class SessionDesign:
         self._angle: float | None = None
         self._trouble = ""
         self._settle_at: float | None = None
-        self._look_at: float | None = None
+        self._look_due = False
         self._file_for: int | None = None
         try:
             self._live = LiveDesign(_question(deck))
@@ -78,15 +81,19 @@ class SessionDesign:
         """
         if not inbox.waiting:
             _choices()
+        told = time.monotonic()
         while True:
-            idle = self._settle_at is None and self._look_at is None and not self._news.running
+            idle = self._settle_at is None and not self._look_due and not self._news.running
             message = inbox.take(None if idle else _TICK)
             if message is not None:
-                self._answer(message, more=inbox.waiting)
+                self._answer(message)
             else:
                 self._on_a_pause()
+            if time.monotonic() - told >= _NEWS:
+                told = time.monotonic()
+                self._tell_news()
 
-    def _answer(self, message: Mapping[str, Any], *, more: bool) -> None:
+    def _answer(self, message: Mapping[str, Any]) -> None:
         if "server" in message:
             self._serve(message["server"])
             return
@@ -97,8 +104,6 @@ class SessionDesign:
             self._refuse(asked, str(error))
         except Exception as error:  # a fault of ours must not take the design with it
             self._refuse(asked, f"a fault of the program: {type(error).__name__}: {error}")
-        if not more:
-            self._on_a_pause()
 
     def _refuse(self, asked: Mapping[str, Any], reason: str) -> None:
         self._outbox.page({"what": "refused", "number": _number(asked), "reason": reason})
@@ -143,9 +148,9 @@ class SessionDesign:
 
     def _turn(self, asked: Mapping[str, Any]) -> None:
         self._angle = _finite("angle", asked.get("angle"))
-        said = {"angle": self._angle, "mechanism": self._mechanism()}
+        said = mechanism_data(self._live.shown, self._angle)
         self._outbox.page({"what": "at", "number": _number(asked), "at": said})
-        self._look_at = time.monotonic()
+        self._look_due = True
 
     def _keep(self, asked: Mapping[str, Any]) -> None:
         name = str(asked.get("name", ""))
@@ -174,20 +179,16 @@ class SessionDesign:
             given = asked.get("angle")
             wanted = self._angle if given is None else _finite("angle", given)
             self._angle = min(0.6 * last if wanted is None else wanted, last)
-            at = {"angle": self._angle, "mechanism": self._mechanism()}
-            self._look_at = time.monotonic()
-        said = to_json(answer)
+            at = mechanism_data(self._live.shown, self._angle)
+            self._look_due = True
+        said = answer_data(answer)
         self._outbox.page({"what": "answer", "number": _number(asked), "answer": said, "at": at})
-
-    def _mechanism(self) -> Any:
-        shown = self._live.shown
-        return None if shown is None or self._angle is None else to_json(shown.mechanism(self._angle))
 
     def _say_kept(self, asked: Mapping[str, Any]) -> None:
         kept = [
             {
                 "name": name, "title": each.question.title, "material": each.question.machine.material,
-                "design": to_json(each.answer.design),
+                "design": design_data(each.answer.design),
             }
             for name, each in self._live.snapshots.items()
         ]  # fmt: skip
@@ -200,17 +201,21 @@ class SessionDesign:
     def _on_a_pause(self) -> None:
         """Do what may wait while a hand moves: what holds at the angle, the whole design, news of work."""
         now = time.monotonic()
-        if self._look_at is not None and now - self._look_at >= 0.5 * _TICK:
-            self._look_at = None
+        if self._look_due:
+            self._look_due = False
             self._look()
         if self._settle_at is not None and now >= self._settle_at:
             self._settle_at = None
             self._live.start(SettleDesign())
+        self._tell_news()
+
+    def _tell_news(self) -> None:
+        """Say what has changed of work, also while a hand moves."""
         before = self._live.answer
         for each in self._news.changed():
             self._outbox.page({"what": "work", "work": each})
             if each["name"] == TorqueLoop.__name__:
-                self._look_at = now
+                self._look_due = True
         self._send_file()
         if self._live.answer is not before:
             self._say(self._live.answer, {})
@@ -219,7 +224,7 @@ class SessionDesign:
         if self._live.shown is None or self._angle is None:
             return
         try:
-            self._outbox.page({"what": "at", "number": None, "at": to_json(self._live.at(self._angle))})
+            self._outbox.page({"what": "at", "number": None, "at": angle_data(self._live.at(self._angle))})
         except NlsError as error:
             self._refuse({}, str(error))
 

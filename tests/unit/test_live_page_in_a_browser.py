@@ -129,8 +129,8 @@ def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
     coarse = settled(tab, value, fine)
     numbers = [float(str(each).split()[0]) * (1e-3 if " mN" in str(each) else 1.0) for each in (before, fine, coarse)]
     assert numbers[2] - numbers[1] == pytest.approx(10.0 * (numbers[1] - numbers[0]), rel=0.1)
-    words = tab.until("document.getElementById('said').textContent.includes('rms') && document.getElementById('said').textContent")
-    assert str(coarse).split()[0] in words
+    said = "document.getElementById('said').textContent"
+    tab.until(f"{said}.includes('rms error') && {said}.startsWith({str(coarse).split()[0]!r})")
     count = tab.evaluate("document.querySelectorAll('.handle').length")
     tab.press("Insert")
     tab.until(f"document.querySelectorAll('.handle').length === {count + 1}")

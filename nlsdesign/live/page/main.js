@@ -311,6 +311,7 @@ function cursor() {
 // The mechanism comes at once; what takes longer to compute comes when the hand rests.
 function showAngle(at) {
   if (at.mechanism) picture.show(at.mechanism);
+  if (at.mechanism !== undefined) picture.explain(at.reason);
   if (at.poles) atAngle.show(at);
 }
 
