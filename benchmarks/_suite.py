@@ -116,6 +116,21 @@ SUITE = (
         modules=("ziglang",),
     ),
     Benchmark(
+        "batches", "1,000 draws of the published loop in one batch",
+        "one call of ours per draw; `solve_ivp` from sample to sample",
+        (
+            Promise("time of one call per draw over the batch", r"batch compiled ratio (\d+)", least=20),
+            Promise("time of one call per draw over the batch without a compiler", r"NumPy ratio ([\d.]+)"),
+            Promise(
+                "time of one compiled call per draw over the batch",
+                r"compiled call per draw: .* ([\d.]+) times",
+            ),
+            Promise("time of `solve_ivp` over the batch", r"sample: .* against the batch (\d+) times"),
+            Promise("open simulations one by one over the batch", r"one by one .*, ([\d.]+) times"),
+        ),
+        modules=("ziglang",),
+    ),
+    Benchmark(
         "observers", "Co-design of observers and errors over the spread",
         "SLSQP on eigenvalues; `solve_ivp` sample by sample",
         (

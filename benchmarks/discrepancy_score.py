@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import signal
 import sys
@@ -29,12 +28,13 @@ from typing import Any
 from benchmarks._score_cases import TIERS, Case, cases, sample
 from benchmarks._score_run import run
 from benchmarks._score_table import Result, table
+from nlsdesign.work_sharing import ChunkSizes, DaskScheduler, PointOutcome, Processes, shared_map
 
 
 def main() -> None:
     """Run the cases that have no result yet, and write the table."""
     given = _arguments()
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))  # and the pool ends with it
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))  # and the workers end with it
     results = _read(given.out)
     done = {r["case"] for r in results}
     todo = [case for case in _wanted(given) if case.name not in done]
@@ -70,11 +70,15 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="results, one JSON a line")
     parser.add_argument("--table", type=Path, help="Markdown file for the table; its head is kept")
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--scheduler", help="address of a Dask scheduler, in place of processes")
     parser.add_argument(
         "--limit", type=int, default=0, help="seconds of the processor after which a case is given up"
     )
     parser.add_argument("--no-yardsticks", action="store_true")
-    return parser.parse_args()
+    given = parser.parse_args()
+    if given.scheduler and given.limit:
+        parser.error("--limit needs a process of its own, not a Dask scheduler")
+    return given
 
 
 def seeds_of(text: str) -> list[int]:
@@ -109,15 +113,26 @@ def _read(file: Path) -> list[Result]:
 
 def _results(todo: list[Case], given: argparse.Namespace) -> Iterator[dict[str, Any]]:
     work = partial(run, limit=given.limit, yardsticks=not given.no_yardsticks)
-    if given.processes < 1:
+    if given.processes < 1 and given.scheduler is None:
         yield from map(work, todo)
         return
-    # One case is one core: numerical libraries of the workers start no threads, and
+    # One case is one core: numerical libraries of the workers start no threads, and workers of the engine
+    # start no processes of their own. A case whose worker dies is tried again on its own.
     for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(threads, "1")
-    # workers of a pool are daemons, in which the package starts no processes of its own.
-    with multiprocessing.get_context("spawn").Pool(given.processes, maxtasksperchild=25) as pool:
-        yield from pool.imap_unordered(work, todo)
+    executor = Processes(given.processes) if given.scheduler is None else DaskScheduler(given.scheduler)
+    for batch in shared_map(work, enumerate(todo), executor, sizes=ChunkSizes(largest=1)):
+        for each in batch:
+            yield _lost(todo[each.number], each) if each.reason else each.value
+
+
+def _lost(case: Case, outcome: PointOutcome) -> dict[str, Any]:
+    """Return the line of a case that no worker could bring to an end."""
+    return {
+        "case": case.name, "tier": case.tier, "machine": case.machine, "hidden": list(case.effects),
+        "strength": case.strength, "seed": case.seed, "noise": case.noise,
+        "seconds": outcome.seconds, "cpu_seconds": outcome.seconds, "error": outcome.reason, "trace": "",
+    }  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from . import observer as observer
 from . import progress as progress
 from . import report as report
 from . import simulation as simulation
+from . import sweeps as sweeps
 from .analysis import EstimateDeviation as EstimateDeviation
 from .analysis import Observability as Observability
 from .analysis import Stability as Stability
@@ -93,5 +94,7 @@ from .simulation import Trace as Trace
 from .simulation import measure as measure
 from .simulation import simulate as simulate
 from .simulation import sine as sine
+from .sweeps import read_sweep as read_sweep
+from .sweeps import sweep as sweep
 
 __version__: str

@@ -194,6 +194,10 @@ class ConvergenceError(NlsError):
     """A solver stopped without a solution; no number is returned."""
 
 
+class WorkSharingError(NlsError):
+    """Workers, or the scheduler that gives them work, cannot be used."""
+
+
 class ExportError(NlsError):
     """A file could not be written, or generated code not compiled or loaded."""
 

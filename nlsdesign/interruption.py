@@ -59,7 +59,10 @@ def guarded(run: Callable[[], None]) -> None:
             guard.end()
         raise
     finally:
-        guard.leave()
+        try:
+            guard.leave()
+        except KeyboardInterrupt:
+            guard.end()
 
 
 class _Guard:
@@ -117,6 +120,10 @@ class _Guard:
         """Remove what is temporary; from here on interrupts change nothing."""
         if os.getpid() == self._process:
             self._leaving = True
+            for number in (signal.SIGINT, signal.SIGTERM):
+                # At its very end Python gives handlers back to the system, which would end it by the signal;
+                # what is ignored stays ignored.
+                signal.signal(number, signal.SIG_IGN)
             self._sweep()
 
     def _sweep(self) -> None:

@@ -18,13 +18,15 @@ _MOST_PROCESSES = 4
 _DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 _work: Callable[[int], Any] | None = None
+_alone = False
 
 
 def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     """Yield ``work(0)`` to ``work(count - 1)``, in order.
 
     Processes are forked, so that they see all data of the work without copying; only results are pickled.
-    Without fork, on one core, or inside such a process, the work is done in this process.
+    Without fork, on one core, or inside such a process or a worker of a sweep, the work is done in this
+    process.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     cores = min(
         _MOST_PROCESSES, count, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     )
-    if cores < 2 or multiprocessing.current_process().daemon:
+    if cores < 2 or _alone or multiprocessing.current_process().daemon:
         yield from map(work, range(count))
         return
     _work = work
@@ -45,13 +47,27 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     # for it for ever. A request to end that comes there is lost where this process handles such requests, for
     # after a fork Python forgets what it has not handled. So neither is delivered until helpers are ready.
     with signals_held():
-        pool = multiprocessing.get_context("fork").Pool(cores, initializer=_made_ready)
+        pool = multiprocessing.get_context("fork").Pool(cores, initializer=ready_as_helper)
     try:
         yield from pool.imap(_call, range(count))
     finally:
         with signals_held():
             pool.terminate()
             pool.join()
+
+
+@contextlib.contextmanager
+def alone() -> Iterator[None]:
+    """Do the work of :func:`parallel_map` in this process until the end of the block.
+
+    A worker of many computes whole points, and its neighbours have the other cores.
+    """
+    global _alone
+    before, _alone = _alone, True
+    try:
+        yield
+    finally:
+        _alone = before
 
 
 def run_to_end(
@@ -98,7 +114,7 @@ def signals_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _made_ready() -> None:
+def ready_as_helper() -> None:
     """Let the parent handle interruptions, and end at once when it asks for it or ends itself."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -121,13 +121,13 @@ def _effect(row: Effect | Ranked) -> str:
     if isinstance(row, Ranked):
         written = markup.sections(row.function)[""]
         return head + f"<p><code>{row.__name__}</code></p>\n\n" + markup.prose(written)
-    rows = [
-        [markup.inline(form.signature), markup.inline(form.source), escape(form.brings)] for form in row.forms
-    ]
-    columns = ("what it leaves in records", "source", "phenomenon that it adds")
+    rows = [[markup.inline(form.signature), markup.inline(form.source)] for form in row.forms]
+    columns = ("what it leaves in records", "source")
+    brings = "; ".join(dict.fromkeys(escape(form.brings) for form in row.forms if form.brings))
+    adds = f'<p class="facts">Phenomenon that it adds: {brings}</p>\n\n' if brings else ""
     every = " ".join(form.source for form in row.forms)
     return (
         head + f"<p><code>{row.identifier}</code></p>\n\n" + markup.prose(inspect.cleandoc(row.description))
-        + markup.table(columns, rows, caption=f"Forms of {escape(title(row.identifier))}")
+        + adds + markup.table(columns, rows, caption=f"Forms of {escape(title(row.identifier))}")
         + bibliography.sources(every, up="../")
     )  # fmt: skip

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ExportError
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
 from .range_remarks import range_remarks, warn
@@ -200,9 +199,10 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
     import numpy as np
 
     from .. import control as ctl
+    from ..export import quickest
     from ..model.roles import motor_of
 
-    translate = compiled()
+    translate = quickest()
     reach = ctl.largest_torque(fixed.plant)
     side = ctl.only_side(fixed.plant)
     shares = (0.1, 0.3) if side else (0.2, 0.6)
@@ -240,21 +240,6 @@ def _evaluated(fixed: ClosedLoop, moved: ClosedLoop, asked: _Asked) -> _Evaluati
         margins, ctl.output_impedance(moved, angles[::5]), coupled, zero,
         ctl.torque_resolution(fixed, angles),
     )  # fmt: skip
-
-
-def compiled() -> Any:
-    """Return what compiles the loop; without a compiler it is interpreted, about eight times slower."""
-    import casadi as ca
-
-    from ..export import natively
-    from ..simulation.buffered import as_it_is
-
-    x = ca.SX.sym("x")
-    try:
-        natively(ca.Function("probe", [x], [2 * x]))
-    except ExportError:
-        return as_it_is  # no compiler on this machine: the same numbers, slower
-    return natively
 
 
 def _written(result: _Evaluation, out: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from ..errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..quantity import Quantity, same_dimension, typeset_unit
 from ..writing import write_text
 from .output import examples, json_option, show_json
+from .readiness import shown_command
 from .units import parse_number, split_number
 
 if TYPE_CHECKING:
@@ -52,8 +53,10 @@ def new(
     On a terminal the numbers that matter are asked for, with unit and usual value; elsewhere, and with --yes,
     those of the template are taken unless --set gives another. A name without .toml gets it.
     """
+    from ..components.assembly.deck_remarks import deck_remarks
     from ..components.assembly.deck_template import load_template, motor_inertia, plain_name, template_names
     from ..components.assembly.deck_writer import declare
+    from ..deck import read_deck
 
     file = Path(path) if path.endswith(".toml") else Path(f"{path}.toml")
     refuse_to_replace(file, force)
@@ -69,14 +72,18 @@ def new(
     if asking:
         material = material or _asked_material(chosen)
         numbers |= _asked(chosen, at, numbers)
-    write_text(file, chosen.filled(plain_name(file.stem), numbers=numbers, material=material))
+    name = plain_name(file.stem)
+    text = chosen.filled(name, numbers=numbers, material=material)
+    remarks = deck_remarks(declare(read_deck(text, file)))
+    write_text(file, text)
     if others["as_json"]:
-        ready = list(chosen.ready_for)
-        show_json({"file": file, "numbers": len(chosen.deck.numbers()), "ready_for": ready})
+        ready, count = list(chosen.ready_for), len(chosen.deck.numbers())
+        show_json({"file": file, "numbers": count, "ready_for": ready, "warnings": remarks})
         return
-    click.echo(
-        f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {', '.join(chosen.ready_for)}"
-    )
+    for remark in remarks:
+        click.echo(f"warning: {remark}")
+    commands = ", ".join(map(shown_command, chosen.ready_for))
+    click.echo(f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {commands}")
     click.echo(f"next: nlsdesign deck check {file}")
 
 

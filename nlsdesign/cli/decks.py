@@ -14,7 +14,7 @@ from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
 from ..writing import write_text
 from .deck_new import force_option, new, refuse_to_replace
-from .output import examples, json_option, show_json, show_table
+from .output import examples, json_option, line_width, show_json, show_table
 from .overwriting import out_file_option
 
 if TYPE_CHECKING:
@@ -115,9 +115,7 @@ def check(deck_name: str, as_json: bool) -> None:
 
 
 def _show_readiness(commands: list[Readiness]) -> None:
-    ready = [
-        each.command + (f" (with {each.needs})" if each.needs else "") for each in commands if each.ready
-    ]
+    ready = [each.shown for each in commands if each.ready]
     click.echo(f"ready for: {', '.join(ready) or 'no command'}")
     reasons: dict[str, list[str]] = {}
     for each in commands:
@@ -150,6 +148,7 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
             raise click.UsageError("--toml and --json exclude each other; give one")
         click.echo(load_deck(deck_name).path.read_text(encoding="utf-8-sig"), nl=False)
         return
+    from ..components.assembly.circuit_text import draw
     from ..components.assembly.deck_writer import declare
 
     assembly = declare(load_deck(deck_name))
@@ -162,7 +161,8 @@ def show(deck_name: str, as_toml: bool, as_json: bool) -> None:
             }
         )
         return
-    click.echo(str(assembly) + "\n")
+    title = f"{assembly.name}: {assembly.description}".rstrip(": ")
+    click.echo(draw(title, assembly.parts, width=line_width()) + "\n")
     rows = [
         (n, _short(q), f"± {100 * q.spread:.0f} %" if q.spread else "", q.source) for n, q in numbers.items()
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,19 @@ _FILES = (
     *("model.toml", "design.json", "picture.svg", "torque.svg", "margins.svg", "tolerance.svg"),
     *("cam.csv", "cam_centre_line.csv", "cam.svg", "cam.dxf", "drawing.svg", "drawing.pdf"),
 )
+_TASK_FILES = ("task_curve.svg", "task_motor.svg")
+
+
+def _writes(given: Mapping[str, Any]) -> list[str]:
+    """Return the names of the files of the design that is asked for, and of what an earlier one has left."""
+    if given["deck_name"] is None:
+        raise click.MissingParameter(param_type="option", param_hint="'--deck'")
+    from ..design import Target
+
+    job = _job(**given)
+    never = set() if job.settings.draws else {"tolerance.svg"}
+    names = [name for name in _FILES if name not in never or (given["out"] / name).exists()]
+    return names if isinstance(job.target, Target) else [*names, *_TASK_FILES]
 
 
 @click.command(
@@ -74,10 +87,10 @@ _FILES = (
 @click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
 @click.option("--draws", type=int, default=None, help="Draws of the tolerance, else 1000; 0: none.")
 @spring_option
-@out_option("out/design", writes=(*_FILES, "task_curve.svg", "task_motor.svg"))
+@out_option("out/design", writes=_writes)
 @json_option
 @click.pass_context
-def design(context: click.Context, /, deck_name: str | None, out: Path, as_json: bool, **given: Any) -> None:
+def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, **given: Any) -> None:
     """Design cam and rubber for a torque curve; exit status 1 if the design misses its target.
 
     Limits of the declared cable and rubber hold unless one of the same kind is given.
@@ -85,8 +98,6 @@ def design(context: click.Context, /, deck_name: str | None, out: Path, as_json:
     if given.pop("listed") is not None:
         show_kinds(context.params["listed"], as_json)
         return
-    if deck_name is None:
-        raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck
     from ..design import design_cam

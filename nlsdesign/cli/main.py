@@ -29,9 +29,11 @@ from .observer_certificate import verify_certificate
 from .observer_proofs import certify_adaptive_estimate, certify_continuous_gain
 from .output import examples
 from .parts import parts
+from .report import report
 from .serve import serve
 from .simulate import simulate
 from .studies import study
+from .sweep import sweep
 
 
 @click.group(
@@ -65,7 +67,7 @@ for part in (calibrate, certify_adaptive_estimate, certify_continuous_gain, veri
     observer.add_command(part)
 for command in (
     *(parts, materials, deck, design, analyse, observer, export),
-    *(cosimulation, simulate, fit, diagnose, compare, study, serve, completion, docs),
+    *(sweep, report, cosimulation, simulate, fit, diagnose, compare, study, serve, completion, docs),
 ):
     program.add_command(command)
 for analysis in (analyse_angle, loop):  # the first is the default

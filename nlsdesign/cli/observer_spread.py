@@ -51,10 +51,10 @@ def spread_errors(
     ArrangementError
         If no number of the deck has a spread.
     """
+    from ..export import quickest
     from ..model.roles import measured_motion, series_spring
     from ..observer import observer_bench, observer_errors
     from ..observer.adaptive.adaptive_observer import encoder_quantum
-    from .analyse_loop import compiled
 
     if not any(v.spread > 0.0 for v in plant.parameters):
         raise ArrangementError(
@@ -76,7 +76,7 @@ def spread_errors(
     except ArrangementError:
         # What no estimator can do better depends on the counts; without an encoder it is not computed.
         bounded = 0
-    return observer_errors(observers, bench, draws=draws, bounded=bounded, translate=compiled())
+    return observer_errors(observers, bench, draws=draws, bounded=bounded, translate=quickest())
 
 
 def write_errors(

@@ -31,15 +31,20 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
     rows
         Text of the cells.
     """
-    on_terminal = sys.stdout.isatty()
-    # What is piped is not for a narrow screen, unless COLUMNS says so.
-    width = shutil.get_terminal_size((80, 24)).columns if on_terminal else _columns() or WIDE
+    on_terminal, width = sys.stdout.isatty(), line_width()
     lines = table_lines(columns, rows, width=width)
     bold = head_count(columns, rows, width=width) if on_terminal and not os.environ.get("NO_COLOR") else 0
     if title:
         click.echo("\n".join(textwrap.wrap(title, width)))
     for number, line in enumerate(lines):
         click.echo(click.style(line, bold=True) if number < bold else line)
+
+
+def line_width() -> int:
+    """Return the width of what is printed; a pipe is no narrow screen, unless COLUMNS says so."""
+    if sys.stdout.isatty():
+        return shutil.get_terminal_size((80, 24)).columns
+    return _columns() or WIDE
 
 
 def _columns() -> int:

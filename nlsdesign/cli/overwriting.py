@@ -208,6 +208,8 @@ def _file_can_be_made(
 ) -> Path | None:
     """Refuse, before any work, a file whose folder could not be written into, or of another ending."""
     if file is not None:
+        if not file.name:
+            raise click.BadParameter(f"'{file}' is the name of no file; name one")
         if ending and file.suffix.lower() != ending:
             step = f"name it {file.with_suffix(ending).name}"
             raise ValueRangeError(f"--out {file}", f"must end in {ending}", next_step=step)

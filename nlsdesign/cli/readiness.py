@@ -26,18 +26,20 @@ class Readiness(NamedTuple):
         As it is typed, without ``nlsdesign``.
     reason
         Why not, with the next step; ``None`` where the deck is ready.
-    needs
-        What else the command asks for; may be empty.
     """
 
     command: str
     reason: NlsError | None
-    needs: str = ""
 
     @property
     def ready(self) -> bool:
         """Whether the command takes the deck."""
         return self.reason is None
+
+    @property
+    def shown(self) -> str:
+        """The command, with what else it asks for."""
+        return shown_command(self.command)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +153,7 @@ def readiness(declared: Assembly) -> list[Readiness]:
 
     machine = _Machine(declared, flatten(declared))
     asked: dict[str, Callable[[], None]] = {
+        "simulate": machine.plant,
         "design": machine.design,
         "analyse angle": machine.angle,
         "analyse loop": machine.loop,
@@ -168,4 +171,15 @@ def readiness(declared: Assembly) -> list[Readiness]:
             reasons[work.__name__] = None
         except NlsError as error:
             reasons[work.__name__] = error
-    return [Readiness(name, reasons[work.__name__], _NEEDS.get(name, "")) for name, work in asked.items()]
+    return [Readiness(name, reasons[work.__name__]) for name, work in asked.items()]
+
+
+def shown_command(command: str) -> str:
+    """Return a command with what else it asks for, as ``fit (with records)``.
+
+    Parameters
+    ----------
+    command
+        As it is typed, without ``nlsdesign``.
+    """
+    return f"{command} (with {_NEEDS[command]})" if command in _NEEDS else command

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _file = click.Path(path_type=Path, dir_okay=False)
 _MOST_ROWS = 2_000_000
 _SHOWN_EVENTS = 5
+_ROUNDING = 1e-13
+"""Share of the largest value of a signal that is no more than the rounding of its numbers, and shown as 0."""
 _FORWARD = (
     "inputs",
     "input_file",
@@ -292,7 +294,7 @@ def _drawn(
     sections = [
         TextSection("Warnings", "\n\n".join(warnings) or "No law leaves its range, no limit is reached."),
         FigureSection("Signals over time", picture, caption="Signals of one unit share a panel."),
-        TableSection("Sizes", _COLUMNS, tuple(_rows(run, shown)), caption="Over the whole run."),
+        TableSection("Sizes", _COLUMNS, tuple(_sized(run, shown)), caption="Over the whole run."),
         *(
             [
                 TableSection(
@@ -315,13 +317,18 @@ def _drawn(
 def _sizes(values: Any) -> tuple[float, float, float, float]:
     import numpy as np
 
-    rms = float(np.sqrt(np.mean(values**2)))
-    return float(values.min()), float(values.max()), rms, float(values[-1])
+    sizes = [values.min(), values.max(), np.sqrt(np.mean(values**2)), values[-1]]
+    least = _ROUNDING * float(np.max(np.abs(values)))
+    smallest, largest, rms, last = (float(size) if abs(size) > least else 0.0 for size in sizes)
+    return smallest, largest, rms, last
+
+
+def _sized(run: Trace, names: Sequence[str]) -> list[tuple[str | float, ...]]:
+    return [(n, *_sizes(run[n]), typeset_unit(run.units[n])) for n in names]
 
 
 def _rows(run: Trace, names: Sequence[str]) -> list[tuple[str, ...]]:
-    units = {n: typeset_unit(run.units[n]) for n in names}
-    return [(n, *(f"{size:.4g}" for size in _sizes(run[n])), units[n]) for n in names]
+    return [(str(n), *(f"{size:.4g}" for size in sizes), str(u)) for n, *sizes, u in _sized(run, names)]
 
 
 def _content(run: Trace, names: Sequence[str], warnings: list[str], files: list[Path]) -> dict[str, Any]:

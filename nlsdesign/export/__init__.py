@@ -2,7 +2,7 @@
 
 from .c.controller_code import CSource, export_c
 from .c.examples import write_examples
-from .compilation.compiled_step import natively
+from .compilation.compiled_step import Natively, natively, quickest
 from .compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, host_platform
 from .compilation.running_c import CompiledStep
 from .cosimulation.convergence import Convergence, convergence
@@ -33,6 +33,7 @@ __all__ = [
     "Held",
     "Iterated",
     "Late",
+    "Natively",
     "Processor",
     "SamplesOf",
     "Stepping",
@@ -48,6 +49,7 @@ __all__ = [
     "host_platform",
     "measure_on_target",
     "natively",
+    "quickest",
     "read_ssp",
     "write_examples",
     "write_reference",

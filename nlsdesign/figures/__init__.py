@@ -2,6 +2,8 @@
 
 from matplotlib.figure import Figure
 
+from .answer_histograms import MarkedQuantile, answer_histograms
+from .answers_against import answers_against
 from .before_after import (
     CandidateShare,
     HeldOut,
@@ -26,11 +28,15 @@ from .made_springs import tolerance_bars, torque_band
 from .number_text import compact, significant
 from .over_angle import observability_over_angle, observer_stability, stability_over_angle
 from .over_time import ClosedLoopRun, closed_loop, closed_loop_of, observer_error, over_time
+from .parallel_coordinates import parallel_coordinates
 from .ranked import ranked_intervals
+from .response_surfaces import SurfacePanel, response_surfaces
 from .run_over_time import run_over_time
+from .sensitivity_bars import VarianceShare, sensitivity_bars
 from .spread_of_errors import errors_over_spread
 from .style import alternative_text, described, styled
 from .svg import inline_svg, svg_text, write_figures
+from .sweep_points import PointKinds, ShownColumn
 from .task_figures import curve_of_task, motor_over_task
 from .torque import loop_area, metric_note, torque_against_measured, torque_against_target, torque_loops
 from .trade_off import pareto_front
@@ -44,10 +50,17 @@ __all__ = [
     "Figure",
     "HeldOut",
     "InspectionRow",
+    "MarkedQuantile",
+    "PointKinds",
     "PointPanel",
     "RecordError",
+    "ShownColumn",
+    "SurfacePanel",
     "TitleBlock",
+    "VarianceShare",
     "alternative_text",
+    "answer_histograms",
+    "answers_against",
     "binned_errors",
     "cam_motion",
     "cam_motion_of",
@@ -77,9 +90,12 @@ __all__ = [
     "observer_error",
     "observer_stability",
     "over_time",
+    "parallel_coordinates",
     "pareto_front",
     "ranked_intervals",
+    "response_surfaces",
     "run_over_time",
+    "sensitivity_bars",
     "significant",
     "stability_over_angle",
     "styled",

@@ -129,7 +129,9 @@ def gap_bars(errors: Sequence[RecordError], *, unit: str, quantity: str = "error
     axes.grid(visible=False, axis="x")
     axes.set_xlim(-0.6, len(ordered) - 0.4)
     axes.margins(y=0.22)
-    axes.set_ylabel(f"rms {quantity} in {unit}")
+    axes.set_ylabel(f"rms {quantity} in {unit}" if unit else f"rms {quantity}")
+    # As the labels of the bars: a power of ten above the axis would be a second unit.
+    axes.yaxis.set_major_formatter(lambda value, _: np.format_float_positional(round(value, 12), trim="-"))
     legend(axes)
     held_out = [
         f"{e.record} {significant(e.before)} to {significant(e.after)} {unit}" for e in ordered if e.held_out

@@ -68,8 +68,6 @@ class Sheet:
         **look
             For matplotlib.
         """
-        # A dollar sign is no formula.
-        text = text.replace("$", r"\$")
         self.axes.text(x, y, text, **{"fontsize": TEXT, "color": INK.light, "va": "baseline", **look})
 
     def box(self, x: float, y: float, *, width: float, height: float) -> None:

@@ -111,6 +111,8 @@ STYLE: Any = {
     "grid.color": GRID.light,
     "grid.linewidth": 0.7,
     "text.color": INK.light,
+    # A dollar sign in somebody's name is no formula.
+    "text.parse_math": False,
     "xtick.color": MUTED.light,
     "ytick.color": MUTED.light,
     "xtick.labelcolor": INK.light,

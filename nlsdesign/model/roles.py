@@ -133,8 +133,15 @@ def measured_motion(model: FlatModel, name: str | None = None) -> str:
     ------
     ArrangementError
         If the structure does not decide.
+    UnknownNameError
+        If the model has no state of that name.
     """
-    return driven_body(model).motion if name is None else name
+    if name is None:
+        return driven_body(model).motion
+    states = [v.name for v in model.states]
+    if name not in states:
+        raise unknown_name(f"model '{model.name}': state", name, states)
+    return name
 
 
 def spring_torque(model: FlatModel, name: str | None = None) -> str:

@@ -7,6 +7,7 @@ from .design_sections import design_sections, tolerance_sections, write_design_r
 from .diagnosis import verdict_sections
 from .equations_section import EquationsSection
 from .page import report_text, write_report
+from .point_table import PointTableSection
 from .regeneration_sections import regeneration_sections
 from .sections import (
     Chapter,
@@ -34,6 +35,7 @@ __all__ = [
     "FileSection",
     "KeyNumber",
     "NumbersSection",
+    "PointTableSection",
     "PublishedNumber",
     "Section",
     "TableSection",

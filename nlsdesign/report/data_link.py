@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
@@ -16,18 +18,37 @@ _KEPT = ",:[]{}()/ "
 
 
 class DataLink(NamedTuple):
-    """A link that holds a file.
+    """A link that holds a file or leads to one.
 
     Parameters
     ----------
     name
         Of the file, when it is saved.
     link
-        The whole content.
+        The whole content, or the path of the file from the page.
+    words
+        What is to be had there.
     """
 
     name: str
     link: str
+    words: str = "Data of this figure (JSON)"
+
+
+def file_link(file: Path, folder: Path) -> DataLink:
+    """Return a link to the file that holds the numbers behind a figure.
+
+    Parameters
+    ----------
+    file
+        Written beside the page.
+    folder
+        Of the page.
+    """
+    relative = Path(os.path.relpath(file, folder)).as_posix()
+    return DataLink(
+        file.name, quote(relative), f"Data behind this figure, all points ({file.suffix[1:].upper()})"
+    )
 
 
 def data_link(figure: Figure, title: str) -> DataLink | None:

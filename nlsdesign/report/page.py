@@ -85,8 +85,9 @@ def report_text(
     sections, title, abstract, facts
         As for :func:`write_report`.
     """
-    entries = _entries(folder, list(sections))
-    script = _source("report.js")
+    pieces = list(sections)
+    entries = _entries(folder, pieces)
+    script = "\n".join(_source(name) for name in dict.fromkeys(["report.js", *_scripts(pieces)]))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     light, dark = (
         {
@@ -100,6 +101,10 @@ def report_text(
         light=light, dark=dark, script=Html(script), script_digest=digest,
     )  # fmt: skip
     return visible(page)
+
+
+def _scripts(sections: Iterable[Section]) -> list[str]:
+    return [section.script for section in sections if section.script]
 
 
 def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from urllib.parse import quote
 from ..errors import ExportError, ValueRangeError
 from ..figures import Figure, alternative_text, inline_svg
 from ..figures.number_text import compact, significant
-from .data_link import data_link
+from .data_link import data_link, file_link
 from .html import Html
 
 Cell = str | int | float
@@ -60,6 +60,8 @@ class Section(ABC):
 
     title: str
     template: ClassVar[str]
+    script: ClassVar[str] = ""
+    """File of the templates that the page needs for it, once however often the section stands there."""
 
     @abstractmethod
     def content(self, place: PagePosition) -> Mapping[str, Any]:
@@ -125,6 +127,8 @@ class FigureSection(Section):
         What it means, and what was assumed.
     alternative
         Alternative text; by default the one attached to the figure.
+    data
+        File with the numbers behind it; by default the page holds those that are drawn.
 
     Raises
     ------
@@ -138,6 +142,7 @@ class FigureSection(Section):
     means: str = ""
     assumed: str = ""
     alternative: str = ""
+    data: Path | None = None
     template: ClassVar[str] = "figure.html"
 
     def __post_init__(self) -> None:
@@ -150,7 +155,7 @@ class FigureSection(Section):
     def content(self, place: PagePosition) -> Mapping[str, Any]:
         """Return the figure as inline SVG, and its texts."""
         svg = Html(inline_svg(self.figure, place.key, alternative=self.alternative))
-        data = data_link(self.figure, self.title)
+        data = data_link(self.figure, self.title) if self.data is None else file_link(self.data, place.folder)
         return {
             "svg": svg, "data": data, "caption": self.caption, "means": self.means, "assumed": self.assumed,
         }  # fmt: skip

@@ -6,6 +6,7 @@ from .limits_reached import LimitReached, limits_reached
 from .measure import measure
 from .prior import Prior, declared_prior
 from .signals import Sine, sine
+from .simulated_batch import SimulatedBatch, simulate_batch
 from .trace import RangeWarning, Trace, range_warnings
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "LimitReached",
     "Prior",
     "RangeWarning",
+    "SimulatedBatch",
     "Sine",
     "Trace",
     "declared_prior",
@@ -20,5 +22,6 @@ __all__ = [
     "measure",
     "range_warnings",
     "simulate",
+    "simulate_batch",
     "sine",
 ]

@@ -73,7 +73,7 @@ def simulate(
     ConvergenceError
         If the integrator stops early, or an implicit equation was not solved.
     """
-    times = _checked_times(times)
+    times = checked_times(times)
     drives = drives_of(model, times, inputs or {}, hold=hold)
     x0 = _start(model, start or {})
     events: list[Event] = []
@@ -84,7 +84,19 @@ def simulate(
     return replace(_evaluated(model, times, x, drives.samples), events=tuple(events))
 
 
-def _checked_times(times: Array) -> Array:
+def checked_times(times: Array) -> Array:
+    """Return sample times as an array.
+
+    Parameters
+    ----------
+    times
+        In s.
+
+    Raises
+    ------
+    ValueRangeError
+        If they do not ascend or are not finite, or there are fewer than two.
+    """
     grid = np.asarray(times, dtype=float)
     if grid.ndim != 1 or len(grid) < 2 or np.any(np.diff(grid) <= 0.0) or not np.all(np.isfinite(grid)):
         raise ValueRangeError("times", "must be at least two strictly ascending finite numbers in s")

@@ -90,8 +90,22 @@ def step_function(branch: ca.Function) -> ca.Function:
     return ca.Function("step", symbols, ca.cse([ca.densify(ca.SX(each)) for each in step.call(symbols)]))
 
 
-class _Stepper:
-    """One step at a time through fixed buffers, without allocation."""
+class Stepper:
+    """One step at a time through fixed buffers, without allocation.
+
+    Parameters
+    ----------
+    model
+        Continuous, with at least one state.
+    drives
+        Inputs.
+    tolerance
+        Error allowed per step.
+    modes
+        Of all switches; read at each step.
+    translate
+        Makes the function of a step a faster one.
+    """
 
     def __init__(
         self, model: FlatModel, drives: Drives, tolerance: float, modes: Array, translate: Translate
@@ -100,7 +114,8 @@ class _Stepper:
         self._time, self._length = np.zeros(1), np.zeros(1)
         self.state, self._inputs = np.zeros(len(model.states)), np.zeros((STAGES + 1, len(model.inputs)))
         nominal = np.array([v.nominal for v in model.states])
-        fixed = (model.start(model.parameters), np.array([tolerance]), nominal, modes)
+        self.numbers = model.start(model.parameters)
+        fixed = (self.numbers, np.array([tolerance]), nominal, modes)
         step = translate(step_function(branch_of(model.switching, model.equations)))
         given = (self._time, self._length, self.state, self._inputs, *fixed)
         self._step = Buffered(step, given)
@@ -172,7 +187,7 @@ def integrate_explicitly(
     """
     times = drives.times.tolist()
     modes = Modes(model, times[-1] - times[0]) if model.switching else None
-    stepper = _Stepper(model, drives, tolerance, modes.now if modes else np.zeros(0), translate)
+    stepper = Stepper(model, drives, tolerance, modes.now if modes else np.zeros(0), translate)
     states = np.zeros((len(x0), len(times)))
     stepper.state[:] = x0
     if modes:
@@ -203,7 +218,7 @@ def integrate_explicitly(
                     raise _no_step(model, now)
             done += 1
             if done > budget:
-                if may_change_method and _limited_by_stability(model, drives, k, stepper.state, proposed):
+                if may_change_method and limited_by_stability(model, drives, k, stepper.state, proposed):
                     raise TooStiffError(k, states[:, : k + 1], modes.log.events if modes else [])
                 budget *= 2.0
         states[:, k + 1] = stepper.state
@@ -211,8 +226,20 @@ def integrate_explicitly(
     return states, modes.log.events if modes else []
 
 
-def _limited_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, length: float) -> bool:
-    """Tell whether a step length is near the stability limit of the fastest pole."""
+def limited_by_stability(model: FlatModel, drives: Drives, interval: int, x: Array, length: float) -> bool:
+    """Tell whether a step length is near the stability limit of the fastest pole.
+
+    Parameters
+    ----------
+    model, drives
+        What is integrated.
+    k
+        Number of the interval between samples.
+    x
+        States.
+    length
+        Of the step in s.
+    """
     s = model.symbols()
     slope = ca.Function(
         "slope", [s.time, s.state, s.input, s.parameter], [ca.jacobian(s.derivative, s.state)]

@@ -13,6 +13,7 @@ from pathlib import Path
 import click
 
 from nlsdesign.cli.main import main, program
+from nlsdesign.written_files import LIST_NAME
 
 from .cases import ACCEPTED, REFUSED, Case, Outcome, signature
 from .records import _JOB, _MAPPING, _TARGET, Records
@@ -152,7 +153,7 @@ class Commands:
         # The kept binaries of the compiler stay; drafts and folders of work do not.
         left = [each.name for each in place.iterdir() if not each.name.startswith("nlsdesign-0")
                 and each.name != f"nlsdesign-{os.getuid()}"]  # fmt: skip
-        drafts = [each.name for each in folder.rglob(".*") if each.name not in (".keep", ".cache")]
+        drafts = [each.name for each in folder.rglob(".*") if each.name not in (".keep", ".cache", LIST_NAME)]
         if left or drafts:
             return Outcome("left over", str((left + drafts)[0])[:20])
         return outcome

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from nlsdesign.export import export_fmu
+from nlsdesign.written_files import LIST_NAME
 
 from ..hand_built import controller
 from .cases import ACCEPTED, REFUSED, Case, Outcome
@@ -111,7 +112,8 @@ def _judged(what: str, status: int, errors: str, folder: Path, seconds: float, e
         return Outcome("too long", f"{what}: over {PATIENCE:g} s")
     # The compiler keeps what it has built; everything else is gone.
     left = [e.name for e in (folder / "temporary").iterdir() if e.name != f"nlsdesign-{os.getuid()}"]
-    half = [e.name for e in (folder / "out").rglob(".*")] if (folder / "out").is_dir() else []
+    hidden = (folder / "out").rglob(".*") if (folder / "out").is_dir() else ()
+    half = [e.name for e in hidden if e.name != LIST_NAME]
     if left or half:
         return Outcome("left over", f"{what}: {(left + half)[0][:16]}")
     time.sleep(0.05)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nlsdesign.components import CurrentDrivenMotor, Gear, Inertia
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.errors import ArrangementError, UnknownNameError, ValueRangeError
@@ -27,6 +28,7 @@ from nlsdesign.observer import (
     observer_bench,
     observer_errors,
 )
+from nlsdesign.quantity import quantity
 from nlsdesign.simulation.prior import declared_prior
 from tests.renamed import nested, renamed
 
@@ -110,6 +112,27 @@ def test_errors_over_the_spread_are_those_of_their_runs(errors: SpreadErrors) ->
 def test_the_bound_lies_below_what_the_deck_alone_says(errors: SpreadErrors) -> None:
     alone = np.log(1.05) * 1.2 / np.sqrt(2.0)
     assert 0.3 * alone < errors.bound[0] < alone
+
+
+def test_the_bound_counts_every_input_of_a_machine() -> None:
+    """A rotor behind a gear and the inertia that it turns: current and torque are inputs."""
+    machine = declare(load_deck("austin2015_soft_spring"))
+    parts = dict(machine.parts)
+    rotor = CurrentDrivenMotor(
+        inertia=quantity(140.0, "g*cm^2", spread=0.1),
+        torque_constant=parts["motor"].torque_constant,
+        resistance=quantity(0.3, "Ohm"), current_limit=quantity(20.0, "A"), voltage_limit=quantity(24.0, "V"),
+    )  # fmt: skip
+    parts["motor"] = Inertia(inertia=quantity(100.0, "g*cm^2", spread=0.1))
+    parts["motor_encoder"] = replace(parts["motor_encoder"], of="rotor.angle")
+    gear = Gear(between=("rotor", "motor"), ratio=quantity(4.0, "1"))
+    two = flatten(replace(machine, parts=(("rotor", rotor), *parts.items(), ("gear", gear))))
+    assert [v.name for v in two.inputs] == ["rotor.current", "motor.torque"]
+    observers = {"cascade": design_observer_with_details(two).model}
+    duty = Duty(torque=0.5, frequencies=(4.0,))
+    found = observer_errors(observers, observer_bench(two, duty=duty), draws=4, bounded=1)
+    alone = np.log(1.05) * 0.5 / np.sqrt(2.0)
+    assert 0.3 * alone < found.bound[0] < alone
 
 
 def test_bad_settings_are_named(linear: FlatModel) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -21,6 +22,7 @@ from nlsdesign.components import (
     tie,
 )
 from nlsdesign.components.assembly.circuit import Circuit, Leaf, Row, circuit_lines, circuit_of
+from nlsdesign.components.assembly.circuit_text import draw
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.deck import deck_names, load_deck
@@ -46,6 +48,25 @@ def test_series_and_parallel_read_as_they_are() -> None:
     assert circuit_lines(circuit_of(standard, "net"), "grip", "clamp") == [
         "(grip)┬─╱╲╱╲ stiff ───────────────────────────────────┬─(clamp)",
         "      └─╱╲╱╲ relaxing.spring ───[│─ relaxing.dashpot ─┘",
+    ]
+
+
+def test_a_drawing_fits_its_width_and_loses_nothing() -> None:
+    machine = declare(load_deck("test_rig"))
+    whole, narrow = str(machine), draw(f"{machine.name}: {machine.description}", machine.parts, width=60)
+    assert max(map(len, whole.splitlines())) > 120
+    assert max(map(len, narrow.splitlines())) <= 60
+    assert draw(f"{machine.name}: {machine.description}", machine.parts) == whole
+    text = re.sub(r"[\s│├└─]", "", narrow).replace("…", "")
+    pieces = re.sub(r"[\s│├└─]", "", whole)
+    assert sorted(text) == sorted(pieces)
+    assert narrow.splitlines()[7:16] == [
+        *("    (motor)──◖─ cam ───◇─ cable ─┬─╱╲╱╲ stiff ──────────── …",),
+        *("                                 └─╱╲╱╲ relaxing.spring ── …",),
+        *("    … ───────────────────────┬─(load)", "    … ─[│─ relaxing.dashpot ─┘"),
+        *("    ├─ cam: TwoSidedCam(elements = 1,", "    │      lever_arm = <80 numbers in m>,"),
+        *("    │      last_angle = 0.977384 rad,", "    │      changeover = 2e-05 rad,"),
+        "    │      anchor_distance = 1e+06 m)",
     ]
 
 

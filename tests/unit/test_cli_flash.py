@@ -17,7 +17,7 @@ from nlsdesign.errors import UnitError
 from nlsdesign.export import export_fmu
 from nlsdesign.export.c.guarded_step import GuardedModel
 from nlsdesign.model.flat import FlatModel, Table, Variable
-from nlsdesign.simulation.sampled_batch import _looked_up
+from nlsdesign.simulation.sample_writer import looked_up
 from tests.command_line import files_in
 from tests.fmu_unit import opened
 
@@ -123,7 +123,7 @@ def test_breakpoints_are_read_alike_in_an_fmu_and_in_a_batch(tmp_path: Path) -> 
     model = over_breakpoints()
     reference, (table,) = GuardedModel(model), model.tables
     x, u = ca.MX.sym("x"), ca.MX.sym("u")
-    many = ca.Function("look", [u], [_looked_up(table, model, x, u)])
+    many = ca.Function("look", [u], [looked_up(table, model, x, u)])
     with opened(export_fmu(model, tmp_path / "uneven.fmu")) as unit:
         unit.begin()
         unit.run()

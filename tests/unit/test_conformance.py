@@ -36,6 +36,7 @@ from nlsdesign.model import FlatModel, flatten
 from nlsdesign.quantity import parse_unit
 from tests.parts import examples
 from tests.parts.systems import around, named
+from tests.selection import quick_only
 
 STEP = 1e-6
 """Relative to the size of each variable, for the finite difference."""
@@ -165,7 +166,10 @@ def sources(part: Part, folder: Path) -> Path:
     return folder / "sources"
 
 
-def test_it_becomes_c_that_compiles(part: Part, tmp_path: Path) -> None:
+# Each takes a run of the compiler; a new component is compiled by the thorough run.
+@pytest.mark.parametrize("name", quick_only(EXAMPLES, list(EXAMPLES)[::6]))
+def test_it_becomes_c_that_compiles(name: str, tmp_path: Path) -> None:
+    part = EXAMPLES[name]
     folder = sources(part, tmp_path)
     text = (folder / "model.c").read_text(encoding="utf-8")
     for v in smooth(part).parameters:

@@ -40,7 +40,8 @@ def agrees(run: Run, name: str, commands: list[str]) -> dict[str, tuple[bool, st
     differing = {}
     for command in commands:
         words = (*command.split(), "--deck", str(deck) if deck.exists() else name, *COMMANDS[command])
-        status, _, err = run(*words, "--out", f"out/{command.replace(' ', '_')}")
+        out = f"out/{command.replace(' ', '_')}" + (".csv" if command == "simulate" else "")
+        status, _, err = run(*words, "--out", out)
         # A design that misses its target and a loop that limit-cycles are findings, not refusals.
         if known[command].ready != (status in (0, 1)):
             differing[command] = known[command].ready, err
@@ -69,11 +70,19 @@ def test_ready_commands_run(run: Run) -> None:
 def test_the_table_says_what_to_do_and_json_says_the_same(run: Run) -> None:
     status, out, _ = run("deck", "check", "one_sided_cable_drive")
     assert status == 0
-    assert "ready for: design (with a target), analyse angle" in out
+    assert "ready for: simulate, design (with a target), analyse angle" in out
     assert "CapstanFriction" in " ".join(out.split()), "what is in the way is named"
     content = json.loads(run("deck", "check", "one_sided_cable_drive", "--json")[1])
     ready = {name for name, each in content["commands"].items() if each["ready"]}
-    assert ready == {"design", "analyse angle", "export controller", "export fmu", "fit", "diagnose"}
+    assert ready == {
+        "simulate",
+        "design",
+        "analyse angle",
+        "export controller",
+        "export fmu",
+        "fit",
+        "diagnose",
+    }
     assert "take the friction out of the spring" in content["commands"]["observer"]["reason"]
     assert content["warnings"] == []
     assert len(content["digest"]) == 64
@@ -101,6 +110,27 @@ def test_an_output_inertia_at_the_rotor_is_told_too() -> None:
     (said,) = slips("value = 140.0,", "value = 350000.0,", template="geared-joint")
     assert "is that of the rotor, in front of the gear" in said
     assert "write 140 g·cm², divided by 50^2" in said
+
+
+def test_a_gear_that_speeds_up_is_named() -> None:
+    (said,) = slips("gear_ratio = {value = 10.0", "gear_ratio = {value = 0.02")
+    assert said.startswith(
+        "motor.gear_ratio: 0.02 motor turns per output turn make the output 50 times as fast"
+    )
+    assert said.endswith("-> if 50 motor turns per output turn were meant, write 50")
+    (said,) = slips("ratio = {value = 50.0", "ratio = {value = -0.02", template="geared-joint")
+    assert said.startswith("gear.ratio: 0.02 motor turns")
+    assert slips("gear_ratio = {value = 10.0", "gear_ratio = {value = 1.0") == [], "a direct drive"
+
+
+def test_a_new_deck_is_written_with_what_is_likely_a_slip(run: Run) -> None:
+    words = ("--template", "cam-actuator", "--set", "motor.gear_ratio=0.02", "--yes")
+    status, out, err = run("deck", "new", "own", *words)
+    assert (status, err) == (0, "")
+    assert "warning: motor.gear_ratio: 0.02 motor turns per output turn" in out
+    content = json.loads(run("deck", "new", "other", *words, "--json")[1])
+    assert content["warnings"][0].startswith("motor.gear_ratio: 0.02 motor turns")
+    assert json.loads(run("deck", "new", "third", *words[:2], "--json")[1])["warnings"] == []
 
 
 def test_ends_of_a_spring() -> None:

@@ -47,9 +47,11 @@ def test_a_template_is_ready_for_each_command_that_it_names_and_holds_no_slip(
     machine = declare(deck)
     commands = {each.command: each for each in readiness(machine)}
     claimed = load_template(name).ready_for
-    assert claimed
     assert [str(commands[each].reason) for each in claimed if not commands[each].ready] == []
-    assert ", ".join(claimed) in out
+    assert claimed == tuple(name for name, each in commands.items() if each.ready), "and no other"
+    shown = ", ".join(each.shown for each in commands.values() if each.ready)
+    assert f"ready for {shown}\n" in out
+    assert f"ready for: {shown}\n" in run("deck", "check", "own.toml")[1]
     assert deck_remarks(machine) == []
     assert deck.name == "own"
 

@@ -8,6 +8,8 @@ import pytest
 
 from nlsdesign import components as c
 from nlsdesign.components import Assembly, DriveSaturation, assembly, tie
+from nlsdesign.components.assembly.deck_template import load_template
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.discrepancy.blocks.balance_scale import BalanceTerms, scaled_balance
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.identification import Column, Record, RecordSet
@@ -142,3 +144,26 @@ def test_a_drive_held_at_its_limit_is_in_the_scale_of_the_drive_below_it() -> No
         assert float(at([2.0, 5.0], (2.0 * size + 0.3) / 5.0, size)) == pytest.approx(0.3, rel=1e-6)
         assert float(at([1.0, 2.5], (2.0 * size + 0.3) / 5.0, size)) == pytest.approx(0.3, rel=1e-6)
     assert float(at([2.0, 5.0], (2.0 * 7.4 + 0.3) / 5.0, 14.8)) == pytest.approx(0.6, rel=1e-6)
+
+
+def test_a_geared_joint_gains_nothing_by_smaller_efforts_and_worse_gears() -> None:
+    """No record tells all efforts times a factor, or a load from the share of it that the gear passes on."""
+    model = flatten(declare(load_template("geared-joint").deck))
+    signals = ["motor_encoder.reading", "current_sensor.reading", "motor.current", "limb.torque"]
+    block = next(each for each in blocks_of(model, signals) if each.name == "motor")
+    names = [v.name for v in block.model.inputs]
+    inputs = np.random.default_rng(7).uniform(-1.0, 1.0, (len(names), 40)) * 10.0
+    inputs[names.index("limb.torque")] = 0.0  # a load from outside that was measured, and there was none
+    load = {"limb.inertia": 0.8, "weight.mass": 0.8, "bearing.damping": 0.8}
+    everything = {"motor.torque_constant": 0.9, "motor.inertia": 0.9, **dict.fromkeys(load, 0.9)}
+    gear = load | {"gear.efficiency": 0.8, "gear.back_efficiency": 1.0 / 0.8}
+
+    def errors(factors: dict[str, float]) -> np.ndarray:
+        numbers = [v.start * factors.get(v.name, 1.0) for v in block.model.parameters]
+        return np.asarray(block.model.equations(0.0, [], inputs, numbers, [])[1].full()[0])
+
+    declared = errors({})
+    assert block.effort_per_drive == pytest.approx(0.03), "the error of the current, times N·m/A"
+    assert np.ptp(declared) > 0.1
+    for factors in (everything, gear):
+        np.testing.assert_allclose(errors(factors), declared, rtol=1e-4)

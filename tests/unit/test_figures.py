@@ -22,6 +22,7 @@ from nlsdesign.figures.cam_frames import MARKER, cam_picture
 from nlsdesign.figures.lines import thinned
 from nlsdesign.figures.style import SERIES, TONES, look
 from tests import figure_samples as samples
+from tests.selection import quick_only
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -43,7 +44,7 @@ def drawn(name: str) -> figures.Figure:
 # --- every figure ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", samples.FIGURES)
+@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::4]))
 def test_a_figure_is_drawn_the_same_whatever_the_user_has_set(name: str) -> None:
     first = figures.svg_text(drawn(name))
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 20.0, "axes.facecolor": "red"}):
@@ -341,6 +342,18 @@ def test_bars_are_as_high_as_the_errors_and_held_out_records_stand_right() -> No
     assert [bar.get_height() for bar in axes.containers[1]] == [0.15, 0.11, 0.13]
     floors = [segment[0][1] for segment in axes.collections[0].get_segments()]
     assert floors == [0.09, 0.08, 0.085]
+
+
+def test_small_errors_have_one_unit_and_shares_have_none() -> None:
+    errors = [figures.RecordError("a", 1.8e-4, 1.7e-4, 1.6e-4, False)]
+    axes = figures.gap_bars(errors, unit="N*m").axes[0]
+    axes.figure.canvas.draw()
+    ticks = [label.get_text() for label in axes.get_yticklabels()]
+    assert "0.00005" in ticks
+    assert axes.yaxis.get_offset_text().get_text() == ""
+    assert figures.gap_bars(errors, unit="1", quantity="error over noise").axes[0].get_ylabel() == (
+        "rms error over noise"
+    )
 
 
 def test_no_number_of_a_bar_is_struck_through_by_the_noise_floor() -> None:

@@ -88,3 +88,17 @@ def test_a_program_that_ends_by_itself_keeps_its_status_and_leaves_nothing(
     ended = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, check=False)
     assert (ended.returncode, ended.stderr) == (1, b"")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_while_python_itself_ends_changes_nothing(
+    number: signal.Signals, tmp_path: Path, root: Path
+) -> None:
+    late = f"class Late:\n    def __del__(self, kill=os.kill, own=os.getpid()): kill(own, {int(number)})\n\n"
+    program = f"{HEAD}{late}late = Late()\nguarded(lambda: sys.exit(1))\n"
+    environment = {**os.environ, "PYTHONPATH": str(root), "TMPDIR": str(tmp_path)}
+    ended = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, check=False,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
+    )  # fmt: skip
+    assert (ended.returncode, ended.stderr) == (1, b"")

@@ -141,7 +141,8 @@ def test_a_command_repeats_itself_without_a_question_and_refuses_to_lose_an_edit
 
 
 def test_a_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
-    calls = (CALL, ("design", "--deck", DECK), ("export", "c", "--deck", DECK, "--what", "both"),
+    curve = ("--maximum", "1 N*m", "--angle", "30 deg")
+    calls = (CALL, ("design", "--deck", DECK, *curve), ("export", "c", "--deck", DECK, "--what", "both"),
              ("export", "fmu", "--deck", DECK), ("diagnose", "--deck", DECK, "--records", "r", "--export"),
              ("study", "run", "hello"), ("observer", "--deck", DECK),
              ("fit", "--deck", DECK, "--records", "r"))  # fmt: skip
@@ -156,6 +157,31 @@ def test_a_dry_run_writes_nothing(run: Run, tmp_path: Path) -> None:
     assert "would write: out/fmu/observer_and_controller.fmu" in listed["export", "fmu"]
     assert "would write: out/diagnosis/c/torque_loop.c" in listed["diagnose", "--deck"]
     assert "not known before the work" in listed["study", "run"]
+
+
+def test_a_dry_run_of_a_design_lists_what_it_is_asked_for(run: Run, tmp_path: Path) -> None:
+    curve = ("--maximum", "1 N*m", "--angle", "30 deg", "--out", "o")
+    task = ("--target", "TaskTarget = {joint = 'ankle', body_mass = '75 kg', scale = 0.05}", "--out", "o")
+
+    def listed(*words: str) -> set[str]:
+        status, out, err = run("design", "--deck", DECK, *words, "--dry-run", "--json")
+        assert (status, err) == (0, "")
+        return {Path(name).name for name in json.loads(out)["files"]}
+
+    whole = listed(*curve)
+    assert "tolerance.svg" in whole
+    assert listed(*curve, "--draws", "0") == whole - {"tolerance.svg"}
+    assert listed(*task) == whole | {"task_curve.svg", "task_motor.svg"}
+    with keeping(tmp_path / "o"):
+        write_text(tmp_path / "o" / "tolerance.svg", "of an earlier design, which the next one removes")
+    assert listed(*curve, "--draws", "0") == whole
+
+
+@pytest.mark.parametrize("name", ["", "."])
+def test_a_file_without_a_name_is_refused(run: Run, name: str) -> None:
+    status, _, err = run("cosimulate", "--fmu", "a=b.fmu", "--stop", "1 s", "--out", name, "--dry-run")
+    assert status == 2
+    assert "--out" in err
 
 
 def test_what_a_command_lists_beforehand_is_what_it_writes(run: Run, tmp_path: Path) -> None:

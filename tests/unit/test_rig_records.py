@@ -26,6 +26,7 @@ from tests.rig.bench import Servo, simulate
 from tests.rig.commands import RECORDS, SINES, STEP, sines
 from tests.rig.effects import scale_of
 from tests.rig.records import measure
+from tests.selection import quick_only
 
 WIDEST = "sine_45deg_0.5Hz"
 
@@ -101,9 +102,10 @@ def clean_swing() -> np.ndarray:
     return make_records(ACTUATORS["wrist"], {"none": 1.0}, 9, noise=False, only=[WIDEST])[WIDEST]
 
 
-@pytest.mark.parametrize(
-    "effect", [name for name in (*EFFECTS, *LATER_EFFECTS, *OUTSIDE_ANY_CATALOGUE) if name != "none"]
-)
+ADDED = [name for name in (*EFFECTS, *LATER_EFFECTS, *OUTSIDE_ANY_CATALOGUE) if name != "none"]
+
+
+@pytest.mark.parametrize("effect", quick_only(ADDED, ADDED[::4]))
 def test_every_effect_shows_above_the_noise(clean_swing: np.ndarray, effect: str) -> None:
     wrist = ACTUATORS["wrist"]
     wrong = make_records(wrist, {effect: 1.0}, 9, noise=False, only=[WIDEST])[WIDEST]

@@ -275,3 +275,11 @@ def test_the_sentence_is_an_error_of_the_project() -> None:
     with pytest.raises(NlsError) as caught:
         series_spring(flatten(machine(finger=motor())))
     assert caught.value.next_step == "tie an elastic element between two bodies"
+
+
+@pytest.mark.parametrize("kind", ["kalman", "cascade", "adaptive"])
+def test_a_motion_that_no_state_is_called_by_is_refused(run: Run, kind: str) -> None:
+    words = ("--deck", "test_rig", "--kind", kind, "--measured", "motor.angel", "--out", "o")
+    status, _, err = run("observer", *words)
+    assert status == 2
+    assert "model 'test_rig': state 'motor.angel': no such name; did you mean 'motor.angle'?" in err

@@ -32,7 +32,7 @@ def deck_remarks(machine: Assembly) -> list[str]:
     >>> deck_remarks(declare(load_deck("austin2015_as_printed")))
     []
     """
-    return [*_spreads(machine.quantities()), *_ends(machine), *_inertias(machine)]
+    return [*_spreads(machine.quantities()), *_ends(machine), *_ratios(machine), *_inertias(machine)]
 
 
 def _spreads(numbers: Mapping[str, Quantity]) -> Iterator[str]:
@@ -72,6 +72,23 @@ def _driven(machine: Assembly) -> set[str]:
     for _ in gears:
         names |= {end for pair in gears if set(pair) & names for end in pair}
     return names
+
+
+def _ratios(machine: Assembly) -> Iterator[str]:
+    for name, part in machine.parts:
+        if isinstance(part, GearedMotor):
+            field, ratio = "gear_ratio", part.gear_ratio.number
+        elif isinstance(part, Gear) and isinstance(machine[part.between[0]], ElectricMotor):
+            field, ratio = "ratio", abs(part.ratio.number)
+        else:
+            continue
+        if ratio < 1.0:
+            turns = f"{1.0 / ratio:.4g}"
+            yield (
+                f"{name}.{field}: {ratio:g} motor turns per output turn make the output {turns} times as "
+                f"fast as the motor, with {ratio:g} of its torque -> if {turns} motor turns per output turn "
+                f"were meant, write {turns}"
+            )
 
 
 def _inertias(machine: Assembly) -> Iterator[str]:

@@ -138,7 +138,27 @@ def job_of(text: str, file: Path) -> DesignJob:
         [tolerance]
         draws = 2000
     """
-    deck = read_deck(text, file)
+    return job_in(read_deck(text, file))
+
+
+def job_in(deck: Deck) -> DesignJob:
+    """Return what is asked of a design by tables that were read; see :func:`job_of`.
+
+    Parameters
+    ----------
+    deck
+        Tables of a design file, with their places.
+
+    Raises
+    ------
+    DeckError
+        If a table is of the wrong kind; file, line and column are named.
+    UnknownNameError
+        If there is no such table, limit, goal, target or field, with the nearest that exists.
+    NlsError
+        If a number is refused by what it is for, with its place.
+    """
+    file = deck.path
     for key in deck.tables:
         if key not in _TABLES:
             raise unknown_name(deck.place(key), key, _TABLES)

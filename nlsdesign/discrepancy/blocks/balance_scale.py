@@ -7,8 +7,9 @@ the *declared* effort per unit of that signal, a constant:
 1. Where the drive is measured: the error of the drive. With e(u) what a drive of u gives at standstill and b
    the balance, the model asks for the drive u + b/e'(u), to first order: its inverse along the tangent at the
    measured point. So the error is b/e'(u). A drive that saturates gives less and asks for more: the flatter
-   it is, the larger its error. Where e is proportional to u this is the exact inverse. Where a drive is held
-   at its limit there is no tangent; the straight line from zero to the measured point stands for it.
+   it is, the larger its error. Where a drive is held at its limit there is no tangent; the straight line
+   from zero to the measured point stands for it. Where e is proportional to u the tangent is that in motion,
+   and the inverse exact: a gear with losses passes on another share of the drive in each direction.
 2. Where another effort on the body is measured: the balance as it is, for its reading enters there.
 3. Where motion alone is measured: the error of the acceleration.
 """
@@ -79,7 +80,9 @@ def scaled_balance(
             continue
         tangent = ca.jacobian(given, reading)
         if not depends(tangent, reading):
-            return terms.balance * (declared / slope), declared
+            direct = depends(terms.balance, reading) and not _states_behind(terms, reading)
+            in_motion = -ca.jacobian(terms.balance, reading) if direct else slope
+            return terms.balance * (declared / in_motion), declared
         tiny = _NEAR_ZERO**2
         line = (given * reading + tiny * slope) / (reading * reading + tiny)
         # A record of what a limit lets through stands on the limit itself: the slope is that just below it.

@@ -345,7 +345,10 @@ class _Tearing:
         inputs = {v.name for v in model.inputs}
         own = [m for m in self._given if m.shown in inputs and top_part(m.shown) in (body.name, *body.geared)]
         commands = [m for m in own if m.shown not in body.goals]
-        first = sorted(commands, key=lambda m: m.shown not in body.commands)
+        # What a command has become, such as a current in a winding, before a load from outside: that may
+        # have been zero all the time, and then a balance in its scale could be made small.
+        became = {v.name for v in model.signals}
+        first = sorted(commands, key=lambda m: (m.shown not in body.commands, m.shown not in became))
         readings = [symbol for _, symbol in self._inputs.values()]
         efforts = [self._reading(m, 0) for m in self._given if not m.body and m.shown in inputs]
         return scaled_balance(

@@ -2,39 +2,165 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import os
+import platform
 import tempfile
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import ExportError
+from ...simulation.buffered import Translate, as_it_is
+from ...simulation.column_graph import ColumnGraph
+from ...simulation.column_runs import ColumnRun
 from ...writing import write_bytes
-from .cross_compiler import cache_folder, compile_library
+from .columns_in_c import WIDTH, sampled_run_in_c
+from .cross_compiler import BASELINE, THIS_PROCESSOR, cache_folder, compile_library
+
+Array = NDArray[np.float64]
+
+_STEP_FLAGS = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")
+"""Without the definition the generated code does not export its functions."""
+_COLUMN_FLAGS = ("-std=gnu99", "-fno-math-errno", "-Wno-psabi")
 
 
-@lru_cache(maxsize=16)
-def natively(function: ca.Function) -> ca.Function:
-    """Return a function as compiled code, for ``simulate(..., translate=natively)``.
+class Natively:
+    """Makes compiled code of functions, for ``simulate(..., translate=natively)`` and for batches.
 
-    Compilation takes about a second; results are cached under a hash of the code.
+    Compilation takes about a second; results are cached under a hash of the code. A function keeps its form;
+    a batch gets code that computes eight columns together, with the instructions of this processor.
+    """
+
+    def __call__(self, function: ca.Function) -> ca.Function:
+        """Return a function as compiled code.
+
+        Parameters
+        ----------
+        function
+            Any CasADi function that can be written in C.
+
+        Raises
+        ------
+        ExportError
+            If the compiler is missing or fails, or its result cannot be loaded.
+        """
+        return _step(function)
+
+    def columns(self, graph: ColumnGraph) -> ColumnRun:
+        """Return compiled code that runs samples of many columns.
+
+        Parameters
+        ----------
+        graph
+            (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
+
+        Raises
+        ------
+        ExportError
+            If the compiler is missing or fails, or its result cannot be loaded.
+        """
+        return CompiledColumns(sampled_run_in_c(graph), kept=len(graph.results[1]))
+
+
+natively = Natively()
+"""Compiled code for ``translate=``."""
+
+
+@lru_cache(maxsize=1)
+def quickest() -> Translate:
+    """Return what runs functions quickest here: compiled code, or without a compiler CasADi and NumPy.
+
+    The numbers are the same but for the last digits of elementary functions, which are NumPy's own.
+    """
+    x = ca.SX.sym("x")
+    try:
+        natively(ca.Function("probe", [x], [2 * x]))
+    except ExportError:
+        return as_it_is
+    return natively
+
+
+class CompiledColumns:
+    """Compiled code that runs samples of many columns.
 
     Parameters
     ----------
-    function
-        Any CasADi function that can be written in C.
+    text
+        C code with a function ``run``.
+    kept
+        How many values are kept of a sample.
 
     Raises
     ------
     ExportError
         If the compiler is missing or fails, or its result cannot be loaded.
     """
+
+    def __init__(self, text: str, kept: int) -> None:
+        path = _built(text, _COLUMN_FLAGS, this_processor=True)
+        try:
+            self._run = ctypes.CDLL(str(path)).run
+        except OSError as error:
+            raise _not_loaded(path) from error
+        self._run.restype, self._kept = None, kept
+
+    def __call__(self, state: Array, given: Array, parameter: Array) -> tuple[Array, Array]:
+        """Return the states after the last sample, (states, columns), and what is kept, (T, kept, columns).
+
+        Parameters
+        ----------
+        state
+            Shape (states, columns).
+        given
+            Shape (T, given, columns).
+        parameter
+            Shape (parameters, columns).
+        """
+        count = state.shape[1]
+        after, inputs, numbers = (_filled_up(each) for each in (state, given, parameter))
+        after = after.copy() if after is state else after
+        kept = np.empty((len(given), self._kept, after.shape[1]))
+        arrays = (array.ctypes.data_as(ctypes.c_void_p) for array in (after, inputs, numbers, kept))
+        self._run(ctypes.c_int64(len(given)), ctypes.c_int64(after.shape[1] // WIDTH), *arrays)
+        return after[:, :count], kept[:, :, :count]
+
+
+def _filled_up(values: Array) -> Array:
+    """Return an array whose last axis is a multiple of the width; the last column is repeated."""
+    missing = -values.shape[-1] % WIDTH
+    if missing:
+        values = np.concatenate([values, np.repeat(values[..., -1:], missing, axis=-1)], axis=-1)
+    return np.ascontiguousarray(values)
+
+
+@lru_cache(maxsize=16)
+def _step(function: ca.Function) -> ca.Function:
     code = ca.CodeGenerator("step.c", {"with_header": False, "main": False})
     code.add(function)
-    text = code.dump()
-    digest = hashlib.sha256(text.encode()).hexdigest()[:24]
+    library = _built(code.dump(), _STEP_FLAGS)
+    try:
+        return ca.external(function.name(), str(library))
+    except RuntimeError as error:
+        raise _not_loaded(library) from error
+
+
+def _not_loaded(library: Path) -> ExportError:
+    return ExportError(f"compiled step {library}", "cannot be loaded", next_step="delete it and try again")
+
+
+def _built(text: str, flags: Sequence[str], *, this_processor: bool = False) -> Path:
+    """Return the library of a C text, compiled if it is not in the cache.
+
+    Code for this processor has its name in the hash: the cache may be shared with a machine that has another.
+    """
+    named = f"{text}{_processor()}" if this_processor else text
+    digest = hashlib.sha256(named.encode()).hexdigest()[:24]
     folder = cache_folder() / "steps"
     library = folder / f"{digest}{'.dll' if os.name == 'nt' else '.so'}"
     if not library.exists():
@@ -42,13 +168,18 @@ def natively(function: ca.Function) -> ca.Function:
         with tempfile.TemporaryDirectory(dir=folder) as name:
             source = Path(name) / "step.c"
             source.write_text(text, encoding="utf-8")
-            # Without this definition the generated code does not export its functions.
-            flags = ("-std=c99", "-DGCC_HASCLASSVISIBILITY")
-            built = compile_library([source], Path(name) / library.name, flags=flags)
+            processor = THIS_PROCESSOR if this_processor else BASELINE
+            built = compile_library([source], Path(name) / library.name, flags=flags, processor=processor)
             write_bytes(library, built.read_bytes())
+    return library
+
+
+@lru_cache(maxsize=1)
+def _processor() -> str:
+    """Return what distinguishes the instructions of this processor from those of others."""
     try:
-        return ca.external(function.name(), str(library))
-    except RuntimeError as error:
-        raise ExportError(
-            f"compiled step {library}", "cannot be loaded", next_step="delete it and try again"
-        ) from error
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return f"{platform.machine()} {platform.processor()} {platform.node()}"
+    naming = [line for line in lines if line.split("\t")[0].strip() in ("flags", "Features", "model name")]
+    return "\n".join(sorted(set(naming))) + platform.machine()

@@ -26,6 +26,9 @@ BASELINE = ("-mcpu=baseline",)
 """Only instructions that every processor of the platform has: what is built here runs elsewhere too, also in
 emulators and under valgrind. Without it the compiler may take those of the machine it runs on."""
 
+THIS_PROCESSOR = ("-mcpu=native",)
+"""All instructions of the machine that it runs on, for code that stays here."""
+
 
 @dataclass(frozen=True)
 class Platform:
@@ -179,6 +182,7 @@ def compile_library(
     platform: Platform | None = None,
     include: Sequence[Path] = (),
     flags: Sequence[str] = ("-std=c99",),
+    processor: Sequence[str] = BASELINE,
 ) -> Path:
     """Compile C files to a shared library.
 
@@ -194,6 +198,8 @@ def compile_library(
         Folders of foreign headers.
     flags
         Further flags.
+    processor
+        Which instructions it may take.
 
     Returns
     -------
@@ -206,7 +212,7 @@ def compile_library(
         If the compiler is missing or finds a mistake.
     """
     where = platform or PLATFORMS[host_platform()]
-    arguments: list[str | Path] = ["-target", where.target, *BASELINE, "-shared", "-O2", *flags]
+    arguments: list[str | Path] = ["-target", where.target, *processor, "-shared", "-O2", *flags]
     # Same numbers on every machine: no fused multiply-add, IEEE comparisons.
     arguments += ["-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-s"]
     if where.extension == ".so":

@@ -196,10 +196,10 @@ def observer_errors(
         rows[f"{PLANT}.{quantum}"] = bench.model.values[quantum] * np.where(np.arange(runs) == 1, FINE, 1.0)
     estimates = {name: f"{name}.{bench.estimate}" for name in observers}
     system = bench.system(observers)
-    torque, driven = f"{PLANT}.{bench.estimate}", f"{PLANT}.{system.driven}"
+    torque, acting = f"{PLANT}.{bench.estimate}", [f"{PLANT}.{v.name}" for v in bench.model.inputs]
     batch = run_batch(
         system, bench.stop, inputs=bench.inputs, parameters=rows,
-        keep=[torque, driven, *estimates.values()], translate=translate,
+        keep=[torque, *acting, *estimates.values()], translate=translate,
     )  # fmt: skip
     errors = _errors(batch, torque, estimates, bench)
     whole = batch.finite & np.all(np.isfinite(errors), axis=(0, 2))
@@ -211,7 +211,8 @@ def observer_errors(
             next_step="look at the spreads of the deck, or use more substeps per sample",
         )
     kept = [i for i in range(first, runs) if whole[i]]
-    bound = _bound(bench, known, rows, batch[driven], kept[:bounded]) if bounded else np.zeros(0)
+    inputs = np.stack([batch[name] for name in acting], axis=1)
+    bound = _bound(bench, known, rows, inputs, kept[:bounded]) if bounded else np.zeros(0)
     unit = bench.model.variable(bench.estimate).unit
     return SpreadErrors(
         tuple(observers), tuple(f for f, _, _ in bench.stretches), unit, bench.torque, errors[:, 0],
@@ -293,7 +294,7 @@ def _causes(errors: Array, shifts: list[tuple[str, Array]], counted: bool) -> di
 
 
 def _bound(
-    bench: ObserverBench, known: Prior, rows: Mapping[str, Array], driven: Array, chosen: list[int]
+    bench: ObserverBench, known: Prior, rows: Mapping[str, Array], inputs: Array, chosen: list[int]
 ) -> Array:
     sensed = SensedTorque(
         bench.estimate, bench.measured, encoder_quantum(bench.model, bench.measured),
@@ -303,5 +304,5 @@ def _bound(
     for i in chosen:
         values = {name: float(rows[f"{PLANT}.{name}"][i]) for name in known.names}
         # One sample passes before a computed input acts.
-        bounds.append(estimator_bound(bench.model.with_values(values), known, driven[i][None, :], sensed))
+        bounds.append(estimator_bound(bench.model.with_values(values), known, inputs[i], sensed))
     return np.array([rms_over(bounds, first, last) for _, first, last in bench.stretches])

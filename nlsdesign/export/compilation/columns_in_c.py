@@ -1,0 +1,283 @@
+"""A graph of elementary operations written in C, eight columns of numbers at a time.
+
+The types are vectors of the compiler, so that one instruction of the processor works on several columns.
+Sums, products, quotients, roots and comparisons have the bits of the single column; elementary functions are
+those of the C library, column by column.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ...simulation.column_graph import Call, ColumnGraph, Operation, TableReading
+
+WIDTH = 8
+"""Columns that are computed together."""
+
+_FORMS: Mapping[int, str] = {
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "{0} + {0}",
+    ca.OP_INV: "all(1.0) / {0}",
+    ca.OP_FMIN: "choose(({0} < {1}) | ({1} != {1}), {0}, {1})",
+    ca.OP_FMAX: "choose(({0} > {1}) | ({1} != {1}), {0}, {1})",
+    ca.OP_FABS: "(column)((mask){0} & INT64_MAX)",
+    ca.OP_SIGN: "choose({0} < 0.0, all(-1.0), choose({0} > 0.0, all(1.0), {0}))",
+    ca.OP_COPYSIGN: "(column)(((mask){0} & INT64_MAX) | ((mask){1} & INT64_MIN))",
+}
+_CONDITIONS: Mapping[int, str] = {
+    ca.OP_LT: "{0} < {1}",
+    ca.OP_LE: "{0} <= {1}",
+    ca.OP_EQ: "{0} == {1}",
+    ca.OP_NE: "{0} != {1}",
+    ca.OP_NOT: "{0} == 0.0",
+    ca.OP_AND: "({0} != 0.0) & ({1} != 0.0)",
+    ca.OP_OR: "({0} != 0.0) | ({1} != 0.0)",
+}
+_LIBRARY: Mapping[int, str] = {
+    ca.OP_SQRT: "sqrt", ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow",
+    ca.OP_LOG1P: "log1p", ca.OP_EXPM1: "expm1", ca.OP_HYPOT: "hypot", ca.OP_SIN: "sin", ca.OP_COS: "cos",
+    ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_ATAN2: "atan2",
+    ca.OP_SINH: "sinh", ca.OP_COSH: "cosh", ca.OP_TANH: "tanh", ca.OP_ASINH: "asinh",
+    ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh", ca.OP_ERF: "erf", ca.OP_FLOOR: "floor",
+    ca.OP_CEIL: "ceil", ca.OP_FMOD: "fmod",
+}  # fmt: skip
+_TWO_OPERANDS = frozenset(["pow", "hypot", "atan2", "fmod"])
+
+_HEAD = """\
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#define WIDTH {width}
+typedef double column __attribute__((vector_size(WIDTH * 8)));
+typedef int64_t mask __attribute__((vector_size(WIDTH * 8)));
+
+static inline column all(double value) {{ return (column){{0}} + value; }}
+static inline column choose(mask which, column a, column b) {{
+    return (column)(((mask)a & which) | ((mask)b & ~which));
+}}
+static inline column number(mask which) {{ return (column)((mask)all(1.0) & which); }}
+static inline column load(const double *from) {{
+    column value;
+    memcpy(&value, from, sizeof value);
+    return value;
+}}
+static inline void store(double *to, column value) {{ memcpy(to, &value, sizeof value); }}
+"""
+
+_LOOK_UP = """\
+static void look_up(const double *grid, const double *values, int64_t nodes, int64_t columns, int exact,
+                    column at, column *result) {
+    for (int j = 0; j < WIDTH; ++j) {
+        double x = at[j];
+        int64_t low = 0, high = nodes - 1;
+        if (exact) {
+            const double place = (x - grid[0]) * (double)(nodes - 1) / (grid[nodes - 1] - grid[0]);
+            low = place > 0.0 ? (int64_t)place : 0;
+            if (low > nodes - 2) low = nodes - 2;
+        } else {
+            while (high - low > 1) {
+                int64_t middle = low + (high - low) / 2;
+                if (x < grid[middle]) high = middle; else low = middle;
+            }
+        }
+        double share = (x - grid[low]) / (grid[low + 1] - grid[low]);
+        for (int64_t k = 0; k < columns; ++k)
+            result[k][j] = (1.0 - share) * values[low * columns + k]
+                           + share * values[(low + 1) * columns + k];
+    }
+}
+"""
+
+_RUN = """\
+{export} void run(int64_t samples, int64_t groups, double *state, const double *given,
+                  const double *parameter, double *kept) {{
+    int64_t every = groups * WIDTH;
+    for (int64_t group = 0; group < groups; ++group) {{
+        int64_t at = group * WIDTH;
+        column s[{states} + 1], p[{parameters} + 1];
+{onces}
+        for (int i = 0; i < {states}; ++i) s[i] = load(state + i * every + at);
+        for (int i = 0; i < {parameters}; ++i) p[i] = load(parameter + i * every + at);
+{fixed}
+        for (int64_t k = 0; k < samples; ++k) {{
+            const double *g = given + k * {inputs} * every + at;
+            double *out = kept + k * {shown} * every + at;
+{body}
+        }}
+        for (int i = 0; i < {states}; ++i) store(state + i * every + at, s[i]);
+    }}
+}}
+"""
+
+
+def sampled_run_in_c(graph: ColumnGraph) -> str:
+    """Return C code of a run of samples, for many columns.
+
+    Parameters
+    ----------
+    graph
+        (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
+    """
+    written = [_HEAD.format(width=WIDTH)]
+    if graph.tables:
+        written.append(_LOOK_UP)
+    used = {
+        step.code for each in (graph, *graph.bodies) for step in each.steps if isinstance(step, Operation)
+    }
+    written += [_by_columns(name) for name in sorted({_LIBRARY[code] for code in used & set(_LIBRARY)})]
+    for k, table in enumerate(graph.tables):
+        written.append(_numbers(f"grid{k}", table.grid) + _numbers(f"table{k}", table.values.ravel()))
+    crossing = [_crossing(body) for body in graph.bodies]
+    for k, body in enumerate(graph.bodies):
+        written.append(_once(k, body, crossing[k]) + _each(k, body, crossing[k]))
+    state, given, parameter = graph.arguments
+    names = {number: f"p[{i}]" for i, number in enumerate(parameter)}
+    fixed = [_operation(s, graph, names) for s in graph.steps if _is_fixed(s, graph)]
+    onces = []
+    for k, (place, operands) in enumerate(graph.onces):
+        onces.append(f"        column o{k}[{len(crossing[place])} + 1];")
+        values = "".join(f"{_name(v, graph, names)}, " for v in operands)
+        fixed.append(f"{{ column a[] = {{{values}{{0}}}}; once{place}(a, o{k}); }}")
+    names |= {number: f"s[{i}]" for i, number in enumerate(state)}
+    names |= {number: f"load(g + {i} * every)" for i, number in enumerate(given)}
+    lines = [_step(step, graph, names) for step in graph.steps if not _is_fixed(step, graph)]
+    after, kept = graph.results
+    lines += [f"store(out + {i} * every, {_name(v, graph, names)});" for i, v in enumerate(kept)]
+    lines += [f"column n{i} = {_name(v, graph, names)};" for i, v in enumerate(after)]
+    lines += [f"s[{i}] = n{i};" for i in range(len(after))]
+    written.append(
+        _RUN.format(
+            export="__attribute__((visibility(\"default\")))", states=len(state), inputs=len(given),
+            parameters=len(parameter), shown=len(kept), onces="\n".join(onces),
+            fixed="\n".join(fixed), body="\n".join(lines),
+        )
+    )  # fmt: skip
+    return "\n".join(written)
+
+
+def _is_fixed(step: object, graph: ColumnGraph) -> bool:
+    return isinstance(step, Operation) and step.result in graph.fixed
+
+
+def _number(value: float) -> str:
+    if math.isnan(value):
+        return "NAN"
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    return f"({value.hex()})"
+
+
+def _numbers(name: str, values: NDArray[np.float64]) -> str:
+    return f"static const double {name}[] = {{{', '.join(_number(float(v)) for v in values)}}};\n"
+
+
+def _by_columns(name: str) -> str:
+    two = name in _TWO_OPERANDS
+    return (
+        f"static inline column {name}_of(column a{', column b' if two else ''}) {{\n"
+        f"    column r; for (int j = 0; j < WIDTH; ++j) r[j] = {name}(a[j]{', b[j]' if two else ''});\n"
+        "    return r;\n}\n"
+    )
+
+
+def _crossing(body: ColumnGraph) -> list[int]:
+    """Return the fixed values of a body that what is not fixed takes, without constants."""
+    given = {k for argument in body.arguments for k in argument}
+    taken = {
+        k for s in body.steps if isinstance(s, Operation) and s.result not in body.fixed for k in s.operands
+    }
+    taken |= {k for result in body.results for k in result}
+    return sorted(k for k in taken & body.fixed if k not in body.constants and k not in given) + sorted(
+        k for k in taken & body.fixed & given
+    )
+
+
+def _fixed_arguments(body: ColumnGraph) -> list[int]:
+    return [k for argument in body.arguments for k in argument if k in body.fixed]
+
+
+def _once(number: int, body: ColumnGraph, crossing: Sequence[int]) -> str:
+    names = {k: f"a[{i}]" for i, k in enumerate(_fixed_arguments(body))}
+    lines = [_operation(s, body, names) for s in body.steps if _is_fixed(s, body)]
+    lines += [f"o[{i}] = {_name(k, body, names)};" for i, k in enumerate(crossing)]
+    text = "\n    ".join(lines)
+    return (
+        f"static __attribute__((noinline)) void once{number}(const column *a, column *o) {{\n    {text}\n}}\n"
+    )
+
+
+def _each(number: int, body: ColumnGraph, crossing: Sequence[int]) -> str:
+    names = {k: f"o[{i}]" for i, k in enumerate(crossing)}
+    moving = [k for argument in body.arguments for k in argument if k not in body.fixed]
+    names |= {k: f"a[{i}]" for i, k in enumerate(moving)}
+    lines = [_operation(s, body, names) for s in body.steps if not _is_fixed(s, body)]
+    results = [k for result in body.results for k in result]
+    lines += [f"r[{i}] = {_name(k, body, names)};" for i, k in enumerate(results)]
+    text = "\n    ".join(lines)
+    return (
+        f"static __attribute__((noinline)) void each{number}(const column *restrict o, "
+        f"const column *restrict a, column *restrict r) {{\n    {text}\n}}\n"
+    )
+
+
+def _name(number: int, graph: ColumnGraph, names: Mapping[int, str]) -> str:
+    if number in graph.constants:
+        return f"all({_number(graph.constants[number])})"
+    return names.get(number, f"v{number}")
+
+
+def _operation(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> str:
+    assert isinstance(step, Operation)
+    operands = [_name(k, graph, names) for k in step.operands]
+    result = step.result
+    if step.code in _CONDITIONS:
+        condition = _CONDITIONS[step.code].format(*operands)
+        return f"mask m{result} = {condition}; column v{result} = number(m{result}); (void)v{result};"
+    if step.code == ca.OP_IF_ELSE_ZERO:
+        where = (
+            f"m{step.operands[0]}" if _is_condition(step.operands[0], graph) else f"({operands[0]} != 0.0)"
+        )
+        return f"column v{result} = (column)((mask){operands[1]} & {where});"
+    if step.code in _LIBRARY:
+        return f"column v{result} = {_LIBRARY[step.code]}_of({', '.join(operands)});"
+    return f"column v{result} = {_FORMS[step.code].format(*operands)};"
+
+
+def _is_condition(number: int, graph: ColumnGraph) -> bool:
+    return number in graph.conditions
+
+
+def _step(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> str:
+    if isinstance(step, Operation):
+        return _operation(step, graph, names)
+    if isinstance(step, TableReading):
+        table, first = graph.tables[step.table], step.results[0]
+        exact = int(table.breakpoints is None)
+        call = (
+            f"column t{first}[{len(step.results)}]; look_up(grid{step.table}, table{step.table}, "
+            f"{len(table.grid)}, {len(step.results)}, {exact}, {_name(step.at, graph, names)}, t{first});"
+        )
+        return " ".join([call, *(f"column v{k} = t{first}[{i}];" for i, k in enumerate(step.results))])
+    assert isinstance(step, Call)
+    first, body = step.results[0], graph.bodies[step.body]
+    places = [k for argument in body.arguments for k in argument]
+    moving = "".join(
+        f"{_name(value, graph, names)}, "
+        for value, own in zip(step.operands, places, strict=True) if own not in body.fixed
+    )  # fmt: skip
+    call = (
+        f"column r{first}[{len(step.results)}]; {{ column a[] = {{{moving}{{0}}}}; "
+        f"each{step.body}(o{step.once}, a, r{first}); }}"
+    )
+    return " ".join([call, *(f"column v{k} = r{first}[{i}];" for i, k in enumerate(step.results))])

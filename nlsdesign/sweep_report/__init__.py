@@ -1,0 +1,9 @@
+"""The page of a sweep: what was asked, what failed, which points no other betters, figures, decks.
+
+The command and the front door import it. It computes no answers and draws nothing itself: `sweeps` judges the
+points, `figures` draws them.
+"""
+
+from .sweep_page import SweepPage, write_sweep_report
+
+__all__ = ["SweepPage", "write_sweep_report"]

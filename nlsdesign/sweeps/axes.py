@@ -1,0 +1,319 @@
+"""Axes of a sweep: a grid, a Sobol or Latin hypercube sample, a list, draws over the spread of the deck.
+
+Every set of axes gives its rows one at a time, so that a sweep needs no memory for the points that wait.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ValueRangeError, unknown_name
+from ..model import flatten
+from ..simulation.prior import LONGEST_ROW, declared_prior
+from .axis_values import Given, Subject
+from .columns import Column
+
+_BLOCK: Final = 1024
+_MOST_SOBOL: Final = 2**30
+
+
+@dataclass(frozen=True, eq=False)
+class BoundAxes:
+    """A set of axes with its values.
+
+    Parameters
+    ----------
+    columns
+        Of the axes.
+    count
+        Number of rows.
+    row
+        The values of one row, by its number.
+    """
+
+    columns: tuple[Column, ...]
+    count: int
+    row: Callable[[int], tuple[Any, ...]]
+
+
+class AxisSet(ABC):
+    """Axes that are varied together; a sweep crosses all its sets."""
+
+    @abstractmethod
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axes with their values.
+
+        Parameters
+        ----------
+        subject
+            What they change.
+
+        Raises
+        ------
+        NlsError
+            If a name does not exist, or a value does not fit it.
+        """
+
+
+def _count(name: str, count: int, least: int = 1, most: float = math.inf) -> None:
+    if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= most:
+        raise ValueRangeError(f"{name}: count = {count}", f"must be a whole number from {least} on",
+                              next_step="take for instance 64")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Grid(AxisSet):
+    """One axis with even steps, or with steps of an even ratio.
+
+    Parameters
+    ----------
+    name
+        Full name of the number.
+    lower, upper
+        Ends, both belong to it; with unit, or in SI.
+    count
+        Number of values, 2 or more.
+    spacing
+        ``"even"`` or ``"ratio"``.
+    """
+
+    name: str
+    lower: Given
+    upper: Given
+    count: int
+    spacing: Literal["even", "ratio"] = "even"
+
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axis; see :meth:`AxisSet.bound`."""
+        _count(f"grid over {self.name}", self.count, 2)
+        column, ends = subject.column(self.name, (self.lower, self.upper), "grid")
+        lower, upper = _ends(column, ends)
+        if self.spacing not in ("even", "ratio"):
+            raise unknown_name(f"grid over {self.name}: spacing", self.spacing, ("even", "ratio"))
+        if self.spacing == "ratio" and lower <= 0.0:
+            raise ValueRangeError(
+                f"grid over {self.name}", "begins at or below zero, so its steps have no ratio",
+                next_step='take spacing = "even"',
+            )  # fmt: skip
+        space = np.geomspace if self.spacing == "ratio" else np.linspace
+        values = [float(each) for each in space(lower, upper, self.count)]
+        _distinct(self.name, values)
+        return BoundAxes((column,), self.count, lambda number: (values[number],))
+
+
+@dataclass(frozen=True)
+class Listed(AxisSet):
+    """Rows that are written down: one axis with its values, or several whose values belong together.
+
+    Parameters
+    ----------
+    values
+        Numbers or words by name; all rows are equally long.
+    """
+
+    values: Mapping[str, Sequence[Given]]
+
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axes; see :meth:`AxisSet.bound`."""
+        names = ", ".join(self.values)
+        if not self.values or any(isinstance(each, str) for each in self.values.values()):
+            raise ValueRangeError(
+                "list of an axis", "has no rows", next_step='write {"NAME" = ["1 mm", "2 mm"]}'
+            )
+        if len({len(each) for each in self.values.values()}) != 1:
+            raise ValueRangeError(
+                f"list over {names}", "has rows of different length",
+                next_step="give each name as many values; use two lists to cross them",
+            )  # fmt: skip
+        _count(f"list over {names}", len(next(iter(self.values.values()))))
+        pairs = [subject.column(name, tuple(given), "list") for name, given in self.values.items()]
+        rows = list(zip(*(values for _, values in pairs), strict=True))
+        _distinct(names, rows)
+        return BoundAxes(tuple(column for column, _ in pairs), len(rows), rows.__getitem__)
+
+
+@dataclass(frozen=True)
+class SobolSample(AxisSet):
+    """A scrambled Sobol sequence over ranges; counts that are powers of two are balanced.
+
+    Parameters
+    ----------
+    ranges
+        Lower and upper end by name.
+    count
+        Number of points.
+    seed
+        Of the scrambling.
+    """
+
+    ranges: Mapping[str, tuple[Given, Given]]
+    count: int
+    seed: int = 0
+
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axes; see :meth:`AxisSet.bound`."""
+        _count("Sobol sample", self.count, 1, _MOST_SOBOL)
+        columns, lower, upper = _box(subject, self.ranges, "sobol")
+
+        @functools.lru_cache(maxsize=2)
+        def block(number: int) -> NDArray[np.float64]:
+            from scipy.stats import qmc
+
+            sampler = qmc.Sobol(len(columns), scramble=True, seed=np.random.default_rng(self.seed))
+            if number:
+                sampler.fast_forward(number * _BLOCK)
+            unit: NDArray[np.float64] = sampler.random(_BLOCK)
+            return unit
+
+        def row(number: int) -> tuple[float, ...]:
+            unit = block(number // _BLOCK)[number % _BLOCK]
+            return tuple((lower + (upper - lower) * unit).tolist())
+
+        return BoundAxes(columns, self.count, row)
+
+
+@dataclass(frozen=True)
+class LatinHypercube(AxisSet):
+    """A Latin hypercube over ranges: each axis has one point in each of its ``count`` stretches.
+
+    Parameters
+    ----------
+    ranges
+        Lower and upper end by name.
+    count
+        Number of points; all are held in memory, 8 bytes for each axis.
+    seed
+        The same seed gives the same points.
+    """
+
+    ranges: Mapping[str, tuple[Given, Given]]
+    count: int
+    seed: int = 0
+
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axes; see :meth:`AxisSet.bound`."""
+        from scipy.stats import qmc
+
+        _count("Latin hypercube", self.count)
+        columns, lower, upper = _box(subject, self.ranges, "latin_hypercube")
+        sampler = qmc.LatinHypercube(len(columns), seed=np.random.default_rng(self.seed))
+        points = lower + (upper - lower) * sampler.random(self.count)
+        return BoundAxes(columns, self.count, lambda number: tuple(points[number].tolist()))
+
+
+@dataclass(frozen=True)
+class RandomDraws(AxisSet):
+    """Machines drawn over the spread of the deck, as errors and loops over the spread draw them.
+
+    Every number is its declared value times exp(x), x normal with ln(1 + spread) as standard deviation. A row
+    of more than twelve numbers is the table of a shape and has one factor.
+
+    Parameters
+    ----------
+    count
+        Number of machines.
+    seed
+        The same seed gives the same machines; the first of many draws are those of a short one.
+    names
+        Only these numbers; all that have a spread by default.
+    """
+
+    count: int
+    seed: int = 0
+    names: tuple[str, ...] = ()
+
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axes; see :meth:`AxisSet.bound`."""
+        _count("random draws", self.count)
+        prior = declared_prior(flatten(subject.base))
+        groups = {key: list(inner) for key, inner in itertools.groupby(prior.names, key=_head)}
+        places: dict[str, tuple[int, bool]] = {}
+        for head, inner in groups.items():
+            shape = len(inner) > LONGEST_ROW
+            for name in [f"factor({head})"] if shape else inner:
+                places[name] = (prior.place(inner[0] if shape else name), shape)
+        chosen = {name: _chosen(name, places) for name in self.names} if self.names else places
+        if not chosen:
+            raise ValueRangeError("random draws", "no number of the deck has a spread",
+                                  next_step="give numbers a spread")  # fmt: skip
+        at = [place for place, _ in chosen.values()]
+        shapes = np.array([shape for _, shape in chosen.values()])
+        values = np.where(shapes, 1.0, prior.values[at])
+        low = _ends_of(prior.minimum, at, shapes, -np.inf)
+        high = _ends_of(prior.maximum, at, shapes, np.inf)
+        deviations = prior.deviations[at]
+
+        def row(number: int) -> tuple[float, ...]:
+            normal = np.random.default_rng([self.seed, number]).standard_normal(len(at))
+            return tuple(np.clip(values * np.exp(deviations * normal), low, high).tolist())
+
+        columns = []
+        for name, value, each in zip(chosen, values, deviations, strict=True):
+            column, _ = subject.column(name, (float(value),), "random")
+            ends = sorted((float(value * np.exp(-3.0 * each)), float(value * np.exp(3.0 * each))))
+            words = "drawn over its spread; range of three deviations"
+            columns.append(Column(column.name, column.unit, words, "axis", "random", *ends))
+        return BoundAxes(tuple(columns), self.count, row)
+
+
+def _ends_of(ends: NDArray[np.float64], at: list[int], shapes: Any, without: float) -> NDArray[np.float64]:
+    return np.where(shapes, without, ends[at]) if len(ends) else np.full(len(at), without)
+
+
+def _head(name: str) -> str:
+    return name.partition("[")[0]
+
+
+def _chosen(name: str, places: Mapping[str, tuple[int, bool]]) -> tuple[int, bool]:
+    if name not in places:
+        raise unknown_name("number with a spread", name, places)
+    return places[name]
+
+
+def _ends(column: Column, ends: tuple[Any, ...]) -> tuple[float, float]:
+    if column.lower is None:
+        raise ValueRangeError(f"axis '{column.name}'", "takes words, which have no range",
+                              next_step="list them: Listed")  # fmt: skip
+    lower, upper = ends
+    if not lower < upper:
+        raise ValueRangeError(f"axis '{column.name}'", f"goes from {lower:g} to {upper:g} in SI",
+                              next_step="give the smaller end first, and two different ones")  # fmt: skip
+    return float(lower), float(upper)
+
+
+def _box(
+    subject: Subject, ranges: Mapping[str, tuple[Given, Given]], kind: str
+) -> tuple[tuple[Column, ...], NDArray[np.float64], NDArray[np.float64]]:
+    if not ranges:
+        raise ValueRangeError(
+            "sample", "has no ranges", next_step='write ranges = {"NAME" = ["1 mm", "2 mm"]}'
+        )
+    columns, ends = [], []
+    for name, given in ranges.items():
+        if isinstance(given, str) or len(given) != 2:
+            raise ValueRangeError(f"range of {name}", "has no two ends", next_step='write ["1 mm", "2 mm"]')
+        column, values = subject.column(name, tuple(given), kind)
+        ends.append(_ends(column, values))
+        columns.append(column)
+    low, high = np.array(ends).T
+    return tuple(columns), low, high
+
+
+def _distinct(name: str, rows: Sequence[Any]) -> None:
+    seen: dict[Any, int] = {}
+    for number, row in enumerate(rows):
+        if row in seen:
+            raise ValueRangeError(
+                f"axis '{name}'", f"has the same point twice: rows {seen[row] + 1} and {number + 1}",
+                next_step="leave one out",
+            )  # fmt: skip
+        seen[row] = number

@@ -1,0 +1,263 @@
+"""Values of an axis as they are given, and the names that an axis can have."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from ..components import materials
+from ..components.assembly.named_parts import Assembly
+from ..errors import UnitError, ValueRangeError, brief, unknown_name
+from ..quantity import BASE, Quantity, parse_unit, same_dimension
+from ..written_numbers import split_number
+from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
+from .columns import Column
+
+Given = float | int | str | Quantity
+_KNOWN_UNITS: Final = (
+    *(
+        "1",
+        "m",
+        "kg",
+        "s",
+        "A",
+        "K",
+        "rad",
+        "N",
+        "N*m",
+        "Pa",
+        "W",
+        "V",
+        "Ohm",
+        "H",
+        "N*m/rad",
+        "rad/s",
+        "m/s",
+    ),
+    *("m^2", "m^3", "kg*m^2", "N*m*s/rad", "Pa*s", "1/s", "N/m", "N*s/m", "N*m/A", "V*s/rad", "kg/m^3"),
+)
+
+
+def si_unit(unit: str) -> str:
+    """Return the unit of a number once it is in SI.
+
+    Parameters
+    ----------
+    unit
+        As given, for instance ``"mm"``.
+
+    Examples
+    --------
+    >>> si_unit("mm"), si_unit("mN*m/A"), si_unit("deg"), si_unit("%")
+    ('m', 'N*m/A', 'rad', '1')
+    """
+    exponents = parse_unit(unit).exponents
+    for known in _KNOWN_UNITS:
+        if parse_unit(known).exponents == exponents:
+            return known
+    factors = [f"{name}^{e}" if e != 1 else name for name, e in zip(BASE, exponents, strict=True) if e]
+    return "*".join(factors) or "1"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Subject:
+    """What axes change: the decks and the question.
+
+    Parameters
+    ----------
+    assemblies
+        By the name of their deck; the first is the one that is swept.
+    question
+        A dataclass; its fields are named ``ask.FIELD``.
+    """
+
+    assemblies: Mapping[str, Assembly]
+    question: Any
+
+    @property
+    def base(self) -> Assembly:
+        """The assembly that is swept."""
+        return next(iter(self.assemblies.values()))
+
+    def names(self) -> list[str]:
+        """Return all names that an axis can have."""
+        numbers = self.base.quantities()
+        rows = [f"{name}[1]" for name, q in numbers.items() if isinstance(q.value, tuple)]
+        single = [name for name, q in numbers.items() if not isinstance(q.value, tuple)]
+        return [DECK, *pieces_of_rubber(self.base), *single, *rows, *settings_of(self.question)]
+
+    def column(self, name: str, values: Sequence[Given], kind: str) -> tuple[Column, tuple[Any, ...]]:
+        """Return the column of an axis, and its values: words, or numbers in SI.
+
+        Parameters
+        ----------
+        name
+            Of a number, a piece of rubber, ``deck``, ``factor(NAME)`` or ``ask.FIELD``.
+        values
+            As given: words, numbers with unit, or numbers in SI.
+        kind
+            Of the axis.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such name, deck or rubber.
+        UnitError
+            If a value is of another dimension.
+        ValueRangeError
+            If a value is no finite number.
+        """
+        words = self._words_for(name)
+        if words is not None:
+            given = tuple(str(each) for each in values)
+            for each in given:
+                if words and each not in words:
+                    raise unknown_name(f"axis {name}", each, words)
+            return Column(name, "", "words of the sweep", "axis", kind), given
+        unit = self._unit_of(name, values)
+        numbers = tuple(_number(name, each, unit) for each in values)
+        text = "" if unit == "1" else unit
+        described = "asked of the point" if name.startswith(f"{ASK}.") else "number of the deck"
+        return Column(name, text, described, "axis", kind, min(numbers), max(numbers)), numbers
+
+    def _words_for(self, name: str) -> list[str] | None:
+        """Return the words that an axis may have; an empty list for any, ``None`` for an axis of numbers."""
+        if name == DECK:
+            return list(self.assemblies)
+        if name in pieces_of_rubber(self.base):
+            return list(materials())
+        return [] if isinstance(settings_of(self.question).get(name), str) else None
+
+    def _unit_of(self, name: str, values: Sequence[Given]) -> str:
+        """Return the unit in SI; that of the question's own fields is the one that is written."""
+        if name in settings_of(self.question):
+            present = settings_of(self.question)[name]
+            units = [u for u in (_written_unit(name, v) for v in (*values, present)) if u]
+            return si_unit(units[0]) if units else "1"
+        row = row_of_factor(name)
+        known = self.base.quantities()
+        if row is not None and row in known:
+            return "1"
+        head, _, index = name.partition("[")
+        if head not in known:
+            raise unknown_name("axis", name, self.names())
+        count = len(known[head].value) if isinstance(known[head].value, tuple) else 0  # type: ignore[arg-type]
+        if count != 0 and index.rstrip("]") not in map(str, range(1, count + 1)):
+            raise ValueRangeError(
+                f"axis '{name}'", f"'{head}' is a row of {count} numbers",
+                next_step=f"name one, for instance '{head}[1]', or all by a factor: 'factor({head})'",
+            )  # fmt: skip
+        if count == 0 and index:
+            raise unknown_name("axis", name, [head])
+        return si_unit(known[head].unit)
+
+
+def _written_unit(name: str, given: object) -> str:
+    if isinstance(given, Quantity):
+        return given.unit
+    return _split(name, given)[1] if isinstance(given, str) else ""
+
+
+def _split(name: str, text: str) -> tuple[float, str]:
+    try:
+        return split_number(text)
+    except UnitError as error:
+        raise UnitError(
+            f"axis {name} = '{text}'", error.rule, next_step="write for instance '20 mm'"
+        ) from None
+
+
+def _number(name: str, given: Given, unit: str) -> float:
+    """Return a number in SI; a bare one is in SI already."""
+    written = _written_unit(name, given)
+    if written and not same_dimension(written, unit):
+        raise UnitError(
+            f"axis {name} = {given}",
+            f"'{written}' is no unit of it",
+            next_step=f"give it in a unit like '{unit}'",
+        )
+    if isinstance(given, Quantity):
+        value = given.number
+    elif isinstance(given, str):
+        number, text = _split(name, given)
+        value = number * parse_unit(text or "1").factor
+    elif isinstance(given, bool) or not isinstance(given, int | float | np.number):
+        raise ValueRangeError(f"axis {name} = {brief(given)}", "is not a number")
+    else:
+        value = float(given)
+    if not math.isfinite(value):
+        raise ValueRangeError(f"axis {name} = {given}", "is not finite")
+    return float(value)
+
+
+def settings_of(question: Any, prefix: str = ASK) -> dict[str, Any]:
+    """Return what an axis can change in a question: single numbers and words, by name.
+
+    Parameters
+    ----------
+    question
+        A dataclass; also those that it holds are looked through. In a row of them each goes by the name of
+        its class, for instance ``ask.keep.MaximumCamRadius.radius``.
+    prefix
+        Of the names.
+    """
+    found: dict[str, Any] = {}
+    for name, value in _inner(question).items():
+        full = f"{prefix}.{name}"
+        if isinstance(value, str | Quantity) or (
+            isinstance(value, int | float) and not isinstance(value, bool)
+        ):
+            found[full] = value
+        elif dataclasses.is_dataclass(value) or isinstance(value, tuple):
+            found |= settings_of(value, full)
+    return found
+
+
+def _inner(holder: Any) -> dict[str, Any]:
+    if isinstance(holder, tuple):
+        return {type(each).__name__: each for each in holder if dataclasses.is_dataclass(each)}
+    if not dataclasses.is_dataclass(holder):
+        return {}
+    return {field.name: getattr(holder, field.name) for field in dataclasses.fields(holder) if field.init}
+
+
+def with_settings(question: Any, values: Mapping[str, Any], units: Mapping[str, str]) -> Any:
+    """Return a copy of a question with other numbers and words.
+
+    Parameters
+    ----------
+    question
+        A dataclass.
+    values
+        By full name, in SI.
+    units
+        In SI, by full name.
+    """
+    for name, value in values.items():
+        question = _changed(question, name.split(".")[1:], value, units.get(name, ""))
+    return question
+
+
+def _changed(holder: Any, path: list[str], value: Any, unit: str) -> Any:
+    first, *rest = path
+    if isinstance(holder, tuple):
+        return tuple(
+            _changed(each, rest, value, unit) if type(each).__name__ == first else each for each in holder
+        )
+    present = getattr(holder, first)
+    if rest:
+        new = _changed(present, rest, value, unit)
+    elif isinstance(present, str):
+        new = str(value)
+    elif isinstance(present, int):
+        new = round(value)
+    else:
+        # A field that takes a quantity checks the dimension of what it gets.
+        takes = Quantity in typing.get_args(typing.get_type_hints(type(holder)).get(first))
+        new = Quantity(float(value), unit, "swept") if takes and unit else float(value)
+    return dataclasses.replace(holder, **{first: new})

@@ -1,0 +1,96 @@
+"""All points of a sweep: every row of each set of axes with every row of the others, one at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from ..errors import ValueRangeError
+from .axes import AxisSet
+from .axis_values import Subject
+from .changes import row_of_factor
+from .columns import Column
+
+_PROBES = 64
+
+
+class Plan:
+    """Points by number; the last set of axes changes first.
+
+    Parameters
+    ----------
+    axes
+        Sets of axes.
+    subject
+        What they change.
+
+    Raises
+    ------
+    ValueRangeError
+        If there are no axes, or two of them change the same number.
+    NlsError
+        If a name does not exist, or a value does not fit it.
+    """
+
+    def __init__(self, axes: Sequence[AxisSet], subject: Subject) -> None:
+        if not axes:
+            raise ValueRangeError("sweep", "has no axes", next_step="give one, such as Grid or SobolSample")
+        self._sets = [each.bound(subject) for each in axes]
+        self.columns: tuple[Column, ...] = tuple(c for each in self._sets for c in each.columns)
+        _require_apart(self.columns)
+
+    def __len__(self) -> int:
+        return math.prod(each.count for each in self._sets)
+
+    def point(self, number: int) -> tuple[Any, ...]:
+        """Return the values of a point, in the order of the columns.
+
+        Parameters
+        ----------
+        number
+            Of the point, from 0.
+        """
+        rows: list[tuple[Any, ...]] = []
+        for each in reversed(self._sets):
+            number, inner = divmod(number, each.count)
+            rows.append(each.row(inner))
+        return tuple(value for row in reversed(rows) for value in row)
+
+    def points(self) -> Iterator[tuple[int, tuple[Any, ...]]]:
+        """Yield all points with their numbers."""
+        return ((number, self.point(number)) for number in range(len(self)))
+
+    def digest(self) -> str:
+        """Return the SHA-256 of the plan: its columns, its size, and points all over it."""
+        count = len(self)
+        probes = sorted({round(k * (count - 1) / (_PROBES - 1)) for k in range(_PROBES)})
+        content = [[asdict(column) for column in self.columns], count, [each.count for each in self._sets]]
+        content.append([[k, *map(repr, self.point(k))] for k in probes])
+        for each in self._sets:
+            if each.count <= _PROBES**2:
+                content.append([list(map(repr, each.row(k))) for k in range(each.count)])
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def _require_apart(columns: Sequence[Column]) -> None:
+    """Refuse axes that change the same number."""
+    for name, times in Counter(column.name for column in columns).items():
+        if times > 1:
+            raise ValueRangeError(
+                f"axis '{name}'", f"stands {times} times: its points collide",
+                next_step="keep one of them",
+            )  # fmt: skip
+    names = {column.name for column in columns}
+    for name in names:
+        row = row_of_factor(name)
+        inside = sorted(each for each in names if row is not None and each.partition("[")[0] == row)
+        if inside:
+            raise ValueRangeError(
+                f"axes '{name}' and '{inside[0]}'", "change the same number: their points collide",
+                next_step="keep one of them",
+            )  # fmt: skip

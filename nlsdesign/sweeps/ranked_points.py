@@ -1,0 +1,128 @@
+"""Points of a sweep in their order: those that no other betters, the misses, and those without a number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ValueRangeError, unknown_name
+from .preferences import Preference, Requirement
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class RankedPoints:
+    """Which points are on the front, and which do not count.
+
+    Parameters
+    ----------
+    preferences, requirements
+        As given.
+    failed
+        Points without an answer, shape (n,).
+    missed
+        Points with an answer that does not keep a requirement.
+    incomplete
+        Points that keep all requirements, with an answer to compare that is no finite number.
+    front
+        Rows of the points that no other betters in all preferences, the best in the first one first; empty
+        without preferences.
+    misses
+        How many points miss each requirement, in their order.
+    """
+
+    preferences: tuple[Preference, ...]
+    requirements: tuple[Requirement, ...]
+    failed: Mask
+    missed: Mask
+    incomplete: Mask
+    front: Rows
+    misses: tuple[int, ...]
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Names of the answers with a direction or a requirement, each once."""
+        names = [each.answer for each in self.preferences] + [each.answer for each in self.requirements]
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def compared(self) -> Mask:
+        """Points that were compared with one another."""
+        return ~(self.failed | self.missed | self.incomplete)
+
+
+def rank_points(
+    answers: Mapping[str, Floats],
+    done: Mask,
+    *,
+    preferences: Sequence[Preference] = (),
+    requirements: Sequence[Requirement] = (),
+) -> RankedPoints:
+    """Return which points no other betters; failures, misses and what is no finite number are set aside.
+
+    Parameters
+    ----------
+    answers
+        Values by name, shape (n,) each, in SI.
+    done
+        Which points have answers, shape (n,).
+    preferences
+        What is better; a point is on the front where no other is at least as good in all and better in one.
+    requirements
+        What a point must keep to be compared at all.
+
+    Raises
+    ------
+    UnknownNameError
+        If an answer of that name does not exist.
+    ValueRangeError
+        If one answer has two preferences.
+    """
+    named = [each.answer for each in preferences]
+    for name in (*named, *(each.answer for each in requirements)):
+        if name not in answers:
+            raise unknown_name("answer", name, answers)
+    for name in named:
+        if named.count(name) > 1:
+            raise ValueRangeError(f"answer '{name}'", "has two directions", next_step="state one of them")
+    done = np.asarray(done, dtype=bool)
+    kept = [each.kept(answers[each.answer]) for each in requirements]
+    missed = done & ~np.all(kept, axis=0) if kept else np.zeros_like(done)
+    costs = (
+        np.array([each.cost(answers[each.answer]) for each in preferences]).reshape(len(named), len(done)).T
+    )
+    whole = np.all(np.isfinite(costs), axis=1) if named else done
+    incomplete = done & ~missed & ~whole
+    rows = np.flatnonzero(done & ~missed & ~incomplete)
+    front = rows[nondominated(costs[rows])] if named else np.zeros(0, dtype=np.intp)
+    if len(front):
+        front = front[np.lexsort((front, costs[front, 0]))]
+    counts = tuple(int(np.sum(done & ~each)) for each in kept)
+    return RankedPoints(tuple(preferences), tuple(requirements), ~done, missed, incomplete, front, counts)
+
+
+def nondominated(costs: Floats) -> Rows:
+    """Return the rows that no other row betters: at most as large in each column and smaller in one.
+
+    Equal rows are kept together.
+
+    Parameters
+    ----------
+    costs
+        Finite numbers, shape (n, k); the smaller, the better.
+    """
+    unique, places = np.unique(np.asarray(costs, dtype=float), axis=0, return_inverse=True)
+    # In the order of the columns a later row never betters an earlier one.
+    best = np.empty_like(unique)
+    kept: list[int] = []
+    for number, row in enumerate(unique):
+        if not np.any(np.all(best[: len(kept)] <= row, axis=1)):
+            best[len(kept)] = row
+            kept.append(number)
+    return np.flatnonzero(np.isin(places.ravel(), kept))

@@ -1,0 +1,289 @@
+"""The run of a sweep: points go out, rows come in, parts are written, and at the end the table."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ..components.assembly.named_parts import Assembly
+from ..errors import ArrangementError, ValueRangeError
+from ..progress import Progress, Quiet
+from ..work_sharing import Executor, PointOutcome, Processes, shared_map
+from .axes import AxisSet
+from .axis_values import Subject
+from .columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, Column
+from .parts import Parts, libraries
+from .plan import Plan
+from .question import PointWork, SweepQuestion
+from .sweep_folder import about_sweep, only_run, opened, written_about
+from .sweep_table import SweepTable, read_sweep
+
+_FIRST_PART: Final = 2.0
+_LATEST_PART: Final = 15.0
+"""Seconds after which a part is written: at first soon, then as seldom as a kill may cost."""
+_MOST_ROWS: Final = 4096
+
+
+@dataclass(frozen=True)
+class SweepSettings:
+    """What becomes of earlier results in the folder.
+
+    Parameters
+    ----------
+    again
+        Whether they are thrown away; by default the run goes on where the last one ended.
+    retry_failed
+        Whether points that failed are computed again.
+    """
+
+    again: bool = False
+    retry_failed: bool = False
+
+
+_GO_ON: Final = SweepSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class SweepTask:
+    """A sweep that was checked and not yet run.
+
+    Parameters
+    ----------
+    assemblies
+        By the name of their deck; the first is swept.
+    plan
+        Its points.
+    question
+        What is asked of each.
+    columns
+        Of the table.
+    about
+        What ``sweep.json`` will say.
+    """
+
+    assemblies: Mapping[str, Assembly]
+    plan: Plan
+    question: SweepQuestion
+    columns: tuple[Column, ...]
+    about: Mapping[str, Any]
+
+    @property
+    def work(self) -> PointWork:
+        """What a worker does with a point."""
+        axes = tuple((c.name, c.unit) for c in self.plan.columns)
+        return PointWork(self.assemblies, self.question, axes, _answers(self.columns))
+
+
+def _answers(columns: Sequence[Column]) -> tuple[str, ...]:
+    return tuple(column.name for column in columns if column.role == "answer")
+
+
+def sweep_task(
+    actuator: Assembly | Mapping[str, Assembly], *, axes: Sequence[AxisSet], ask: SweepQuestion
+) -> SweepTask:
+    """Check a sweep before anything is computed.
+
+    Parameters
+    ----------
+    actuator, axes, ask
+        As for :func:`sweep`.
+
+    Raises
+    ------
+    ValueRangeError
+        If axes collide, or an answer has the name of an axis.
+    NlsError
+        If a name does not exist, or a value does not fit it.
+    """
+    assemblies = {actuator.name: actuator} if isinstance(actuator, Assembly) else dict(actuator)
+    if not assemblies:
+        raise ArrangementError("sweep", "has no deck", next_step="give an assembly")
+    plan = Plan(axes, Subject(assemblies, ask))
+    base = next(iter(assemblies.values()))
+    answers = ask.answers(base)
+    taken = {c.name for c in (*plan.columns, *STATE_COLUMNS)}
+    names = [column.name for column in answers]
+    for name in names:
+        if name in taken or names.count(name) > 1:
+            raise ValueRangeError(
+                f"answer '{name}'", "has the name of an axis, a state or another answer",
+                next_step="give it another name",
+            )  # fmt: skip
+    seeds = [int(each.seed) for each in axes if hasattr(each, "seed")]
+    about = about_sweep(assemblies, plan, question=type(ask).__name__, asked=ask.describe(), seeds=seeds)
+    point, *states = STATE_COLUMNS
+    return SweepTask(assemblies, plan, ask, (point, *plan.columns, *answers, *states), about)
+
+
+def sweep(
+    actuator: Assembly | Mapping[str, Assembly],
+    *,
+    axes: Sequence[AxisSet],
+    ask: SweepQuestion,
+    out: Path | str,
+    executor: Executor | None = None,
+    settings: SweepSettings = _GO_ON,
+    progress: Progress | None = None,
+) -> SweepTable:
+    """Ask one question of every point, and write the answers into a folder as they come.
+
+    A run that was stopped in any way goes on where it ended when it is started again. Points that fail are
+    kept with their reason. The table is the same to the byte whoever computed it.
+
+    Parameters
+    ----------
+    actuator
+        Assembly that is swept; or several by name, for an axis ``deck``.
+    axes
+        Sets of axes; every row of one is crossed with every row of the others.
+    ask
+        The question, a pure function of the changed assembly.
+    out
+        Folder.
+    executor
+        Where points are computed; by default processes of this machine, one for each core.
+    settings
+        What becomes of earlier results.
+    progress
+        Told how far it is.
+
+    Returns
+    -------
+    SweepTable
+        All points.
+
+    Raises
+    ------
+    NlsError
+        If a name does not exist or a value does not fit it.
+    ExportError
+        If the folder cannot be written, is full, or holds another sweep.
+    WorkSharingError
+        If workers run other code, or their scheduler is not there.
+    MissingLibraryError
+        If pyarrow is not installed.
+    """
+    libraries()
+    return run_task(
+        sweep_task(actuator, axes=axes, ask=ask), Path(out),
+        executor=executor or Processes(), settings=settings, progress=progress or Quiet(),
+    )  # fmt: skip
+
+
+def run_task(
+    task: SweepTask, folder: Path, *, executor: Executor, settings: SweepSettings, progress: Progress
+) -> SweepTable:
+    """Run a checked sweep; see :func:`sweep`.
+
+    Parameters
+    ----------
+    task
+        The sweep.
+    folder
+        Of the results.
+    executor, settings, progress
+        As for :func:`sweep`.
+
+    Raises
+    ------
+    ExportError
+        If the folder cannot be written, is full, or holds another sweep.
+    WorkSharingError
+        If workers run other code, or their scheduler is not there.
+    """
+    with only_run(folder):
+        parts = opened(folder, task.about, task.columns, task.plan, again=settings.again)
+        written_about(folder, task.about, task.columns, task.assemblies)
+        standing = parts.standing(len(task.plan), with_failed=not settings.retry_failed)
+        left = len(task.plan) - int(standing.sum())
+        results = folder / RESULTS_FILE
+        if left:
+            results.unlink(missing_ok=True)
+            points = ((k, task.plan.point(k)) for k in range(len(task.plan)) if not standing[k])
+            _compute(task, parts, points, executor=executor, watch=_Watch(progress, len(task.plan), left))
+        if left or not results.exists():
+            progress.note("writing the table")
+            parts.finish()
+    return read_sweep(folder)
+
+
+def _compute(
+    task: SweepTask, parts: Parts, points: Iterator[tuple[int, Any]], *, executor: Executor, watch: _Watch
+) -> None:
+    rows: list[dict[str, Any]] = []
+    begin = written = time.monotonic()
+    outcomes = shared_map(task.work, points, executor, count=watch.left)
+    try:
+        with contextlib.closing(outcomes):  # type: ignore[type-var]
+            for batch in outcomes:
+                rows += [_row(task, each) for each in batch]
+                watch.count(batch)
+                now = time.monotonic()
+                patience = min(_LATEST_PART, max(_FIRST_PART, 0.02 * (now - begin)))
+                if len(rows) >= _MOST_ROWS or now - written > patience:
+                    parts.write(rows)
+                    rows, written = [], now
+    finally:
+        # Also when the run is interrupted: what has come is not computed again.
+        parts.write(rows)
+
+
+def _row(task: SweepTask, outcome: PointOutcome) -> dict[str, Any]:
+    answers = _answers(task.columns)
+    values = outcome.value if not outcome.reason else (math.nan,) * len(answers)
+    return {
+        "point": outcome.number,
+        **{c.name: v for c, v in zip(task.plan.columns, task.plan.point(outcome.number), strict=True)},
+        **dict(zip(answers, values, strict=True)),
+        "status": FAILED if outcome.reason else DONE,
+        "reason": outcome.reason,
+        "(seconds)": outcome.seconds,
+        "(worker)": outcome.worker,
+    }
+
+
+class _Watch:
+    """How far a run is, and how long it will take."""
+
+    def __init__(self, progress: Progress, total: int, left: int) -> None:
+        self._progress, self._total, self.left = progress, total, left
+        self._failed, self._done = 0, 0
+        self._begin = time.monotonic()
+
+    def count(self, batch: Sequence[PointOutcome]) -> None:
+        self._done += len(batch)
+        self._failed += sum(1 for each in batch if each.reason)
+        over = self._total - self.left + self._done
+        text = f"{over} of {self._total} points"
+        if self._failed:
+            text += f", {self._failed} failed"
+        if self._done:
+            seconds = (time.monotonic() - self._begin) / self._done * (self.left - self._done)
+            text += f", about {duration(seconds)} left"
+        self._progress.note(text)
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words of two units at most.
+
+    Parameters
+    ----------
+    seconds
+        Not negative.
+
+    Examples
+    --------
+    >>> duration(8.2), duration(754), duration(7600), duration(200000)
+    ('8 s', '12 min 34 s', '2 h 6 min', '2 d 7 h')
+    """
+    whole = round(seconds)
+    for large, small, size in (("d", "h", 86400), ("h", "min", 3600), ("min", "s", 60)):
+        if whole >= size:
+            part = {"h": 3600, "min": 60, "s": 1}[small]
+            return f"{whole // size} {large} {whole % size // part} {small}"
+    return f"{whole} s"

@@ -1,0 +1,81 @@
+"""Saltelli's plan as a set of axes: the points that Sobol indices with totals need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ValueRangeError, missing_library
+from .axes import AxisSet, BoundAxes
+from .axis_values import Given, Subject
+
+_MOST_BLOCKS = 2**24
+
+
+@dataclass(frozen=True)
+class SaltelliSample(AxisSet):
+    """Blocks of points of Saltelli's plan, from a scrambled Sobol sequence of twice as many dimensions.
+
+    A block has two points more than there are axes; with second order two more than twice the axes. The page
+    of the sweep sees the plan in the points, so it must be the only set of axes.
+
+    Parameters
+    ----------
+    ranges
+        Lower and upper end by name.
+    count
+        Number of blocks, a power of two.
+    second_order
+        Whether blocks also hold the reverse exchanges, which shares of pairs of axes need.
+    seed
+        Of the scrambling, 0 or larger.
+    """
+
+    ranges: Mapping[str, tuple[Given, Given]]
+    count: int
+    second_order: bool = False
+    seed: int = 0
+
+    def bound(self, subject: Subject) -> BoundAxes:
+        """Return the axes; see :meth:`AxisSet.bound`.
+
+        Raises
+        ------
+        ValueRangeError
+            If the number of blocks is no power of two, or a range is empty.
+        MissingLibraryError
+            If SALib is not installed.
+        NlsError
+            If a name does not exist, or a value does not fit it.
+        """
+        whole = isinstance(self.count, int) and not isinstance(self.count, bool)
+        if not whole or not 2 <= self.count <= _MOST_BLOCKS or self.count & (self.count - 1):
+            raise ValueRangeError(
+                f"Saltelli sample: count = {self.count}", "must be a power of two, from 2 on",
+                next_step="take for instance 256; the number of points is that times the axes plus two",
+            )  # fmt: skip
+        try:
+            from SALib.sample import sobol
+        except ModuleNotFoundError:
+            raise missing_library("a Saltelli sample", "SALib", "sensitivity") from None
+        columns, ends = [], []
+        for name, given in self.ranges.items():
+            column, values = subject.column(name, tuple(given), "saltelli")
+            if column.lower is None or len(values) != 2 or not values[0] < values[1]:
+                raise ValueRangeError(
+                    f"range of {name}", "must be two ascending numbers", next_step='write ["1 mm", "2 mm"]'
+                )
+            columns.append(column)
+            ends.append([float(value) for value in values])
+        if not columns:
+            raise ValueRangeError(
+                "Saltelli sample", "has no ranges", next_step='write ranges = {"NAME" = [1, 2]}'
+            )
+        unit = {"num_vars": len(columns), "names": list(self.ranges), "bounds": [[0.0, 1.0]] * len(columns)}
+        generator = np.random.default_rng(self.seed)
+        points = sobol.sample(unit, self.count, calc_second_order=self.second_order, seed=generator)
+        low, high = np.array(ends).T
+        rows = low + (high - low) * points
+        return BoundAxes(tuple(columns), len(rows), lambda number: tuple(rows[number].tolist()))

@@ -1,0 +1,215 @@
+"""A sweep in TOML: deck, axes, question; see :func:`read_sweep_file`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from ..components.assembly.deck_writer import declare
+from ..components.assembly.named_parts import Assembly
+from ..control import TorqueGains
+from ..deck import Deck, load_deck, read_deck
+from ..design import Target
+from ..design.jobs.job_file import built, job_in
+from ..errors import DeckError, NlsError, brief, unknown_name
+from ..quantity import parse_unit
+from ..reading import text_of
+from ..written_numbers import split_number
+from .axes import AxisSet, Grid, LatinHypercube, Listed, RandomDraws, SobolSample
+from .design_question import QUICK, DesignQuestion
+from .diagnosis_question import DiagnosisQuestion
+from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
+from .question import SweepQuestion
+from .run_sweep import SweepTask, sweep_task
+from .saltelli_sample import SaltelliSample
+
+_TABLES: Final = ("decks", "axes", "ask")
+_AXES: Final = {
+    each.__name__: each for each in (Grid, Listed, SobolSample, LatinHypercube, RandomDraws, SaltelliSample)
+}
+_QUESTIONS: Final = {
+    each.__name__: each
+    for each in (DesignQuestion, AngleQuestion, SpreadQuestion, LoopQuestion, DiagnosisQuestion)
+}
+
+
+def axis_kinds() -> dict[str, type]:
+    """Return the sets of axes that can stand in a sweep file, by name."""
+    return dict(_AXES)
+
+
+def question_kinds() -> dict[str, type]:
+    """Return the questions that can stand in a sweep file, by name."""
+    return dict(_QUESTIONS)
+
+
+def read_sweep_file(path: Path | str) -> SweepTask:
+    """Read and check a sweep.
+
+    ``decks`` names the deck that is swept, or several for an axis ``deck``. ``[[axes]]`` begins each set of
+    axes, ``[ask.QUESTION]`` holds the question, both with the names and fields of the Python objects. Numbers
+    carry their unit; bare ones are in SI. A design is asked with the tables of a design file.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    DeckError
+        If the file cannot be read, or a table is of the wrong kind; file, line and column are named.
+    UnknownNameError
+        If there is no such table, axis, question, field or deck, with the nearest that exists.
+    NlsError
+        If axes collide, or a number is refused by what it is for.
+
+    Examples
+    --------
+    A file::
+
+        decks = "austin2015_figure_consistent"
+
+        [[axes]]
+        Grid = {name = "spring.rubber.area", lower = "0.2 cm^2", upper = "0.8 cm^2", count = 7}
+
+        [[axes]]
+        Listed = {values = {"spring.rubber" = ["PMC-770", "Dragon_Skin_30"]}}
+
+        [ask.DesignQuestion]
+        free = ["spring.cam.contour", "spring.pretension"]
+        target.ExponentialTorque = {maximum = "5 N*m", angle = "53 deg", shape = 1.0}
+        limits.MaximumCamRadius = {radius = "30 mm"}
+    """
+    file = Path(path)
+    deck = read_deck(text_of(file, DeckError, next_step="give a sweep file in TOML, UTF-8"), file)
+    for key in [*deck.tables, *(["deck"] if deck.head else [])]:
+        if key not in _TABLES:
+            raise unknown_name(deck.place(key), key, _TABLES)
+    assemblies = _assemblies(deck, file.parent)
+    axes = [_axes(deck, number, given) for number, given in enumerate(_axes_tables(deck))]
+    return sweep_task(assemblies, axes=axes, ask=_question(deck))
+
+
+def _assemblies(deck: Deck, folder: Path) -> dict[str, Assembly]:
+    if "decks" not in deck.tables:
+        raise DeckError(deck.path.name, "names no deck", next_step='write decks = "..." above the tables')
+    given = deck.tables["decks"]
+    given = [given] if isinstance(given, str) else given
+    if not isinstance(given, list) or not given or not all(isinstance(each, str) for each in given):
+        raise DeckError(deck.place("decks"), f"{brief(given)} is no list of decks", next_step='write ["..."]')
+    made: dict[str, Assembly] = {}
+    for name in given:
+        beside = folder / name
+        read = load_deck(beside if name.endswith(".toml") and beside.exists() else name)
+        short = Path(name).stem
+        if short in made:
+            raise DeckError(deck.place("decks"), f"names '{short}' twice", next_step="leave one out")
+        made[short] = declare(read)
+    return made
+
+
+def _axes_tables(deck: Deck) -> list[Any]:
+    given = deck.tables.get("axes")
+    if not isinstance(given, list) or not given:
+        raise DeckError(
+            deck.place("axes"), "no axes are given",
+            next_step='write [[axes]] and below it Grid = {name = "...", lower = 1, upper = 2, count = 5}',
+        )  # fmt: skip
+    return given
+
+
+def _axes(deck: Deck, number: int, given: Any) -> AxisSet:
+    place = f"{deck.place('axes')}, number {number + 1}"
+    if not isinstance(given, Mapping) or len(given) != 1:
+        raise DeckError(place, "must hold one set of axes", next_step=f"write one of: {', '.join(_AXES)}")
+    ((name, fields),) = given.items()
+    if name not in _AXES:
+        raise unknown_name(place, name, _AXES)
+    made: AxisSet = _made(_AXES[name], fields, place)
+    return made
+
+
+def _made(kind: type, fields: Any, place: str) -> Any:
+    """Return an object of a table whose values are checked where they are used."""
+    if not isinstance(fields, Mapping):
+        raise DeckError(place, f"{brief(fields)} is not a table", next_step="write {field = ..., ...}")
+    known = {field.name: field for field in dataclasses.fields(kind)}
+    for field in fields:
+        if field not in known:
+            raise unknown_name(f"{place}: {kind.__name__}: field", field, known)
+    missing = [n for n, f in known.items() if n not in fields and f.default is dataclasses.MISSING]
+    if missing:
+        raise DeckError(place, f"{kind.__name__} lacks {', '.join(missing)}",
+                        next_step=f"fields are: {', '.join(known)}")  # fmt: skip
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}
+    try:
+        return kind(**values)
+    except NlsError as error:
+        raise error.at(place) from None
+
+
+def _question(deck: Deck) -> SweepQuestion:
+    given = deck.tables.get("ask")
+    if not isinstance(given, Mapping) or len(given) != 1:
+        raise DeckError(
+            deck.place("ask"), "must hold one question",
+            next_step=f"write [ask.NAME], one of: {', '.join(_QUESTIONS)}",
+        )  # fmt: skip
+    ((name, fields),) = given.items()
+    if name not in _QUESTIONS:
+        raise unknown_name(deck.place("ask"), name, _QUESTIONS)
+    place = deck.place(f"ask.{name}")
+    if name == DesignQuestion.__name__:
+        return _design(deck, fields)
+    if isinstance(fields, Mapping) and "gains" in fields and name == LoopQuestion.__name__:
+        fields = {**fields, "gains": built(deck, TorqueGains, fields["gains"], f"{place}: gains")}
+    made: SweepQuestion = _made(_QUESTIONS[name], _in_si(_QUESTIONS[name], fields, place), place)
+    if isinstance(made, DiagnosisQuestion):
+        beside = deck.path.parent / made.records
+        made = dataclasses.replace(made, records=str(beside.resolve() if beside.is_dir() else made.records))
+    return made
+
+
+def _in_si(kind: type, fields: Any, place: str) -> Any:
+    """Return the fields of a question with numbers in SI, each of the kind of its default."""
+    if not isinstance(fields, Mapping):
+        return fields
+    defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+    values: dict[str, Any] = {}
+    for name, value in fields.items():
+        default, new = defaults.get(name), value
+        if isinstance(default, float) and isinstance(value, str):
+            try:
+                number, unit = split_number(value)
+                new = number * parse_unit(unit or "1").factor
+            except NlsError as error:
+                raise error.at(f"{place}: {name}") from None
+        elif isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):
+            new = float(value)
+        if isinstance(default, bool | int | float | str) and not isinstance(new, type(default)):
+            raise DeckError(f"{place}: {name}", f"{brief(value)} is not of the kind of {default!r}")
+        values[name] = new
+    return values
+
+
+def _design(deck: Deck, fields: Any) -> DesignQuestion:
+    prefix = f"ask.{DesignQuestion.__name__}"
+    if not isinstance(fields, Mapping):
+        raise DeckError(deck.place(prefix), "is no table", next_step=f"write [{prefix}]")
+    places = {k.removeprefix(f"{prefix}."): v for k, v in deck.places.items() if k.startswith(f"{prefix}.")}
+    job = job_in(Deck(deck.name, "", deck.path, fields, places))
+    if not isinstance(job.target, Target) or any(not isinstance(each, str) for each in job.free or ()):
+        raise DeckError(
+            deck.place(prefix), "has a stock, or a task in place of a target",
+            next_step="make the stock an axis (Listed), and the curve for the task a file",
+        )  # fmt: skip
+    search = fields.get("search", {})
+    settings = dataclasses.replace(
+        QUICK, seed=job.settings.seed, largest_error=job.settings.largest_error,
+        starts=job.settings.starts if "starts" in search else QUICK.starts,
+    )  # fmt: skip
+    free = None if job.free is None else tuple(str(each) for each in job.free)
+    return DesignQuestion(job.target, free, job.keep, job.goals, job.spring or "", settings)

@@ -1,0 +1,296 @@
+"""The folder of a sweep: what it holds, whether a run may go on in it, and that only one run does."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from ..components.assembly.deck_writer import deck_digest, deck_text
+from ..components.assembly.named_parts import Assembly
+from ..errors import ExportError, MeasurementError
+from ..work_sharing import CodeIdentity, code_identity
+from ..writing import make_folder, write_text
+from .columns import RESULTS_FILE, Column
+from .parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
+from .plan import Plan
+from .sweep_table import ABOUT_FILE, DECK_FILE, DECKS_FOLDER, about_text, read_about
+
+CODE_FILE: Final = "code.json"
+LOCK_FILE: Final = ".running"
+_LIBRARIES: Final = ("casadi", "numpy", "scipy")
+_LOCK_SECONDS: Final = 5.0
+_SHOWN: Final = 4
+
+
+def about_sweep(
+    assemblies: Mapping[str, Assembly], plan: Plan, *, question: str, asked: str, seeds: list[int]
+) -> dict[str, Any]:
+    """Return what ``sweep.json`` says of a sweep; the same wherever it is computed.
+
+    Parameters
+    ----------
+    assemblies
+        By the name of their deck; the first is swept.
+    plan
+        Its points.
+    question
+        Kind of question.
+    asked
+        The question in full.
+    seeds
+        Of the axes.
+    """
+    code = code_identity()
+    first, base = next(iter(assemblies.items()))
+    return {
+        "question": question,
+        "asked": hashlib.sha256(asked.encode()).hexdigest(),
+        "deck": first,
+        "digest": deck_digest(base),
+        "decks": {name: deck_digest(each) for name, each in assemblies.items()},
+        "version": code.version,
+        "code": code.digest,
+        "libraries": {name: importlib.metadata.version(name) for name in _LIBRARIES},
+        "seed": seeds[0] if seeds else None,
+        "seeds": seeds,
+        "points": len(plan),
+        "plan": plan.digest(),
+    }
+
+
+@contextlib.contextmanager
+def only_run(folder: Path) -> Iterator[None]:
+    """Make the folder and hold it for this run until the end of the block, or of this process.
+
+    Parameters
+    ----------
+    folder
+        Of the sweep.
+
+    Raises
+    ------
+    ExportError
+        If the folder cannot be made or written, or another run is at work in it.
+    """
+    make_folder(folder)
+    try:
+        handle = os.open(folder / LOCK_FILE, os.O_CREAT | os.O_RDWR, 0o644)
+    except OSError as error:
+        raise ExportError(
+            str(folder), f"cannot be written ({error.strerror})", next_step="name another folder"
+        ) from None
+    try:
+        _lock(handle, folder)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _lock(handle: int, folder: Path) -> None:
+    try:
+        import fcntl
+    except ModuleNotFoundError:  # of Windows: two runs in one folder are not noticed there
+        return
+    end = time.monotonic() + _LOCK_SECONDS
+    while True:
+        try:
+            # A lock of the process, which is not inherited by its workers and ends with it.
+            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError:
+            if time.monotonic() > end:
+                raise ExportError(
+                    str(folder), "is in use by another run of this sweep",
+                    next_step="wait for it, end it, or name another folder",
+                ) from None  # fmt: skip
+            time.sleep(0.1)
+
+
+def opened(
+    folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...], plan: Plan, *, again: bool
+) -> Parts:
+    """Return the parts of a sweep that goes on, or begins; points of other axes that fit are taken over.
+
+    Parameters
+    ----------
+    folder
+        Of the sweep; held by this run.
+    about, columns
+        Of the sweep that is to be run.
+    plan
+        Its points.
+    again
+        Whether everything that the folder holds of a sweep is thrown away first.
+
+    Raises
+    ------
+    ExportError
+        If the folder holds another sweep, one that other code computed, or files of something else.
+    """
+    if again:
+        _emptied(folder)
+    if not (folder / ABOUT_FILE).exists():
+        foreign = [name for name in (RESULTS_FILE, TIMINGS_FILE, PARTS_FOLDER) if (folder / name).exists()]
+        if foreign:
+            raise ExportError(
+                str(folder / foreign[0]), f"stands there without the {ABOUT_FILE} of its sweep",
+                next_step="name another folder, or throw it away by --again (in Python again=True)",
+            )  # fmt: skip
+        return Parts(folder, columns)
+    old = _standing(folder)
+    _require_same(folder, old[0], about)
+    if _names(old[1]) != _names(columns):
+        raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
+    parts = Parts(folder, columns)
+    if old[0].get("plan") != about["plan"]:
+        (folder / RESULTS_FILE).unlink(missing_ok=True)
+        parts.replace_all(_adopted(folder, [c.name for c in columns if c.role == "axis"], plan))
+    return parts
+
+
+def _standing(folder: Path) -> tuple[dict[str, Any], tuple[Column, ...]]:
+    try:
+        return read_about(folder)
+    except MeasurementError as error:
+        raise ExportError(
+            error.thing, error.rule, next_step="name another folder, or throw it away by --again"
+        ) from None
+
+
+def written_about(
+    folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...], assemblies: Mapping[str, Assembly]
+) -> None:
+    """Write what is asked, the decks and the digests of the code.
+
+    Parameters
+    ----------
+    folder
+        Of the sweep.
+    about, columns
+        Of the sweep.
+    assemblies
+        By the name of their deck.
+    """
+    for number, (name, assembly) in enumerate(assemblies.items()):
+        write_text(
+            folder / DECKS_FOLDER / f"{name}.toml" if number else folder / DECK_FILE, deck_text(assembly)
+        )
+    write_text(folder / CODE_FILE, json.dumps(dict(code_identity().files), indent=0) + "\n")
+    write_text(folder / ABOUT_FILE, about_text(about, columns))
+
+
+def _names(columns: tuple[Column, ...]) -> list[str]:
+    return [column.name for column in columns if column.role != "state"]
+
+
+def _require_same(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+    if old.get("digest") != new["digest"] or old.get("decks") != new["decks"]:
+        raise _another(folder, f"its deck '{old.get('deck')}' has other numbers or parts")
+    if (old.get("version"), old.get("code")) != (new["version"], new["code"]):
+        was = CodeIdentity(str(old.get("version")), str(old.get("code")))
+        raise _another(folder, f"it was computed by {was}, this is {code_identity()}{_changed_files(folder)}")
+    if old.get("libraries") != new["libraries"]:
+        raise _another(folder, f"it was computed with {_listed(old.get('libraries'))}, here are "
+                               f"{_listed(new['libraries'])}")  # fmt: skip
+    if old.get("asked") != new["asked"]:
+        raise _another(
+            folder, f"its question ({old.get('question')}) is another one, or its source was changed"
+        )
+
+
+def _listed(libraries: Any) -> str:
+    return ", ".join(f"{k} {v}" for k, v in libraries.items()) if isinstance(libraries, dict) else "others"
+
+
+def _changed_files(folder: Path) -> str:
+    """Return which files of the package are others than those that computed a folder."""
+    try:
+        old = json.loads((folder / CODE_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    new = code_identity().files
+    changed = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
+    more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
+    return f"; changed: {', '.join(changed[:_SHOWN])}{more}" if changed else ""
+
+
+def _another(folder: Path, why: str) -> ExportError:
+    return ExportError(
+        str(folder), f"holds another sweep: {why}",
+        next_step="name another folder, or compute everything anew by --again (in Python again=True)",
+    )  # fmt: skip
+
+
+def _emptied(folder: Path) -> None:
+    """Throw away what a sweep has written, and nothing else."""
+    for name in (RESULTS_FILE, TIMINGS_FILE, ABOUT_FILE, CODE_FILE, DECK_FILE):
+        (folder / name).unlink(missing_ok=True)
+    for name in (PARTS_FOLDER, DECKS_FOLDER):
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
+def _adopted(folder: Path, axes: list[str], plan: Plan) -> Iterator[Any]:
+    """Yield the parts of other axes with the numbers that their points have now; -1 for those that left."""
+    import pyarrow
+    from pyarrow import parquet
+
+    marks = np.fromiter((_mark(values) for _, values in plan.points()), dtype=np.uint64, count=len(plan))
+    order = np.argsort(marks)
+    ranked = marks[order]
+    for path in part_files(folder):
+        table = parquet.read_table(path)
+        rows = zip(*(table.column(name).to_pylist() for name in axes), strict=True)
+        numbers = [_place(values, plan, ranked, order) for values in rows]
+        place = table.schema.get_field_index("point")
+        yield table.set_column(place, "point", pyarrow.array(numbers, pyarrow.int64())).cast(table.schema)
+
+
+def _mark(values: tuple[Any, ...]) -> int:
+    return int.from_bytes(hashlib.blake2b(repr(values).encode(), digest_size=8).digest(), "big")
+
+
+def _place(values: tuple[Any, ...], plan: Plan, ranked: Any, order: Any) -> int:
+    """Return the number of a point by its values; the mark only says where to look."""
+    mark = np.uint64(_mark(values))
+    place = int(np.searchsorted(ranked, mark))
+    while place < len(ranked) and ranked[place] == mark:
+        if plan.point(int(order[place])) == values:
+            return int(order[place])
+        place += 1
+    return -1
+
+
+def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Column, ...]) -> int:
+    """Return how many points of a sweep stand in a folder; nothing is written.
+
+    Parameters
+    ----------
+    folder
+        That may not exist.
+    about, columns
+        Of the sweep.
+
+    Raises
+    ------
+    ExportError
+        If the folder holds another sweep.
+    """
+    if not (folder / ABOUT_FILE).exists():
+        return 0
+    old = _standing(folder)
+    _require_same(folder, old[0], about)
+    if _names(old[1]) != _names(columns):
+        raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
+    if old[0].get("plan") != about["plan"]:
+        return 0
+    return len(rows_in_order(folder, columns)["point"])

@@ -1,0 +1,217 @@
+"""The table of a sweep: one row per point, in the order of the points, with what was asked beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..components.assembly.deck_writer import declare
+from ..components.assembly.named_parts import Assembly
+from ..deck import read_deck
+from ..errors import DeckError, MeasurementError, unknown_name
+from ..reading import is_there, text_of
+from .changes import changed_assembly
+from .columns import DONE, RESULTS_FILE, STATE_COLUMNS, Column
+from .parts import libraries, rows_in_order
+
+__all__ = ["STATE_COLUMNS", "Column", "SweepTable", "about_text", "read_about", "read_sweep"]
+
+FORMAT: Final = "nlsdesign sweep 1"
+ABOUT_FILE: Final = "sweep.json"
+DECK_FILE: Final = "deck.toml"
+DECKS_FOLDER: Final = "decks"
+
+
+@dataclass(frozen=True, eq=False)
+class SweepTable:
+    """Points and answers of a sweep.
+
+    Parameters
+    ----------
+    columns
+        Of the table.
+    values
+        By name of the column, one for each point: numbers in SI as float64, ``point`` as int64, words as
+        texts.
+    about
+        What ``sweep.json`` holds: question, deck, digest, version, seed.
+    decks
+        Text of the decks behind the points by name; the first is the one that was swept.
+    """
+
+    columns: tuple[Column, ...]
+    values: Mapping[str, NDArray[Any]]
+    about: Mapping[str, Any] = field(default_factory=dict)
+    decks: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.values["point"])
+
+    @property
+    def axes(self) -> tuple[Column, ...]:
+        """Columns that were chosen."""
+        return tuple(column for column in self.columns if column.role == "axis")
+
+    @property
+    def answers(self) -> tuple[Column, ...]:
+        """Columns that were answered."""
+        return tuple(column for column in self.columns if column.role == "answer")
+
+    @property
+    def done(self) -> NDArray[np.bool_]:
+        """Which points have answers."""
+        result: NDArray[np.bool_] = self.values["status"] == DONE
+        return result
+
+    def column(self, name: str) -> Column:
+        """Return one column.
+
+        Parameters
+        ----------
+        name
+            Of an axis, an answer or a state.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest that exists.
+        """
+        for each in self.columns:
+            if each.name == name:
+                return each
+        raise unknown_name("column", name, (each.name for each in self.columns))
+
+    def row_of(self, point: int) -> int:
+        """Return the row of a point; rows and points differ where a sweep is not finished.
+
+        Parameters
+        ----------
+        point
+            Number of the point, from 0.
+
+        Raises
+        ------
+        UnknownNameError
+            If the table has no such point.
+        """
+        rows = np.flatnonzero(self.values["point"] == point)
+        if not len(rows):
+            shown = f"{self.values['point'][0]} to {self.values['point'][-1]}" if len(self) else "none"
+            raise unknown_name("point", str(point), [shown])
+        return int(rows[0])
+
+    def assembly_at(self, point: int) -> Assembly:
+        """Return the assembly behind a point: its deck with the numbers and materials of the point.
+
+        Parameters
+        ----------
+        point
+            Number of the point, from 0.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such point.
+        MeasurementError
+            If the decks do not stand beside the table.
+        """
+        row = self.row_of(point)
+        if not self.decks:
+            raise MeasurementError("sweep", f"has no {DECK_FILE} beside its table",
+                                   next_step="run the sweep again into another folder")  # fmt: skip
+        values = {axis.name: self.values[axis.name][row] for axis in self.axes}
+        return changed_assembly(self._assemblies(), values)
+
+    def _assemblies(self) -> dict[str, Assembly]:
+        return {name: declare(read_deck(text, Path(f"{name}.toml"))) for name, text in self.decks.items()}
+
+
+def about_text(about: Mapping[str, Any], columns: tuple[Column, ...]) -> str:
+    """Return what stands in ``sweep.json``.
+
+    Parameters
+    ----------
+    about
+        What was asked.
+    columns
+        Of the table.
+    """
+    content = {"format": FORMAT, **about, "columns": [asdict(column) for column in columns]}
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def read_about(folder: Path) -> tuple[dict[str, Any], tuple[Column, ...]]:
+    """Return what ``sweep.json`` says, and the columns.
+
+    Parameters
+    ----------
+    folder
+        Of a sweep.
+
+    Raises
+    ------
+    MeasurementError
+        If there is no such file, or it is of another format.
+    """
+    path = folder / ABOUT_FILE
+    if not is_there(path):
+        raise MeasurementError(str(path), "no such file",
+                               next_step="name the folder that 'nlsdesign sweep' wrote")  # fmt: skip
+    try:
+        content = json.loads(text_of(path, MeasurementError))
+        columns = tuple(Column(**each) for each in content["columns"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        content, columns = {}, ()
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise MeasurementError(str(path), f"is no '{FORMAT}'", next_step="run the sweep again")
+    return content, columns
+
+
+def read_sweep(folder: Path | str) -> SweepTable:
+    """Return the table of a sweep, also of one that is not finished, with the points that it has.
+
+    Parameters
+    ----------
+    folder
+        That ``nlsdesign sweep`` wrote.
+
+    Raises
+    ------
+    MeasurementError
+        If the folder holds no sweep, or a file in it is damaged.
+    MissingLibraryError
+        If pyarrow is not installed.
+    """
+    place = Path(folder)
+    about, columns = read_about(place)
+    results = place / RESULTS_FILE
+    values = _columns_of(results, columns) if is_there(results) else rows_in_order(place, columns)
+    return SweepTable(columns, values, about, _decks(place, about))
+
+
+def _columns_of(path: Path, columns: tuple[Column, ...]) -> dict[str, NDArray[Any]]:
+    pyarrow, parquet = libraries()
+    try:
+        table = parquet.read_table(path, memory_map=True)
+        return {column.name: table.column(column.name).to_numpy() for column in columns}
+    except (OSError, KeyError, pyarrow.ArrowException) as error:
+        raise MeasurementError(
+            str(path), f"cannot be read as the table of a sweep ({error})",
+            next_step="remove it and run the same sweep again: finished points are not computed again",
+        ) from None  # fmt: skip
+
+
+def _decks(folder: Path, about: Mapping[str, Any]) -> dict[str, str]:
+    path = folder / DECK_FILE
+    if not is_there(path):
+        return {}
+    decks = {str(about.get("deck", "deck")): text_of(path, DeckError)}
+    for each in sorted((folder / DECKS_FOLDER).glob("*.toml")):
+        decks[each.stem] = text_of(each, DeckError)
+    return decks

@@ -1,0 +1,27 @@
+"""Work shared among workers: this process, processes of this machine, a Dask scheduler, ranks of MPI.
+
+Sweeps import it. It knows functions, points and workers, and nothing of what is computed; it is the only
+room that may import ``distributed``, ``dask`` and ``mpi4py``.
+"""
+
+from .chunks import PointOutcome
+from .crew import Executor
+from .dask_scheduler import DaskScheduler
+from .identity import CodeIdentity, code_identity
+from .in_this_process import InThisProcess
+from .mpi_ranks import MpiRanks
+from .shared_map import ChunkSizes, shared_map
+from .worker_processes import Processes
+
+__all__ = [
+    "ChunkSizes",
+    "CodeIdentity",
+    "DaskScheduler",
+    "Executor",
+    "InThisProcess",
+    "MpiRanks",
+    "PointOutcome",
+    "Processes",
+    "code_identity",
+    "shared_map",
+]

@@ -1,0 +1,57 @@
+"""What every executor offers: a crew of workers that takes chunks and gives back outcomes or losses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
+
+from .chunks import Chunk, Loss, PointOutcome
+
+Finished = tuple[Chunk, list[PointOutcome] | Loss]
+
+
+class Crew(Protocol):
+    """Workers that stand ready for one function."""
+
+    def free(self) -> int:
+        """Return how many more chunks can be given now."""
+        ...
+
+    def workers(self) -> int:
+        """Return the number of workers."""
+        ...
+
+    def submit(self, chunk: Chunk) -> None:
+        """Give one chunk to a worker.
+
+        Parameters
+        ----------
+        chunk
+            Points.
+        """
+        ...
+
+    def finished(self, seconds: float) -> list[Finished]:
+        """Return what has come to an end; an empty list after that time.
+
+        Parameters
+        ----------
+        seconds
+            To wait at most.
+        """
+        ...
+
+
+class Executor(Protocol):
+    """Where work is done; chosen by the caller."""
+
+    def crew(self, work: Callable[[Any], Any]) -> AbstractContextManager[Crew]:
+        """Return workers for one function; they end with the block.
+
+        Parameters
+        ----------
+        work
+            Asked of each point.
+        """
+        ...

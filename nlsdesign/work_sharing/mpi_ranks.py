@@ -1,0 +1,122 @@
+"""Ranks of MPI as workers, and any executor of the standard library's kind."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import pickle
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import WorkSharingError, missing_library
+from .chunks import Chunk, Loss, Refusal, computed_elsewhere, reason_of
+from .crew import Crew, Finished
+from .identity import own_identity
+from .refusals import refused, sendable
+
+
+@dataclass(frozen=True)
+class MpiRanks:
+    """Ranks of ``mpiexec -n RANKS python -m mpi4py.futures -m nlsdesign sweep ... --mpi``; one drives.
+
+    MPI ends all ranks when one dies, so a death ends the run; the next one resumes.
+    """
+
+    @contextmanager
+    def crew(self, work: Callable[[Any], Any]) -> Iterator[Crew]:
+        """Yield the other ranks.
+
+        Parameters
+        ----------
+        work
+            Asked of each point; pickled.
+
+        Raises
+        ------
+        MissingLibraryError
+            If mpi4py is not installed.
+        WorkSharingError
+            If there is no other rank.
+        """
+        try:
+            from mpi4py import futures
+        except ModuleNotFoundError:
+            raise missing_library("work over MPI", "mpi4py", "mpi") from None
+        with futures.MPIPoolExecutor() as pool:
+            ranks = int(pool.num_workers)
+            if ranks < 1:
+                raise WorkSharingError(
+                    "MPI", "has no rank beside the one that drives",
+                    next_step="start it with: mpiexec -n 3 python -m mpi4py.futures -m nlsdesign sweep ...",
+                )  # fmt: skip
+            yield FuturesCrew(pool, work, ranks)
+
+
+class FuturesCrew:
+    """Workers behind an executor of ``concurrent.futures``.
+
+    Parameters
+    ----------
+    pool
+        The executor.
+    work
+        Asked of each point; pickled.
+    count
+        Number of workers.
+    """
+
+    def __init__(self, pool: concurrent.futures.Executor, work: Callable[[Any], Any], count: int) -> None:
+        self._pool, self._count = pool, count
+        self._payload = sendable(work)
+        self._flying: dict[concurrent.futures.Future[bytes | Refusal], Chunk] = {}
+
+    def free(self) -> int:
+        """Return how many more chunks can be given now: one waits at each worker."""
+        return 2 * self._count - len(self._flying)
+
+    def workers(self) -> int:
+        """Return the number of workers."""
+        return self._count
+
+    def submit(self, chunk: Chunk) -> None:
+        """Give one chunk to the executor.
+
+        Parameters
+        ----------
+        chunk
+            Points.
+        """
+        expected = own_identity()
+        self._flying[self._pool.submit(computed_elsewhere, self._payload, chunk, expected)] = chunk
+
+    def finished(self, seconds: float) -> list[Finished]:
+        """Return what has come to an end.
+
+        Parameters
+        ----------
+        seconds
+            To wait at most.
+
+        Raises
+        ------
+        WorkSharingError
+            If a worker runs other code or has died.
+        """
+        ended, _ = concurrent.futures.wait(
+            self._flying, seconds, return_when=concurrent.futures.FIRST_COMPLETED
+        )
+        return [(self._flying.pop(each), _outcome(each)) for each in ended]
+
+
+def _outcome(future: concurrent.futures.Future[bytes | Refusal]) -> list[Any] | Loss:
+    try:
+        answer = future.result()
+    except concurrent.futures.BrokenExecutor as error:
+        raise WorkSharingError(
+            "workers", f"are gone: {reason_of(error)}", next_step="run the same command again: it resumes"
+        ) from None
+    if isinstance(answer, Refusal):
+        raise refused(answer)
+    outcomes: list[Any] = pickle.loads(answer)
+    return outcomes
