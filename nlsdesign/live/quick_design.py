@@ -168,7 +168,7 @@ class QuickSolver:
             Any.
         """
         key = structure_of(question)
-        if key not in self._programs:
+        if key not in self._programs or not self._programs[key].fits(question):
             self._programs[key] = QuickProgram(question)
             self._programs[key].prepare()
         self._programs.move_to_end(key)
