@@ -14,6 +14,7 @@ from ..components.materials.library import materials
 from ..errors import NlsError, ValueRangeError, brief, unknown_name
 from .answers import LiveAnswer, to_json
 from .archive import archived, unarchived
+from .background import warm_up
 from .edits import edit_from
 from .exports import ExportDesign
 from .gallery import gallery, gallery_question, question_of_deck
@@ -59,6 +60,7 @@ class SessionDesign:
         self._settle_at: float | None = None
         self._look_due = False
         self._file_for: int | None = None
+        warm_up()
         try:
             self._live = LiveDesign(_question(deck))
         except NlsError as error:
