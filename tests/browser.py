@@ -131,7 +131,9 @@ class Tab:
 
     def mouse(self, kind: str, x: float, y: float) -> None:
         """Press, move or release the left button at a place in CSS pixels."""
-        self.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", buttons=1, clickCount=1)
+        self.ask(
+            "Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", buttons=1, clickCount=1
+        )
 
     def picture(self, path: Path) -> Path:
         """Write the whole page as PNG."""

@@ -87,7 +87,18 @@ __all__ = [
     "to_json",
 ]
 
-_PLACES = ("answers", "background", "edits", "exports", "full_design", "gallery", "live_design", "question", "saved", "work")
+_PLACES = (
+    "answers",
+    "background",
+    "edits",
+    "exports",
+    "full_design",
+    "gallery",
+    "live_design",
+    "question",
+    "saved",
+    "work",
+)
 
 
 def __getattr__(name: str) -> object:

@@ -125,7 +125,9 @@ class Access:
         if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and not _opened(headers):
             return Refusal(403, "Another page may not load parts of the live page.")
         if (socket or scope["path"].startswith("/api/")) and not self._shown(headers, socket=socket):
-            return Refusal(401, "Open the address that nlsdesign serve has printed; its token is missing here.")
+            return Refusal(
+                401, "Open the address that nlsdesign serve has printed; its token is missing here."
+            )
         return None
 
     def _shown(self, headers: dict[str, str], *, socket: bool) -> bool:

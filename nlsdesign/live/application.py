@@ -99,7 +99,9 @@ class _Answers:
         kept = socket.query_params.get("session", "")
         session = self._sessions.get(kept) or await self._sessions.new()
         if session is None:
-            words = f"{MOST} designs are open, which is the most: close one of their tabs, then load this again."
+            words = (
+                f"{MOST} designs are open, which is the most: close one of their tabs, then load this again."
+            )
             await socket.send_json({"what": "refused", "reason": words})
             await socket.close(4429)
             return

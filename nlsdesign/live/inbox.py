@@ -36,7 +36,9 @@ class Inbox:
             drag = _drag(message)
             last = self._waiting[-1] if self._waiting else {}
             if drag is not None and drag == _drag(last):
-                self._waiting[-1] = message  # nothing came between the two that could depend on the earlier one
+                self._waiting[-1] = (
+                    message  # nothing came between the two that could depend on the earlier one
+                )
             elif "server" in message or len(self._waiting) < MOST:
                 self._waiting.append(message)
             self._condition.notify()

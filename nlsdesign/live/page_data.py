@@ -40,7 +40,8 @@ def design_data(design: DesignView | None) -> dict[str, Any] | None:
     if design is None:
         return None
     columns = [
-        {"name": each.name, "unit": each.unit, "values": short_numbers(each.values)} for each in design.columns
+        {"name": each.name, "unit": each.unit, "values": short_numbers(each.values)}
+        for each in design.columns
     ]
     said: dict[str, Any] = to_json(dataclasses.replace(design, columns=(), contour=np.zeros((0, 2))))
     return {**said, "columns": columns}

@@ -60,7 +60,9 @@ class Uploads:
         kept = plain_name(name)
         others = sum(size for each, size in self._sizes.items() if each != kept)
         if kept not in self._sizes and len(self._sizes) >= FILES:
-            raise TooLargeError("files", f"{FILES} of them are there, which is the most", next_step="remove some")
+            raise TooLargeError(
+                "files", f"{FILES} of them are there, which is the most", next_step="remove some"
+            )
         most = min(FILE_BYTES, ALL_BYTES - others)
         if announced is not None and announced > most:
             raise too_large(kept, most)
@@ -121,7 +123,9 @@ def plain_name(name: str) -> str:
     last = re.split(r"[/\\]", name)[-1]
     _, dot, ending = last.rpartition(".")
     if dot + ending.lower() not in ENDINGS:
-        raise NlsError(f"file '{last}'", "is no table of records", next_step=f"take one of {', '.join(ENDINGS)}")
+        raise NlsError(
+            f"file '{last}'", "is no table of records", next_step=f"take one of {', '.join(ENDINGS)}"
+        )
     return "records.toml" if ending.lower() == "toml" else plain_letters(last)
 
 

@@ -54,7 +54,9 @@ def tab(opened: Tab) -> Tab:
 
 def settled(tab: Tab, change: str, before: object) -> object:
     """Wait until something on the page is another than before."""
-    return tab.until(f"(() => {{ const now = {change}; return now !== {before!r} && now; }})()".replace("None", "null"))
+    return tab.until(
+        f"(() => {{ const now = {change}; return now !== {before!r} && now; }})()".replace("None", "null")
+    )
 
 
 def resting(tab: Tab) -> None:
@@ -75,7 +77,11 @@ def test_the_page_shows_a_design_asks_nobody_else_and_says_nothing_on_the_consol
 ) -> None:
     assert tab.evaluate("document.querySelectorAll('#panels .card:not([hidden]) path.line').length") >= 7
     assert tab.evaluate("document.querySelectorAll('.mechanism .cable').length") >= 1
-    foreign = [each for each in tab.requests if not each.startswith((server.origin, server.origin.replace("http", "ws")))]
+    foreign = [
+        each
+        for each in tab.requests
+        if not each.startswith((server.origin, server.origin.replace("http", "ws")))
+    ]
     assert foreign == []
     assert tab.messages == []
     assert tab.evaluate("location.href") == f"{server.origin}/", "the token stays in the address"
@@ -85,7 +91,10 @@ def test_the_page_shows_a_design_asks_nobody_else_and_says_nothing_on_the_consol
 
 def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back(tab: Tab) -> None:
     point = POINT.format(3)
-    before, curve = tab.evaluate(point), tab.evaluate("document.querySelector('#torque .line.blue').getAttribute('d')")
+    before, curve = (
+        tab.evaluate(point),
+        tab.evaluate("document.querySelector('#torque .line.blue').getAttribute('d')"),
+    )
     x, y = tab.evaluate(HANDLE.format(3))
     tab.mouse("Pressed", x, y)
     for step in range(1, 13):
@@ -112,7 +121,9 @@ def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
     for _ in range(90):
         tab.press("Tab")
         reached.append(
-            tab.evaluate("(() => { const e = document.activeElement; return `${e.getAttribute('class') ?? ''}#${e.id}`; })()")
+            tab.evaluate(
+                "(() => { const e = document.activeElement; return `${e.getAttribute('class') ?? ''}#${e.id}`; })()"
+            )
         )
         if reached[-1] == "#angle":
             break
@@ -127,7 +138,9 @@ def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
     fine = settled(tab, value, before)
     tab.press("ArrowUp", shift=True)
     coarse = settled(tab, value, fine)
-    numbers = [float(str(each).split()[0]) * (1e-3 if " mN" in str(each) else 1.0) for each in (before, fine, coarse)]
+    numbers = [
+        float(str(each).split()[0]) * (1e-3 if " mN" in str(each) else 1.0) for each in (before, fine, coarse)
+    ]
     assert numbers[2] - numbers[1] == pytest.approx(10.0 * (numbers[1] - numbers[0]), rel=0.1)
     said = "document.getElementById('said').textContent"
     tab.until(f"{said}.includes('rms error') && {said}.startsWith({str(coarse).split()[0]!r})")
@@ -144,7 +157,9 @@ def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
 
 
 @pytest.mark.parametrize("width", [375, 320])
-def test_nothing_is_wider_than_a_small_screen_and_points_are_large_enough_to_touch(tab: Tab, width: int) -> None:
+def test_nothing_is_wider_than_a_small_screen_and_points_are_large_enough_to_touch(
+    tab: Tab, width: int
+) -> None:
     tab.look(width)
     tab.until("document.querySelector('#torque svg').getBoundingClientRect().width < 400")
     assert tab.evaluate(WIDEST) == []

@@ -59,7 +59,9 @@ def test_the_page_is_sent_with_a_policy_that_lets_it_load_nothing_from_elsewhere
         assert server.ask("GET", part)[0] == 200
 
 
-@pytest.mark.parametrize("path", ["/page/../access.py", "/page/%2e%2e/access.py", "/page//etc/passwd", "/api/"])
+@pytest.mark.parametrize(
+    "path", ["/page/../access.py", "/page/%2e%2e/access.py", "/page//etc/passwd", "/api/"]
+)
 def test_no_file_is_sent_but_those_of_the_page(server: Server, path: str) -> None:
     assert server.ask("GET", path, {"Authorization": f"Bearer {server.token}"})[0] == 404
 
