@@ -49,7 +49,10 @@ def serve(
 
 
 def _checked(name: str) -> str:
-    """Return a name that the page can begin with; a deck that cannot be read ends the command, not the page."""
+    """Return a name that the page can begin with.
+
+    A deck that cannot be read ends the command, not the page.
+    """
     from ..components.assembly.deck_template import template_names
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck

@@ -13,7 +13,7 @@ from ..errors import NlsError
 from .access import PROTOCOL, Access, Application, gate
 from .session_process import content_of
 from .sessions import MOST, Session, Sessions
-from .uploads import DECK_BYTES, TooLargeError, Uploads, too_large
+from .uploads import DECK_BYTES, TooLargeError, too_large
 
 if TYPE_CHECKING:
     from starlette.requests import Request

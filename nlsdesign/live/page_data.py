@@ -1,4 +1,4 @@
-"""Answers as the page takes them: seven digits, not more points than a screen shows, nothing it does not show."""
+"""Answers as the page takes them: seven digits, no more points than a screen shows, nothing unseen."""
 
 from __future__ import annotations
 

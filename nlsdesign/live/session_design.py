@@ -36,7 +36,7 @@ _TICK = 0.1
 _NEWS = 0.5
 """Seconds after which work is looked at although messages keep coming."""
 _REST = 0.4
-"""Seconds without an edit after which the whole design is begun: while a hand moves it would be in its way."""
+"""Seconds without an edit after which the whole design is begun: it would be in the way of a hand."""
 
 
 class SessionDesign:
