@@ -226,7 +226,7 @@ function showNumbers(design) {
     ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
     ["limits it sits on", wordsOf(design.active) || "none"],
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
-    ["answered in", `${plain(1e3 * answer.seconds, 2)} ms`],
+    ...(answer.controls.can_undo ? [["answered in", `${plain(1e3 * answer.seconds, 2)} ms`]] : []),
   ];
   byId("numbers").replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
 }
