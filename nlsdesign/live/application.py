@@ -7,7 +7,7 @@ import contextlib
 import itertools
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import NlsError
 from .access import PROTOCOL, Access, Application, gate
@@ -15,10 +15,10 @@ from .session_process import content_of
 from .sessions import MOST, Session, Sessions
 from .uploads import DECK_BYTES, TooLargeError, too_large
 
-if TYPE_CHECKING:
-    from starlette.requests import Request
-    from starlette.responses import Response
-    from starlette.websockets import WebSocket
+# Starlette is optional, so its classes are named where they are used only.
+Request = Any
+Response = Any
+WebSocket = Any
 
 LONGEST_MESSAGE = 1 << 16
 """Most bytes of one message of a page."""
@@ -111,7 +111,7 @@ class _Answers:
             await socket.send_text(text)
 
         if session.name == kept:
-            await session.process.tell({"what": "elsewhere"})  # a tab that was copied
+            await session.process.tell('{"what": "elsewhere"}')  # a tab that was copied
         session.process.listen(listener)
         try:
             # Before the design is computed, so that a tab that is loaded again at once comes back to it.
