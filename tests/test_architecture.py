@@ -119,7 +119,7 @@ HOMES: dict[str, tuple[str, ...]] = {
 
 
 # library as it is imported: its name in pyproject.toml, where they differ
-DISTRIBUTIONS = {"OCP": "cadquery-ocp-novtk"}
+DISTRIBUTIONS = {"OCP": "cadquery-ocp-novtk", "SALib": "salib"}
 
 
 def inside(name: str, place: str) -> bool:
