@@ -131,6 +131,14 @@ SUITE = (
         modules=("ziglang",),
     ),
     Benchmark(
+        "live", "Edits of the live design, from the edit to its answer as JSON",
+        "none",
+        (
+            Promise("% of edits within 100 ms", r"all \d+ steps, wall.*100 ms +([\d.]+)", least=95),
+            Promise("median in ms", r"all \d+ steps, wall +median +([\d.]+)"),
+        ),
+    ),
+    Benchmark(
         "observers", "Co-design of observers and errors over the spread",
         "SLSQP on eigenvalues; `solve_ivp` sample by sample",
         (

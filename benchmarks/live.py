@@ -16,7 +16,7 @@ import time
 import numpy as np
 
 from nlsdesign.errors import NlsError
-from nlsdesign.live import ChangeLimit, Edit, LiveDesign, MovePoint, gallery_question, to_json
+from nlsdesign.live import ChangeLimit, LiveDesign, LiveEdit, MovePoint, gallery_question, to_json
 
 DECKS = (
     "cam-actuator",
@@ -29,7 +29,7 @@ _LENGTH = 10
 """Steps of one drag, all in one direction."""
 
 
-def edits(live: LiveDesign, draw: np.random.Generator) -> list[Edit]:
+def edits(live: LiveDesign, draw: np.random.Generator) -> list[LiveEdit]:
     """One drag: steps in one direction."""
     question = live.question
     limits = list(question.limit_values.values())

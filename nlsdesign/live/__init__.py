@@ -20,17 +20,17 @@ if TYPE_CHECKING:
         ChooseDeck,
         ChooseMaterial,
         DropLimit,
-        Edit,
         FreeNumber,
         HoldNumber,
+        LiveEdit,
         MovePoint,
         RemovePoint,
         SetNumber,
         edit_from,
     )
-    from .exports import EXPORTS, ExportDesign, ExportedFile
+    from .exports import EXPORTS, ExportDesign, ExportedDesign
     from .full_design import FullDesign
-    from .gallery import GalleryCard, gallery, gallery_question, question_of, question_of_deck
+    from .gallery import GalleryCard, gallery_cards, gallery_question, question_of, question_of_deck
     from .live_design import LiveDesign, Snapshot
     from .question import LiveQuestion, TargetPoint
     from .saved import SavedDesign, reopened
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
         CloudAnswer,
         DiagnoseRecords,
         DiagnosisAnswer,
+        LiveTask,
         SettleDesign,
-        Task,
         ToleranceCloud,
         TorqueLoop,
     )
@@ -56,16 +56,17 @@ __all__ = [
     "DiagnoseRecords",
     "DiagnosisAnswer",
     "DropLimit",
-    "Edit",
     "ExportDesign",
-    "ExportedFile",
+    "ExportedDesign",
     "FreeNumber",
     "FullDesign",
     "GalleryCard",
     "HoldNumber",
     "LiveAnswer",
     "LiveDesign",
+    "LiveEdit",
     "LiveQuestion",
+    "LiveTask",
     "Mechanism",
     "MovePoint",
     "RemovePoint",
@@ -74,12 +75,11 @@ __all__ = [
     "SettleDesign",
     "Snapshot",
     "TargetPoint",
-    "Task",
     "ToleranceCloud",
     "TorqueLoop",
     "WorkState",
     "edit_from",
-    "gallery",
+    "gallery_cards",
     "gallery_question",
     "question_of",
     "question_of_deck",

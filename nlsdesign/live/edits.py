@@ -15,13 +15,13 @@ from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS
-from .question import LiveQuestion, Machine, TargetPoint, finite_in
+from .question import ChosenMachine, LiveQuestion, TargetPoint, finite_in
 
 _LONGEST_NAME = 200
 
 
 @dataclass(frozen=True)
-class Edit(ABC):
+class LiveEdit(ABC):
     """Base of the edits; numbers are in SI."""
 
     @abstractmethod
@@ -43,7 +43,7 @@ class Edit(ABC):
 
 
 @dataclass(frozen=True)
-class MovePoint(Edit):
+class MovePoint(LiveEdit):
     """Move a point of the target.
 
     Parameters
@@ -66,7 +66,7 @@ class MovePoint(Edit):
 
 
 @dataclass(frozen=True)
-class AddPoint(Edit):
+class AddPoint(LiveEdit):
     """Add a point to the target, wherever its angle belongs.
 
     Parameters
@@ -85,7 +85,7 @@ class AddPoint(Edit):
 
 
 @dataclass(frozen=True)
-class RemovePoint(Edit):
+class RemovePoint(LiveEdit):
     """Remove a point of the target.
 
     Parameters
@@ -103,7 +103,7 @@ class RemovePoint(Edit):
 
 
 @dataclass(frozen=True)
-class ChangeLimit(Edit):
+class ChangeLimit(LiveEdit):
     """Set a limit, or change one that follows from the deck.
 
     Parameters
@@ -127,7 +127,7 @@ class ChangeLimit(Edit):
 
 
 @dataclass(frozen=True)
-class DropLimit(Edit):
+class DropLimit(LiveEdit):
     """Take a limit away; where the deck gives one of its kind, that one holds again.
 
     Parameters
@@ -155,7 +155,7 @@ class DropLimit(Edit):
 
 
 @dataclass(frozen=True)
-class SetNumber(Edit):
+class SetNumber(LiveEdit):
     """Give a number, for instance pretension or a size of the rubber; it is held from then on.
 
     Parameters
@@ -179,7 +179,7 @@ class SetNumber(Edit):
 
 
 @dataclass(frozen=True)
-class FreeNumber(Edit):
+class FreeNumber(LiveEdit):
     """Let the design choose a number, or the contour.
 
     Parameters
@@ -217,7 +217,7 @@ class FreeNumber(Edit):
 
 
 @dataclass(frozen=True)
-class HoldNumber(Edit):
+class HoldNumber(LiveEdit):
     """Hold a number, or the contour, where the design has it now.
 
     Parameters
@@ -245,7 +245,7 @@ class HoldNumber(Edit):
 
 
 @dataclass(frozen=True)
-class ChooseMaterial(Edit):
+class ChooseMaterial(LiveEdit):
     """Take another rubber of the library; sizes stay.
 
     Parameters
@@ -266,11 +266,11 @@ class ChooseMaterial(Edit):
         changed = question.machine.assembly
         for piece in pieces:
             changed = with_rubber(changed, material(self.material), piece=piece.name)
-        return kept_names(replace(question, machine=Machine(changed, self.material)))
+        return kept_names(replace(question, machine=ChosenMachine(changed, self.material)))
 
 
 @dataclass(frozen=True)
-class ChooseDeck(Edit):
+class ChooseDeck(LiveEdit):
     """Begin from another actuator of the gallery.
 
     Parameters
@@ -331,7 +331,7 @@ def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
     return replace(question, free=free)
 
 
-def _with_cam_of(machine: Machine, shown: AngleView) -> Machine:
+def _with_cam_of(machine: ChosenMachine, shown: AngleView) -> ChosenMachine:
     """Return the machine with the cam of a design."""
     cam = machine.cam
     finished = shown.machine.quantities()
@@ -340,7 +340,7 @@ def _with_cam_of(machine: Machine, shown: AngleView) -> Machine:
     return replace(machine, assembly=changed)
 
 
-def edit_from(message: Mapping[str, Any]) -> Edit:
+def edit_from(message: Mapping[str, Any]) -> LiveEdit:
     """Return the edit of a message: ``{"edit": "MovePoint", "index": 1, "angle": 0.4, "torque": 2.0}``.
 
     Parameters
@@ -355,7 +355,7 @@ def edit_from(message: Mapping[str, Any]) -> Edit:
     ValueRangeError
         If a field is missing or of the wrong kind.
     """
-    kinds = {kind.__name__: kind for kind in Edit.__subclasses__()}
+    kinds = {kind.__name__: kind for kind in LiveEdit.__subclasses__()}
     name = message.get("edit")
     if not isinstance(name, str) or name not in kinds:
         raise unknown_name("edit", str(name)[:80], kinds)

@@ -19,7 +19,7 @@ from ..model.roles import measured_motion, series_cam, series_spring
 from ..model.transform import with_outputs
 from .at_angle import AngleView
 from .question import LiveQuestion
-from .work import Task
+from .work import LiveTask
 
 _SAMPLE_TIME = 1e-3
 _OLD = (1980, 1, 1, 0, 0, 0)
@@ -27,7 +27,7 @@ _OLD = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
-class ExportedFile:
+class ExportedDesign:
     """One file.
 
     Parameters
@@ -46,8 +46,8 @@ class ExportedFile:
 
 
 @dataclass(frozen=True)
-class ExportDesign(Task):
-    """The design as a file: :class:`ExportedFile`.
+class ExportDesign(LiveTask):
+    """The design as a file: :class:`ExportedDesign`.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class ExportDesign(Task):
         return EXPORTS[self.what], (shown.machine, shown.contour)
 
 
-def exported_deck(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+def exported_deck(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
     """Return the machine as a deck.
 
     Parameters
@@ -80,10 +80,10 @@ def exported_deck(stage: Callable[[str], None], machine: Assembly, contour: Cont
     contour
         Of its cam.
     """
-    return ExportedFile(f"{machine.name}.toml", "application/toml", deck_text(machine).encode())
+    return ExportedDesign(f"{machine.name}.toml", "application/toml", deck_text(machine).encode())
 
 
-def exported_svg(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+def exported_svg(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
     """Return the drawing of the cam as SVG.
 
     Parameters
@@ -94,7 +94,7 @@ def exported_svg(stage: Callable[[str], None], machine: Assembly, contour: Conto
     return _drawing(machine, contour, "svg", "image/svg+xml")
 
 
-def exported_dxf(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+def exported_dxf(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
     """Return the drawing of the cam as DXF.
 
     Parameters
@@ -105,7 +105,7 @@ def exported_dxf(stage: Callable[[str], None], machine: Assembly, contour: Conto
     return _drawing(machine, contour, "dxf", "image/vnd.dxf")
 
 
-def exported_c(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+def exported_c(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
     """Return cascade observer and PID controller as C, in an archive.
 
     Parameters
@@ -131,10 +131,10 @@ def exported_c(stage: Callable[[str], None], machine: Assembly, contour: Contour
     with tempfile.TemporaryDirectory() as folder:
         files = export_c(both, folder, name="observer_and_controller")
         content = _archive([files.header, files.source, files.selftest])
-    return ExportedFile("observer_and_controller.zip", "application/zip", content)
+    return ExportedDesign("observer_and_controller.zip", "application/zip", content)
 
 
-def exported_fmu(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedFile:
+def exported_fmu(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
     """Return the plant as an FMU for co-simulation.
 
     Parameters
@@ -152,10 +152,10 @@ def exported_fmu(stage: Callable[[str], None], machine: Assembly, contour: Conto
     stage("compiles the plant")
     with tempfile.TemporaryDirectory() as folder:
         file = export_fmu(flatten(machine), Path(folder) / "plant.fmu")
-        return ExportedFile("plant.fmu", "application/zip", file.read_bytes())
+        return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
 
 
-EXPORTS: dict[str, Callable[..., ExportedFile]] = {
+EXPORTS: dict[str, Callable[..., ExportedDesign]] = {
     "deck": exported_deck,
     "svg": exported_svg,
     "dxf": exported_dxf,
@@ -165,7 +165,7 @@ EXPORTS: dict[str, Callable[..., ExportedFile]] = {
 """What a design can be saved as."""
 
 
-def _drawing(machine: Assembly, contour: Contour, ending: str, media_type: str) -> ExportedFile:
+def _drawing(machine: Assembly, contour: Contour, ending: str, media_type: str) -> ExportedDesign:
     names = series_cam(flatten(machine))
     machined = None
     if names.cable is not None:
@@ -177,7 +177,7 @@ def _drawing(machine: Assembly, contour: Contour, ending: str, media_type: str) 
     with tempfile.TemporaryDirectory() as folder:
         files = write_drawings(Path(folder), contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
-    return ExportedFile(f"cam.{ending}", media_type, content)
+    return ExportedDesign(f"cam.{ending}", media_type, content)
 
 
 def _archive(files: list[Path]) -> bytes:

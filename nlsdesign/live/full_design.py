@@ -94,9 +94,11 @@ def full_answer(
     solved
         Its design; ``None`` where it had none of its own.
     """
+    if full.design is None and solved is None:
+        return replace(quick, state=full.state, source="full", message=full.message)
     if full.design is None:
-        remark = "; the quick answer had a design, which is not confirmed" if solved else ""
-        return replace(quick, state=full.state, source="full", message=full.message + remark)
+        sentence = f"the whole design came to no answer: {full.message}; shown is the quick answer, unchecked"
+        return replace(quick, source="full", message=sentence)
     view = view_of(question, quick.revision, full.design)
     sentences = [*([] if full.design.miss is None else [str(full.design.miss)])]
     if solved is not None and quick.design is not None:

@@ -17,7 +17,7 @@ from ..design.statics.equilibrium import equilibrium_torque
 from ..errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
-from .question import LiveQuestion, Machine, TargetPoint
+from .question import ChosenMachine, LiveQuestion, TargetPoint
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""
@@ -47,7 +47,7 @@ class GalleryCard:
     reason: str
 
 
-def gallery() -> tuple[GalleryCard, ...]:
+def gallery_cards() -> tuple[GalleryCard, ...]:
     """Return the actuators that come with the project, also those without a cam, with the reason."""
     cards = []
     for kind, names in (("deck", deck_names()), ("template", template_names())):
@@ -117,7 +117,7 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     ArrangementError
         If it has no cam spring, or none whose contour can be designed, or one that gives no torque.
     """
-    blank = LiveQuestion(title, Machine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
+    blank = LiveQuestion(title, ChosenMachine(actuator), (TargetPoint(0.0, 0.0), TargetPoint(1.0, 1.0)))
     cam = blank.cam
     if cam.last_angle is not None:
         last = blank.machine.model.values[cam.last_angle]

@@ -9,13 +9,13 @@ from ..errors import ValueRangeError
 from .answers import AngleAnswer, LiveAnswer
 from .at_angle import AngleView
 from .background import WorkState
-from .edits import Edit
+from .edits import LiveEdit
 from .full_design import FullDesign, angle_view_of, full_answer
 from .question import LiveQuestion, finite_in
-from .quick_design import QuickDesign, QuickSolver
+from .quick_design import DesignedNumbers, QuickDesign, QuickSolver
 from .saved import SavedDesign, saved
 from .views import controls_of
-from .work import LiveWork, Task
+from .work import LiveTask, LiveWork
 
 MOST_UNDO = 200
 """Steps that can be undone."""
@@ -51,7 +51,17 @@ class _Moment:
     question: LiveQuestion
     answer: LiveAnswer
     solved: QuickDesign | None
+    numbers: DesignedNumbers | None
     shown: AngleView | None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Numbers of that design in SI by name; empty without one."""
+        return {} if self.numbers is None else self.numbers.values
+
+    def without_program(self) -> _Moment:
+        """Return the moment without the program of its design, which can be made again."""
+        return replace(self, solved=None)
 
 
 class LiveDesign:
@@ -76,8 +86,7 @@ class LiveDesign:
         self._grip: str | None = None
         self.snapshots: dict[str, Snapshot] = {}
         self.work = LiveWork()
-        begin = self._solver.beside_values(question, values) if values else None
-        self._now = self._answered(question, begin, None)
+        self._now = self._answered(question, None, values or {})
 
     @property
     def question(self) -> LiveQuestion:
@@ -94,7 +103,7 @@ class LiveDesign:
         """The last good design as it is looked at angle by angle; ``None`` before the first."""
         return self._now.shown
 
-    def apply(self, edit: Edit, *, drag: str | None = None) -> LiveAnswer:
+    def apply(self, edit: LiveEdit, *, drag: str | None = None) -> LiveAnswer:
         """Do an edit and return the answer.
 
         Parameters
@@ -110,7 +119,7 @@ class LiveDesign:
             If the edit cannot be done; nothing has changed then.
         """
         changed = edit.applied(self.question, self.shown)
-        moment = self._answered(changed, self._now.solved, self._now.shown)
+        moment = self._answered(changed, self._now, self._now.values)
         if drag is None or drag != self._grip:
             self._past = [*self._past, self._now][-MOST_UNDO:]
         self._grip, self._future = drag, []
@@ -150,7 +159,7 @@ class LiveDesign:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
         return self.shown.answer(angle, self.work.loop_at(angle, self.shown.view.revision))
 
-    def start(self, task: Task) -> WorkState:
+    def start(self, task: LiveTask) -> WorkState:
         """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled.
 
         Parameters
@@ -201,8 +210,7 @@ class LiveDesign:
 
     def saved(self) -> SavedDesign:
         """Return deck, design file and where the search stands, as text."""
-        solved = self._now.solved
-        return saved(self.question, {} if solved is None else solved.si_values())
+        return saved(self.question, self._now.values)
 
     def _takes(self, state: WorkState) -> bool:
         return state.revision == self._revision and self.answer.source == "quick"
@@ -215,10 +223,15 @@ class LiveDesign:
             self._now = replace(self._now, answer=answer)
             return
         shown = angle_view_of(answer.design, full.design, self.question) if answer.design else self.shown
-        solved = self._solver.beside_design(self.question, full.design) or self._now.solved
-        self._now = _Moment(self.question, answer, solved, shown)
+        solved = self._solver.beside_design(self.question, full.design)
+        numbers = self._now.numbers if solved is None else solved.numbers
+        self._now = _Moment(self.question, answer, solved or self._now.solved, numbers, shown)
 
     def _go_to(self, moment: _Moment) -> LiveAnswer:
+        for row in (self._past, self._future):
+            for k, each in enumerate(row):
+                if each.solved is not None and not self._solver.keeps(each.solved):
+                    row[k] = each.without_program()
         controls = controls_of(moment.question, can_undo=bool(self._past), can_redo=bool(self._future))
         self._now = replace(moment, answer=replace(moment.answer, controls=controls))
         return self.answer
@@ -234,13 +247,14 @@ class LiveDesign:
         answer = replace(moment.answer, revision=self._revision, design=design, seconds=0.0)
         return self._go_to(replace(moment, answer=answer, shown=shown))
 
-    def _answered(self, question: LiveQuestion, last: QuickDesign | None, shown: AngleView | None) -> _Moment:
+    def _answered(self, question: LiveQuestion, before: _Moment | None, values: dict[str, float]) -> _Moment:
         began = time.perf_counter()
         revision = self._revision + 1
-        solved, outcome = self._solver.answer(question, last)
+        solved, outcome = self._solver.answer(question, before.solved if before else None, values)
+        shown = before.shown if before else None
         message = outcome.words
         if solved is not None:
-            shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.machine)
+            shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.numbers.machine)
             message = "; ".join([*([] if shown.view.met else [missed(shown)]), *not_kept(question)])
         controls = controls_of(question, can_undo=bool(self._past), can_redo=bool(self._future))
         self._revision = revision
@@ -249,7 +263,8 @@ class LiveDesign:
             design=shown.view if shown else None, controls=controls,
             seconds=time.perf_counter() - began, conflicts=outcome.conflicts,
         )  # fmt: skip
-        return _Moment(question, answer, solved or last, shown)
+        last, numbers = (before.solved, before.numbers) if before else (None, None)
+        return _Moment(question, answer, solved or last, solved.numbers if solved else numbers, shown)
 
 
 def missed(shown: AngleView) -> str:

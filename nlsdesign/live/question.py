@@ -57,7 +57,7 @@ class LimitNumber(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Machine:
+class ChosenMachine:
     """An actuator with the rubber that was chosen; questions about it share what follows from its structure.
 
     Parameters
@@ -122,7 +122,7 @@ class LiveQuestion:
     """
 
     title: str
-    machine: Machine
+    machine: ChosenMachine
     points: tuple[TargetPoint, ...]
     limits: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,11 +24,53 @@ from .views import ALLOWED, curve_columns, margins_of, shown_numbers
 Floats = NDArray[np.float64]
 
 _MOST_PROGRAMS = 4
+"""Programs that are kept; one takes about 30 MB."""
+_NO_VALUES: Mapping[str, float] = {}
 _ACTIVE = 1e-3
 _CONTROL_VALUES = 64
 _SOURCE = "designed, quick answer"
 _PER_INTERVAL = 8
 """Points of a contour per interval of its program."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedNumbers:
+    """The numbers of a quick design, without the program that they were found with.
+
+    Parameters
+    ----------
+    question
+        That was asked.
+    values
+        Sizes and variables of the contour in SI by name, to begin another search with.
+    contour
+        Of the cam.
+    shaped
+        Whether the contour was designed; otherwise it is that of the machine.
+    """
+
+    question: LiveQuestion
+    values: dict[str, float]
+    contour: Contour
+    shaped: bool
+
+    def machine(self) -> Assembly:
+        """Return the changed assembly: the numbers of the design, and a cam fitted to its contour."""
+        cam, machine = self.question.cam.name, self.question.actuator
+        known = machine.quantities()
+        changes: dict[str, Quantity] = {
+            name: known[name].with_value(value, _SOURCE)
+            for name, value in self.values.items()
+            if name in self.question.free
+        }
+        if self.shaped:
+            anchor = None if self.question.cam.anchor_distance is None else self.contour.anchor_distance
+            fit = cam_from_profile(
+                self.contour.angles, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
+                anchor_distance=anchor,
+            )  # fmt: skip
+            changes |= {f"{cam}.{field}": given for field, given in fit.changes().items()}
+        return derived(machine.with_values(changes), self.question.machine.assembly, "designed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,28 +125,12 @@ class QuickDesign:
         found = dict(zip(names, self._numbers["sizes"].tolist(), strict=True))
         return {name: found.get(name, n.value) for name, n in self.question.numbers.items()}
 
-    def machine(self) -> Assembly:
-        """Return the changed assembly: the numbers of the design, and a cam fitted to its contour."""
-        cam, machine = self.question.cam.name, self.question.actuator
-        known = machine.quantities()
-        changes: dict[str, Quantity] = {
-            name: known[name].with_value(value, _SOURCE)
-            for name, value in self.values.items()
-            if name in self.question.free
-        }
-        if self.program.problem.contour is not None:
-            anchor = None if self.question.cam.anchor_distance is None else self.contour.anchor_distance
-            fit = cam_from_profile(
-                self.contour.angles, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
-                anchor_distance=anchor,
-            )  # fmt: skip
-            changes |= {f"{cam}.{field}": given for field, given in fit.changes().items()}
-        return derived(machine.with_values(changes), self.question.machine.assembly, "designed")
-
-    def si_values(self) -> dict[str, float]:
-        """Return sizes and variables of the contour in SI by name, to begin another program with."""
-        chosen = self.program.chosen_values(self.point.unknowns)
-        return chosen | self.values
+    @cached_property
+    def numbers(self) -> DesignedNumbers:
+        """What of it is kept when its program is not."""
+        chosen = self.program.chosen_values(self.point.unknowns) | self.values
+        shaped = self.program.problem.contour is not None
+        return DesignedNumbers(self.question, chosen, self.contour, shaped)
 
     def view(self, revision: int) -> DesignView:
         """Return what is shown of it.
@@ -176,8 +203,18 @@ class QuickSolver:
             self._programs.popitem(last=False)
         return self._programs[key]
 
+    def keeps(self, design: QuickDesign) -> bool:
+        """Tell whether the program of a design is still kept.
+
+        Parameters
+        ----------
+        design
+            Of this session.
+        """
+        return any(each is design.program for each in self._programs.values())
+
     def answer(
-        self, question: LiveQuestion, last: QuickDesign | None
+        self, question: LiveQuestion, last: QuickDesign | None, values: Mapping[str, float] = _NO_VALUES
     ) -> tuple[QuickDesign | None, QuickOutcome]:
         """Return the design for a question, and how it was come by.
 
@@ -187,9 +224,12 @@ class QuickSolver:
             Any.
         last
             The last good design, to begin beside.
+        values
+            Its numbers in SI by name, where its program is not kept; empty where there is no design.
         """
         program = self.program(question)
-        begin = self._begin(program, question, last)
+        values = program.scaled_values(values if last is None else last.numbers.values)
+        begin = program.completed(question, values)
         contradicted, self._contradicted = self._contradicted is program, None
         if contradicted:
             # Limits that contradicted each other a moment ago are asked first.
@@ -197,7 +237,7 @@ class QuickSolver:
             if kept.state == "infeasible":
                 self._contradicted = program
                 return None, kept
-        outcome = self._tried(program, question, last)
+        outcome = self._tried(program, question, last, values)
         if outcome.state != "solved" and not contradicted:
             kept = program.conflict(question, begin)
             if kept.state == "infeasible":
@@ -210,10 +250,6 @@ class QuickSolver:
         if outcome.state != "solved" or outcome.point is None:
             return None, replace(outcome, state="not solved", words=f"not solved yet: {outcome.words}")
         return QuickDesign(program, question, outcome.point, outcome.cost), outcome
-
-    def _begin(self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None) -> Floats:
-        values = {} if last is None else program.scaled_values(last.si_values())
-        return program.completed(question, values)
 
     def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
         """Return the quick design at a finished one, for the next drag to begin from.
@@ -243,17 +279,22 @@ class QuickSolver:
             return None
         return QuickDesign(program, question, outcome.point, outcome.cost)
 
-    def _tried(self, program: QuickProgram, question: LiveQuestion, last: QuickDesign | None) -> QuickOutcome:
-        if last is None:
+    def _tried(
+        self,
+        program: QuickProgram,
+        question: LiveQuestion,
+        last: QuickDesign | None,
+        values: Mapping[str, float],
+    ) -> QuickOutcome:
+        if not values:
             return program.from_starts(question)
-        if last.program is program:
+        known = last is not None and last.program is program
+        if last is not None and known:
             outcome = program.beside(question, last.point)
             if outcome.state in ("solved", "infeasible"):
                 return outcome
-        outcome = program.from_values(question, program.scaled_values(last.si_values()))
-        if outcome.state == "solved" or last.program is program:
-            return outcome
-        return program.from_starts(question)
+        outcome = program.from_values(question, values)
+        return outcome if known or outcome.state == "solved" else program.from_starts(question)
 
 
 def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:

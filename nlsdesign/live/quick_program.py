@@ -8,7 +8,7 @@ beside the last solution, with its multipliers.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, cast
@@ -259,7 +259,7 @@ class QuickProgram:
         """
         return self.target.numbers(question.target)
 
-    def completed(self, question: LiveQuestion, values: dict[str, float]) -> Floats:
+    def completed(self, question: LiveQuestion, values: Mapping[str, float]) -> Floats:
         """Return the unknowns that follow from some of them, with held numbers as the question has them.
 
         Parameters
@@ -325,7 +325,7 @@ class QuickProgram:
         """
         return self._solved(self._cold, question, point)
 
-    def from_values(self, question: LiveQuestion, values: dict[str, float]) -> QuickOutcome:
+    def from_values(self, question: LiveQuestion, values: Mapping[str, float]) -> QuickOutcome:
         """Return the solution from scaled values of another program or design.
 
         Parameters
@@ -350,7 +350,7 @@ class QuickProgram:
         values = np.array(self._in_si(unknowns)).ravel()
         return {v.name: float(value) for v, value in zip(kept, values, strict=True)}
 
-    def scaled_values(self, values: dict[str, float]) -> dict[str, float]:
+    def scaled_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return values in SI as this program scales them, those that it knows.
 
         Parameters

@@ -16,7 +16,7 @@ from ..design.curves.numbers import plain
 from ..errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
 from .limit_kinds import LIMIT_KINDS
-from .question import LiveQuestion, Machine, TargetPoint
+from .question import ChosenMachine, LiveQuestion, TargetPoint
 
 _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
 _MOST_VALUES = 200
@@ -111,7 +111,7 @@ def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
         TargetPoint(float(a), float(t)) for a, t in zip(target.angles, target.torques, strict=True)
     )
     limits, ranges = _limits_of(job.keep)
-    machine = Machine(actuator, str(begin.get("material", ""))[:100])
+    machine = ChosenMachine(actuator, str(begin.get("material", ""))[:100])
     question = LiveQuestion(str(begin.get("title", actuator.name))[:100], machine, points, limits, (), ranges)
     given = [each for each in begin.get("points", []) if isinstance(each, list) and len(each) == 2]
     if len(given) == 2 and len(points) == 3:

@@ -10,7 +10,7 @@ from typing import Any
 from ..components.materials.library import materials
 from ..errors import NlsError
 from .answers import LiveAnswer, to_json
-from .gallery import gallery
+from .gallery import gallery_cards
 from .limit_kinds import LIMIT_KINDS
 from .live_design import LiveDesign
 from .outbox import Outbox
@@ -187,4 +187,8 @@ def choices() -> dict[str, Any]:
         {"name": each.name, "words": each.words, "unit": each.unit, "upper": each.upper}
         for each in LIMIT_KINDS.values()
     ]
-    return {"cards": [to_json(each) for each in gallery()], "materials": list(materials()), "limits": kinds}
+    return {
+        "cards": [to_json(each) for each in gallery_cards()],
+        "materials": list(materials()),
+        "limits": kinds,
+    }

@@ -29,7 +29,7 @@ _MOST_BYTES = 200_000_000
 
 
 @dataclass(frozen=True)
-class Task(ABC):
+class LiveTask(ABC):
     """Base of the kinds of long work; of each kind one runs at a time."""
 
     @abstractmethod
@@ -53,7 +53,7 @@ class Task(ABC):
 
 
 @dataclass(frozen=True)
-class SettleDesign(Task):
+class SettleDesign(LiveTask):
     """The whole design of the question: :class:`~.full_design.FullDesign`."""
 
     def call(
@@ -64,7 +64,7 @@ class SettleDesign(Task):
 
 
 @dataclass(frozen=True)
-class ToleranceCloud(Task):
+class ToleranceCloud(LiveTask):
     """Torque of made springs around the design: :class:`CloudAnswer`.
 
     Parameters
@@ -96,7 +96,7 @@ class ToleranceCloud(Task):
 
 
 @dataclass(frozen=True)
-class TorqueLoop(Task):
+class TorqueLoop(LiveTask):
     """The torque loop over the angle: angles, and a :class:`~.answers.LoopResponse` at each."""
 
     def call(
@@ -108,7 +108,7 @@ class TorqueLoop(Task):
 
 
 @dataclass(frozen=True)
-class DiagnoseRecords(Task):
+class DiagnoseRecords(LiveTask):
     """What bench records say that the declared machine lacks: :class:`DiagnosisAnswer`.
 
     Parameters
@@ -140,7 +140,9 @@ class LiveWork:
     def __init__(self) -> None:
         self._running: dict[str, BackgroundWork] = {}
 
-    def start(self, task: Task, question: LiveQuestion, revision: int, shown: AngleView | None) -> WorkState:
+    def start(
+        self, task: LiveTask, question: LiveQuestion, revision: int, shown: AngleView | None
+    ) -> WorkState:
         """Start a task; one of its kind that runs is cancelled.
 
         Parameters

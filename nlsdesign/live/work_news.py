@@ -11,9 +11,9 @@ from .background import WorkState
 from .exports import ExportDesign
 from .full_design import FullDesign
 from .live_design import LiveDesign
-from .work import DiagnoseRecords, SettleDesign, Task, ToleranceCloud, TorqueLoop
+from .work import DiagnoseRecords, LiveTask, SettleDesign, ToleranceCloud, TorqueLoop
 
-TASKS: Final[Mapping[str, Callable[[Path], Task]]] = {
+TASKS: Final[Mapping[str, Callable[[Path], LiveTask]]] = {
     SettleDesign.__name__: lambda _: SettleDesign(),
     ToleranceCloud.__name__: lambda _: ToleranceCloud(),
     TorqueLoop.__name__: lambda _: TorqueLoop(),

@@ -185,8 +185,9 @@ def test_undo_and_redo_give_the_same_numbers(template: LiveDesign) -> None:
 
 def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(template: LiveDesign) -> None:
     good = template.answer.design
-    template.apply(ChangeLimit("MaximumCamRadius", 0.002))
-    answer = template.answer
+    template.apply(ChangeLimit("MaximumCamRadius", 0.03))
+    good = template.answer.design
+    answer = template.apply(ChangeLimit("MaximumCamRadius", 0.002))
     assert answer.state == "infeasible"
     assert answer.stale
     assert answer.design is not None
@@ -275,6 +276,8 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert same.message == ""
     assert same.design is not None
     assert same.design.checked
+    unanswered = full_answer(replace(full, design=None, message="stopped"), question, answer, solved)
+    assert "came to no answer: stopped; shown is the quick answer, unchecked" in unanswered.message
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
     assert "worse local optimum: 0.0175 mN·m rms against 0.0175 mN·m rms now" in worse.message
     template._settled(full)
@@ -334,3 +337,19 @@ def test_another_deck_begins_anew(template: LiveDesign) -> None:
     assert template.shown is not None
     assert len(template.shown.mechanism(0.2).cables) == 1
     assert template.undo().controls.title == "cam-actuator"
+
+
+def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
+    template: LiveDesign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program takes tens of megabytes: a step whose program is gone gives the same design and goes on."""
+    monkeypatch.setattr("nlsdesign.live.quick_design._MOST_PROGRAMS", 1)
+    before = template.answer.design
+    point = template.question.points[2]
+    template.apply(AddPoint(0.5, 0.21))
+    assert template._past[-1].solved is None
+    back = template.undo()
+    assert back.design is not None
+    assert before is not None
+    assert back.design.rms_error == before.rms_error
+    require_same(template.apply(MovePoint(2, point.angle, point.torque * 1.01)), template.question)

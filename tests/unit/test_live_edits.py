@@ -25,7 +25,7 @@ from nlsdesign.live import (
     SavedDesign,
     SetNumber,
     edit_from,
-    gallery,
+    gallery_cards,
     gallery_question,
     question_of_deck,
     reopened,
@@ -41,7 +41,7 @@ def question() -> LiveQuestion:
 
 
 def test_gallery_lists_every_deck_and_says_why_some_have_no_cam() -> None:
-    cards = {card.name: card for card in gallery()}
+    cards = {card.name: card for card in gallery_cards()}
     assert cards["cam-actuator"].reason == ""
     assert cards["cam-actuator"].kind == "template"
     assert "no cam spring" in cards["austin2015_soft_spring"].reason
@@ -143,7 +143,7 @@ def test_another_rubber_keeps_the_sizes(question: LiveQuestion) -> None:
     "message",
     [
         {},
-        {"edit": "Edit"},
+        {"edit": "LiveEdit"},
         {"edit": ["MovePoint"]},
         {"edit": "MovePoint", "index": 1, "angle": 0.1},
         {"edit": "MovePoint", "index": 1.5, "angle": 0.1, "torque": 0.1},
