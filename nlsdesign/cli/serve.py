@@ -28,8 +28,8 @@ def serve(
 ) -> None:
     """Serve a page on which a design follows the mouse, to this machine only, until interrupted.
 
-    DECK is a file, or the name of a deck or template that comes with the project; without it the page begins with its
-    gallery. The address holds a random token, without which nothing is answered.
+    DECK is a file, or the name of a deck or template that comes with the project; without it the page begins
+    with a template. The address holds a random token, without which nothing is answered.
     """
     from ..live.server import serve as run
 
@@ -49,7 +49,10 @@ def serve(
 
 
 def _checked(name: str) -> str:
-    """Return a name that the page can begin with; a deck that cannot be read ends the command, not the page."""
+    """Return a name that the page can begin with.
+
+    A deck that cannot be read ends the command, not the page.
+    """
     from ..components.assembly.deck_template import template_names
     from ..components.assembly.deck_writer import declare
     from ..deck import load_deck

@@ -7,7 +7,7 @@ import contextlib
 import itertools
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import NlsError
 from .access import PROTOCOL, Access, Application, gate
@@ -15,13 +15,15 @@ from .session_process import content_of
 from .sessions import MOST, Session, Sessions
 from .uploads import DECK_BYTES, TooLargeError, too_large
 
-if TYPE_CHECKING:
-    from starlette.requests import Request
-    from starlette.responses import Response
-    from starlette.websockets import WebSocket
+# Starlette is optional, so its classes are named where they are used only.
+Request = Any
+Response = Any
+WebSocket = Any
 
 LONGEST_MESSAGE = 1 << 16
 """Most bytes of one message of a page."""
+_READ_AWAY = 1 << 30
+"""Most bytes that are read only to be dropped."""
 
 _KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -109,7 +111,7 @@ class _Answers:
             await socket.send_text(text)
 
         if session.name == kept:
-            await session.process.tell({"what": "elsewhere"})  # a tab that was copied
+            await session.process.tell('{"what": "elsewhere"}')  # a tab that was copied
         session.process.listen(listener)
         try:
             # Before the design is computed, so that a tab that is loaded again at once comes back to it.
@@ -162,6 +164,7 @@ class _Answers:
         try:
             answer: Response = await work(request, session)
         except TooLargeError as error:
+            await _read_away(request)
             return PlainTextResponse(str(error), 413, {"connection": "close"})
         except NlsError as error:
             return PlainTextResponse(str(error), 422)
@@ -200,6 +203,18 @@ class _Answers:
         )
         headers = {"content-disposition": f'attachment; filename="{name}"'}
         return Response(content, media_type="application/octet-stream", headers=headers)
+
+
+async def _read_away(request: Request) -> None:
+    """Read the rest of what is not taken: a browser that is cut off in its sentence hears no answer."""
+    from starlette.requests import ClientDisconnect
+
+    size = 0
+    with contextlib.suppress(ClientDisconnect):
+        async for part in request.stream():
+            size += len(part)
+            if size > _READ_AWAY:
+                return
 
 
 def _length(request: Request) -> int | None:

@@ -50,13 +50,9 @@ def serve(
     MissingLibraryError
         If the server's library is not installed.
     """
-    try:
-        import starlette
-        import uvicorn
-        import websockets
-    except ImportError as error:
-        raise missing_library("the live page", error.name or "starlette", "live") from None
-    del starlette, websockets
+    _require_libraries()
+    import uvicorn
+
     host = loopback(host)
     listener = _listener(host, port)
     access = Access(host, listener.getsockname()[1])
@@ -92,6 +88,23 @@ def serve(
 
     with contextlib.closing(listener):
         asyncio.run(run())
+
+
+def _require_libraries() -> None:
+    """Refuse in words where a library of the server is not installed.
+
+    Raises
+    ------
+    MissingLibraryError
+        With the extra that brings it.
+    """
+    try:
+        import starlette
+        import uvicorn
+        import websockets
+    except ImportError as error:
+        raise missing_library("the live page", error.name or "starlette", "live") from None
+    del starlette, uvicorn, websockets
 
 
 def _settings(app: Any) -> Any:

@@ -1,38 +1,33 @@
-"""What a page asks and what its session answers: messages in, messages out, the design between them."""
+"""The design of one session: questions of page and server in, answers out."""
 
 from __future__ import annotations
 
 import base64
-import functools
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..components.materials.library import materials
-from ..errors import NlsError, ValueRangeError, brief, unknown_name
-from .answers import LiveAnswer, to_json
+from ..errors import NlsError
 from .archive import archived, unarchived
-from .edits import edit_from
+from .background import warm_up
 from .exports import ExportDesign
-from .gallery import gallery_cards, gallery_question, question_of_deck
+from .gallery import gallery_question, question_of_deck
 from .inbox import Inbox
-from .limit_kinds import LIMIT_KINDS
 from .live_design import LiveDesign
+from .outbox import Outbox
+from .page_questions import PageQuestions
 from .question import LiveQuestion
 from .saved import reopened
-from .session_work import Outbox
+from .session_news import SessionNews, choices
 from .uploads import plain_letters
-from .work import SettleDesign, TorqueLoop
-from .work_news import TASKS, WorkNews
 
 FIRST = "cam-actuator"
 """With which a page begins that names no actuator."""
 _TICK = 0.1
 """Seconds between two looks at work that runs."""
-_REST = 0.4
-"""Seconds without an edit after which the whole design is begun: while a hand moves it would be in its way."""
+_NEWS = 0.5
+"""Seconds after which work is looked at although messages keep coming."""
 
 
 class SessionDesign:
@@ -50,18 +45,14 @@ class SessionDesign:
 
     def __init__(self, deck: str, folder: str, outbox: Outbox) -> None:
         self._outbox = outbox
-        self._folder = Path(folder)
-        self._angle: float | None = None
-        self._trouble = ""
-        self._settle_at: float | None = None
-        self._look_at: float | None = None
+        self._records = Path(folder) / "records"
         self._file_for: int | None = None
+        warm_up()
         try:
-            self._live = LiveDesign(_question(deck))
+            self._begin(LiveDesign(_question(deck)))
         except NlsError as error:
-            self._trouble = f"{error}; the page begins with {FIRST} instead"
-            self._live = LiveDesign(gallery_question(FIRST))
-        self._news = WorkNews(self._live, self._folder / "records")
+            trouble = f"{error}; the page begins with {FIRST} instead"
+            self._begin(LiveDesign(gallery_question(FIRST)), trouble)
 
     def run(self, inbox: Inbox) -> None:
         """Answer until no message can come any more.
@@ -77,153 +68,25 @@ class SessionDesign:
             When the server has closed it.
         """
         if not inbox.waiting:
-            _choices()
+            choices()
+        said = time.monotonic()
         while True:
-            idle = self._settle_at is None and self._look_at is None and not self._news.running
-            message = inbox.take(None if idle else _TICK)
-            if message is not None:
-                self._answer(message, more=inbox.waiting)
+            waits = self._news.idle and self._file_for is None
+            message = inbox.take(None if waits else _TICK)
+            if message is None:
+                self._news.pause()
+                self._send_file()
+            elif "server" in message:
+                self._serve(message["server"])
             else:
-                self._on_a_pause()
+                self._questions.answer(message["page"])
+            if time.monotonic() - said >= _NEWS:
+                said = time.monotonic()
+                self._news.news()
 
-    def _answer(self, message: Mapping[str, Any], *, more: bool) -> None:
-        if "server" in message:
-            self._serve(message["server"])
-            return
-        asked = message["page"]
-        try:
-            self._do(asked)
-        except NlsError as error:
-            self._refuse(asked, str(error))
-        except Exception as error:  # a fault of ours must not take the design with it
-            self._refuse(asked, f"a fault of the program: {type(error).__name__}: {error}")
-        if not more:
-            self._on_a_pause()
-
-    def _refuse(self, asked: Mapping[str, Any], reason: str) -> None:
-        self._outbox.page({"what": "refused", "number": _number(asked), "reason": reason})
-
-    # --- what a page asks ----------------------------------------------------------------------
-
-    def _do(self, asked: Mapping[str, Any]) -> None:
-        what = asked.get("what")
-        kinds: Mapping[str, Callable[[Mapping[str, Any]], None]] = {
-            "show": self._show, "edit": self._edit, "angle": self._turn, "step": self._step,
-            "keep": self._keep, "work": self._work,
-        }  # fmt: skip
-        if not isinstance(what, str) or what not in kinds:
-            raise unknown_name("message", str(what)[:80], kinds)
-        kinds[what](asked)
-
-    def _show(self, asked: Mapping[str, Any]) -> None:
-        """Show everything, as to a page that was loaded just now."""
-        self._say(self._live.answer, asked)
-        self._say_kept({})
-        self._outbox.page({"what": "gallery", **_choices()})
-        for each in self._news.all():
-            self._outbox.page({"what": "work", "work": each})
-        if self._trouble:
-            self._refuse({}, self._trouble)
-        if self._live.answer.source == "quick":
-            self._settle_soon()
-
-    def _edit(self, asked: Mapping[str, Any]) -> None:
-        fields, drag = asked.get("edit"), asked.get("drag")
-        if not isinstance(fields, dict):
-            raise ValueRangeError("edit", "is no table", next_step="send its name and its fields")
-        answer = self._live.apply(edit_from(fields), drag=drag if isinstance(drag, str) else None)
-        self._say(answer, asked)
-        self._settle_soon()
-
-    def _step(self, asked: Mapping[str, Any]) -> None:
-        answer = self._live.undo() if asked.get("back") is True else self._live.redo()
-        self._say(answer, asked)
-        if answer.source == "quick":
-            self._settle_soon()
-
-    def _turn(self, asked: Mapping[str, Any]) -> None:
-        self._angle = _finite("angle", asked.get("angle"))
-        said = {"angle": self._angle, "mechanism": self._mechanism()}
-        self._outbox.page({"what": "at", "number": _number(asked), "at": said})
-        self._look_at = time.monotonic()
-
-    def _keep(self, asked: Mapping[str, Any]) -> None:
-        name = str(asked.get("name", ""))
-        if asked.get("forget") is not True:
-            self._live.keep(name)
-        elif name in self._live.snapshots:
-            del self._live.snapshots[name]
-        else:
-            raise unknown_name("kept design", name[:80], self._live.snapshots)
-        self._say_kept(asked)
-
-    def _work(self, asked: Mapping[str, Any]) -> None:
-        name = str(asked.get("name", ""))
-        if name not in TASKS:
-            raise unknown_name("work", name[:80], TASKS)
-        self._news.stop(name) if asked.get("stop") is True else self._news.start(name)
-        self._outbox.page({"what": "work", "number": _number(asked), "work": self._news.of(name)})
-
-    # --- what is said --------------------------------------------------------------------------
-
-    def _say(self, answer: LiveAnswer, asked: Mapping[str, Any]) -> None:
-        """Send an answer with the mechanism; what takes longer at the angle follows on a pause."""
-        at = None
-        if answer.design is not None:
-            last = float(answer.design.columns[0].values[-1])
-            given = asked.get("angle")
-            wanted = self._angle if given is None else _finite("angle", given)
-            self._angle = min(0.6 * last if wanted is None else wanted, last)
-            at = {"angle": self._angle, "mechanism": self._mechanism()}
-            self._look_at = time.monotonic()
-        said = to_json(answer)
-        self._outbox.page({"what": "answer", "number": _number(asked), "answer": said, "at": at})
-
-    def _mechanism(self) -> Any:
-        shown = self._live.shown
-        return None if shown is None or self._angle is None else to_json(shown.mechanism(self._angle))
-
-    def _say_kept(self, asked: Mapping[str, Any]) -> None:
-        kept = [
-            {
-                "name": name, "title": each.question.title, "material": each.question.machine.material,
-                "design": to_json(each.answer.design),
-            }
-            for name, each in self._live.snapshots.items()
-        ]  # fmt: skip
-        self._outbox.page({"what": "kept", "number": _number(asked), "kept": kept})
-
-    def _settle_soon(self) -> None:
-        self._settle_at = time.monotonic() + _REST
-        self._live.work.cancel(SettleDesign.__name__)
-
-    def _on_a_pause(self) -> None:
-        """Do what may wait while a hand moves: what holds at the angle, the whole design, news of work."""
-        now = time.monotonic()
-        if self._look_at is not None and now - self._look_at >= 0.5 * _TICK:
-            self._look_at = None
-            self._look()
-        if self._settle_at is not None and now >= self._settle_at:
-            self._settle_at = None
-            self._live.start(SettleDesign())
-        before = self._live.answer
-        for each in self._news.changed():
-            self._outbox.page({"what": "work", "work": each})
-            if each["name"] == TorqueLoop.__name__:
-                self._look_at = now
-        self._send_file()
-        if self._live.answer is not before:
-            self._say(self._live.answer, {})
-
-    def _look(self) -> None:
-        if self._live.shown is None or self._angle is None:
-            return
-        try:
-            self._outbox.page({"what": "at", "number": None, "at": to_json(self._live.at(self._angle))})
-        except NlsError as error:
-            self._refuse({}, str(error))
-
-    # --- what the server asks ------------------------------------------------------------------
+    def _begin(self, live: LiveDesign, trouble: str = "") -> None:
+        self._news = SessionNews(live, self._records, self._outbox, trouble=trouble)
+        self._questions = PageQuestions(self._news)
 
     def _serve(self, asked: Mapping[str, Any]) -> None:
         try:
@@ -241,11 +104,11 @@ class SessionDesign:
             self._opened(base64.b64decode(asked["content"]))
             return {}
         if asked["kind"] == "design":
-            return _file("design.zip", archived(self._live.saved()))
+            return _file("design.zip", archived(self._news.live.saved()))
         if self._file_for is not None:
             self._outbox.server({"number": self._file_for, "refused": "another file was asked for meanwhile"})
         self._file_for = None
-        self._live.start(ExportDesign(str(asked["kind"])))
+        self._news.live.start(ExportDesign(str(asked["kind"])))
         self._file_for = asked["number"]
         return None
 
@@ -260,34 +123,19 @@ class SessionDesign:
             except UnicodeDecodeError:
                 raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
             live = LiveDesign(question_of_deck(text, "deck.toml"))
-        self._live.work.close()
-        self._live, self._angle, self._trouble = live, None, ""
-        self._news = WorkNews(live, self._folder / "records")
-        self._show({})
+        self._news.live.work.close()
+        self._begin(live)
+        self._news.everything(None)
 
     def _send_file(self) -> None:
         """Send the file that the server waits for once it is made."""
-        state = self._news.export
+        state = self._news.work.export
         if self._file_for is None or state is None or state.state == "computing":
             return
         made = state.value
         answer = _file(made.name, made.content) if made is not None else {"refused": state.message}
         self._outbox.server({"number": self._file_for, **answer})
         self._file_for = None
-
-
-@functools.cache
-def _choices() -> dict[str, Any]:
-    """Return what a page lets choose from: actuators, rubbers, limits."""
-    kinds = [
-        {"name": each.name, "words": each.words, "unit": each.unit, "upper": each.upper}
-        for each in LIMIT_KINDS.values()
-    ]
-    return {
-        "cards": [to_json(each) for each in gallery_cards()],
-        "materials": list(materials()),
-        "limits": kinds,
-    }
 
 
 def _question(deck: str) -> LiveQuestion:
@@ -303,14 +151,3 @@ def _question(deck: str) -> LiveQuestion:
 
 def _file(name: str, content: bytes) -> dict[str, Any]:
     return {"name": plain_letters(name), "content": base64.b64encode(content).decode()}
-
-
-def _number(asked: Mapping[str, Any]) -> int | None:
-    number = asked.get("number")
-    return number if isinstance(number, int) and not isinstance(number, bool) else None
-
-
-def _finite(what: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueRangeError(f"{what} = {brief(value)}", "is no finite number", next_step="send it in SI")
-    return float(value)

@@ -79,15 +79,17 @@ class SessionProcess:
         """
         self._listener = listener
 
-    async def tell(self, message: Mapping[str, Any]) -> None:
-        """Tell the page that listens now something.
+    async def tell(self, text: str) -> None:
+        """Tell the page that listens now something; one that is not there misses nothing.
 
         Parameters
         ----------
-        message
-            Of the server.
+        text
+            A message of JSON. A page that comes back is shown the whole state.
         """
-        await self._tell(json.dumps(message))
+        if self._listener is not None:
+            with contextlib.suppress(Exception):
+                await self._listener(text)
 
     async def from_page(self, message: Mapping[str, Any]) -> None:
         """Hand over a message of the page.
@@ -160,19 +162,13 @@ class SessionProcess:
                     if future is not None and not future.done():
                         future.set_result(answer)
                 elif line.startswith(b"P"):
-                    await self._tell(line[1:].decode())
+                    await self.tell(line[1:].decode())
         except ValueError as error:  # a line beyond the limit
-            await self._tell(json.dumps({"what": "ended", "reason": f"an answer was too long: {error}"}))
+            await self.tell(json.dumps({"what": "ended", "reason": f"an answer was too long: {error}"}))
         else:
-            await self._tell(json.dumps({"what": "ended", "reason": "the process of this session has ended"}))
+            await self.tell(json.dumps({"what": "ended", "reason": "the process of this session has ended"}))
         finally:
             self._fail_waiting()
-
-    async def _tell(self, text: str) -> None:
-        # A page that has gone misses nothing: it is shown the whole state when it comes back.
-        if self._listener is not None:
-            with contextlib.suppress(Exception):
-                await self._listener(text)
 
     def _fail_waiting(self) -> None:
         for future in self._waiting.values():

@@ -6,53 +6,13 @@ It ends when the server closes its input, however the server has ended, with all
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import signal
 import sys
 import threading
-from collections.abc import Mapping
-from typing import IO, Any
 
 from .inbox import Inbox
-
-
-class Outbox:
-    """Lines to the server: ``P`` for the page, ``S`` for the server itself.
-
-    Parameters
-    ----------
-    stream
-        To the server.
-    """
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-
-    def page(self, message: Mapping[str, Any]) -> None:
-        """Say something to the page.
-
-        Parameters
-        ----------
-        message
-            Plain data; numbers are finite or ``None``.
-        """
-        self._write(b"P", message)
-
-    def server(self, message: Mapping[str, Any]) -> None:
-        """Answer a question of the server.
-
-        Parameters
-        ----------
-        message
-            Plain data with the ``number`` of the question.
-        """
-        self._write(b"S", message)
-
-    def _write(self, kind: bytes, message: Mapping[str, Any]) -> None:
-        line = json.dumps(message, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
-        self._stream.write(kind + line.encode() + b"\n")
-        self._stream.flush()
+from .outbox import Outbox
 
 
 def main() -> None:

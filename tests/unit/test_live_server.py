@@ -175,7 +175,8 @@ def test_uploads_are_bounded_in_size_and_number_and_leave_nothing(
 def test_the_name_of_an_upload_is_no_path(tmp_path: Path) -> None:
     names = {
         "../../etc/cron.csv": "cron.csv", "C:\\x\\run 1.CSV": "run_1.csv", "<img src=x>.csv": "img_src_x.csv",
-        "...csv": "record.csv", "\x1b[2J.mat": "2J.mat", "mapping.toml": "records.toml", "ü" * 300 + ".csv": "record.csv",
+        "...csv": "record.csv", "\x1b[2J.mat": "2J.mat", "mapping.toml": "records.toml",
+        "ü" * 300 + ".csv": "record.csv",
     }  # fmt: skip
     assert {name: plain_name(name) for name in names} == names
     for bad in ("deck.py", "passwd", "", "a.csv/../b", ".csv.exe"):

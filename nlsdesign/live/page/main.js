@@ -226,7 +226,7 @@ function showNumbers(design) {
     ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
     ["limits it sits on", wordsOf(design.active) || "none"],
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
-    ["answered in", `${plain(1e3 * answer.seconds, 2)} ms`],
+    ...(answer.controls.can_undo ? [["answered in", `${plain(1e3 * answer.seconds, 2)} ms`]] : []),
   ];
   byId("numbers").replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
 }
@@ -311,6 +311,7 @@ function cursor() {
 // The mechanism comes at once; what takes longer to compute comes when the hand rests.
 function showAngle(at) {
   if (at.mechanism) picture.show(at.mechanism);
+  if (at.mechanism !== undefined) picture.explain(at.reason);
   if (at.poles) atAngle.show(at);
 }
 

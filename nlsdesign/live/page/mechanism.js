@@ -56,6 +56,12 @@ export class MechanismPicture {
     set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}` });
   }
 
+  // Why there is no picture for this design; the one that is seen belongs to an earlier one.
+  explain(reason) {
+    if (reason) text(this.remark, `No picture of this design: ${reason}`);
+    for (const each of [this.near, this.whole]) each.classList.toggle("old", reason !== "");
+  }
+
   // A scale in each picture, of a round length.
   frame(wide, high, both, radius) {
     const code = `${wide} ${high} ${both} ${radius}`;
