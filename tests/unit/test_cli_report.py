@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from nlsdesign.errors import NlsError
-from nlsdesign.sweeps.sweep_parts import Parts
 from nlsdesign.sweeps.saltelli_plan import saltelli_plan
 from nlsdesign.sweeps.sweep_file import read_sweep_file
+from nlsdesign.sweeps.sweep_parts import Parts
 from nlsdesign.sweeps.sweep_table import about_text, read_sweep
 from tests.command_line import Run, run
 from tests.sweep_tables import AREA, DECK, spread_table
