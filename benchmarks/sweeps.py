@@ -160,7 +160,7 @@ def run_of(points: int, out: Path, executor: Any, others: Callable[[], float]) -
     given = asked(points)
     first, worked, begin = memory(), time.process_time(), time.perf_counter()
     actuator = given.pop("actuator")
-    table_ = nls.sweeps.sweep(actuator, out=out, executor=executor, **given)
+    table_ = nls.sweep(actuator, out=out, executor=executor, **given)
     wall = time.perf_counter() - begin
     assert len(table_) == points
     return {
@@ -180,7 +180,7 @@ def memory_of_driver(points: int, out: Path) -> dict[str, Any]:
 
     wheel = nls.assembly("wheel", wheel=nls.Inertia(inertia=quantity(1e-3, "kg*m^2", source="assumed")))
     begin = time.perf_counter()
-    nls.sweeps.sweep(
+    nls.sweep(
         wheel, axes=[nls.sweeps.GridAxis("wheel.inertia", 1e-3, 2e-3, points)],
         ask=nls.sweeps.FunctionQuestion(doubled, {"doubled": "kg*m^2"}), out=out,
     )  # fmt: skip

@@ -70,7 +70,6 @@ from .export import export_c as export_c
 from .export import export_fmu as export_fmu
 from .identification import Record as Record
 from .identification import RecordSet as RecordSet
-from .identification import agreement as agreement
 from .identification import fit_by_simulation as fit_by_simulation
 from .identification import free_parameter as free_parameter
 from .identification import load_record as load_record
@@ -81,7 +80,6 @@ from .model import flatten as flatten
 from .model.equations import equations as equations
 from .model.linear import linearise as linearise
 from .model.transform import with_outputs as with_outputs
-from .observer import Minimal as Minimal
 from .observer import PaperForm as PaperForm
 from .observer import design_observer as design_observer
 from .observer import design_observer_with_details as design_observer_with_details
@@ -95,5 +93,7 @@ from .simulation import Trace as Trace
 from .simulation import measure as measure
 from .simulation import simulate as simulate
 from .simulation import sine as sine
+from .sweeps import read_sweep as read_sweep
+from .sweeps import sweep as sweep
 
 __version__: str

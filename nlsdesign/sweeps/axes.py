@@ -93,7 +93,15 @@ class GridAxis(AxisSet):
     spacing: Literal["even", "ratio"] = "even"
 
     def bound(self, subject: Subject) -> BoundAxes:
-        """Return the axis; see :meth:`AxisSet.bound`."""
+        """Return the axis; see :meth:`AxisSet.bound`.
+
+        Raises
+        ------
+        UnknownNameError
+            If the name or the spacing does not exist.
+        ValueRangeError
+            If the count, an end or the spacing does not fit.
+        """
         _count(f"grid over {self.name}", self.count, 2)
         column, ends = subject.column(self.name, (self.lower, self.upper), "grid")
         lower, upper = _ends(column, ends)
@@ -123,7 +131,13 @@ class Listed(AxisSet):
     values: Mapping[str, Sequence[Given]]
 
     def bound(self, subject: Subject) -> BoundAxes:
-        """Return the axes; see :meth:`AxisSet.bound`."""
+        """Return the axes; see :meth:`AxisSet.bound`.
+
+        Raises
+        ------
+        ValueRangeError
+            If there are no rows, or names have rows of different length.
+        """
         names = ", ".join(self.values)
         if not self.values or any(isinstance(each, str) for each in self.values.values()):
             raise ValueRangeError(
@@ -232,7 +246,13 @@ class RandomDraws(AxisSet):
     names: tuple[str, ...] = ()
 
     def bound(self, subject: Subject) -> BoundAxes:
-        """Return the axes; see :meth:`AxisSet.bound`."""
+        """Return the axes; see :meth:`AxisSet.bound`.
+
+        Raises
+        ------
+        ValueRangeError
+            If no number of the deck has a spread.
+        """
         _count("random draws", self.count)
         prior = declared_prior(flatten(subject.base))
         groups = {key: list(inner) for key, inner in itertools.groupby(prior.names, key=_head)}

@@ -108,7 +108,13 @@ class SpreadQuestion(SweepQuestion):
         )
 
     def ask(self, assembly: Assembly) -> Mapping[str, float]:
-        """Return the errors."""
+        """Return the errors.
+
+        Raises
+        ------
+        ArrangementError
+            If no number of the deck has a spread.
+        """
         model, torque, angle = _plant(assembly, "", "")
         if not any(v.spread > 0.0 for v in model.parameters):
             raise ArrangementError(

@@ -95,6 +95,8 @@ def sweep_task(
 
     Raises
     ------
+    ArrangementError
+        If there is no deck.
     ValueRangeError
         If axes collide, or an answer has the name of an axis.
     NlsError
