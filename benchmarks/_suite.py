@@ -139,6 +139,15 @@ SUITE = (
         ),
     ),
     Benchmark(
+        "live_page", "The live page in a browser, from mouse to picture", "none",
+        (
+            Promise("seconds to the first paint", r"first paint ([\d.]+) s", most=1),
+            Promise("ms from mouse to picture, 95 %",
+                    r"from mouse to picture +\d+ +\d+ +(\d+)", most=100),
+        ),
+        arguments=("cam-actuator", "--moves", "300"), programs=("chromium",), modules=("starlette",),
+    ),
+    Benchmark(
         "observers", "Co-design of observers and errors over the spread",
         "SLSQP on eigenvalues; `solve_ivp` sample by sample",
         (
@@ -155,5 +164,10 @@ ELSEWHERE = (
     ("Deviations from MISRA C", "misra.md", "python -m benchmarks.misra"),
     ("How often the diagnosis is right", "discrepancy.md", "python -m benchmarks.discrepancy_score"),
     ("Random targets of a cam design", "cam_design.md", "python -m benchmarks.random_targets"),
+    (
+        "Sweeps of ten thousand points",
+        "scale.md",
+        "python -m benchmarks.sweeps --points 10000 --write docs/scale.md",
+    ),
 )
 """Measurements with a page of their own, which ``make bench`` does not repeat."""
