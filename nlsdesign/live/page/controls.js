@@ -1,7 +1,7 @@
 // Fields and sliders: points of the target, limits, sizes, rubber. Each is made once and then only updated,
 // so that the focus stays where a hand is.
 
-import { make, text } from "./elements.js";
+import { make, nameText, text } from "./elements.js";
 import { editable, factorOf, typed, unitOf, withUnit } from "./units.js";
 
 const SPAN = 4;
@@ -38,7 +38,7 @@ class NumberRow {
   // given: { label, value, unit, minimum, maximum, free, active, margin }
   show(given) {
     this.given = given;
-    text(this.name, given.label);
+    nameText(this.name, given.label);
     this.name.title = given.path ?? "";
     text(this.unit, unitOf(given.unit));
     const locked = given.free === true;

@@ -28,6 +28,13 @@ export function text(element, words) {
   if (element.textContent !== words) element.textContent = words;
 }
 
+// A name from a deck, which may go on in the next line after a dot or an underscore.
+export function nameText(element, words) {
+  if (element.textContent === words) return;
+  const pieces = words.split(/(?<=[._])/);
+  element.replaceChildren(...pieces.flatMap((piece, k) => (k ? [document.createElement("wbr"), piece] : [piece])));
+}
+
 export function byId(name) {
   return document.getElementById(name);
 }

@@ -1,7 +1,7 @@
 // What a design does over the angle, and at one angle.
 
 import { Chart, range } from "./chart.js";
-import { draw, make, text } from "./elements.js";
+import { draw, make, nameText, text } from "./elements.js";
 import { plain, withUnit } from "./units.js";
 
 const TONES = ["blue", "vermillion", "green", "purple"];
@@ -61,7 +61,7 @@ export class Panels {
       const used = each.upper ? each.value / each.bound : each.bound / each.value;
       const share = Number.isFinite(used) ? Math.min(1.15, Math.max(0, used)) / 1.15 : 0;
       row.classList.toggle("active", each.active);
-      text(row.children[0], each.of);
+      nameText(row.children[0], each.of);
       row.children[0].title = each.limit;
       text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, unit(each), 3)}${each.active ? " · active" : ""}`);
       row.children[2].firstChild.setAttribute("width", (300 * share).toFixed(1));
