@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 @click.command(
     epilog=examples(
-        "nlsdesign report out/sweep --smaller rms_error --smaller mass",
-        "nlsdesign report out/sweep --larger bandwidth --near 'peak_torque=5 N·m' --at-most 'strain=3'",
+        "nlsdesign report out/sweep --smaller torque_error_rms --smaller cam_radius",
+        "nlsdesign report out/sweep --larger bandwidth --at-most 'strain=3'",
         "nlsdesign report out/sweep --deck-of 17 --deck-of 42 --out out/chosen --json",
     )
 )
