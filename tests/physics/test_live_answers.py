@@ -35,6 +35,7 @@ from nlsdesign.live import (
 )
 from nlsdesign.live.background import BackgroundWork
 from nlsdesign.live.full_design import full_answer, whole_design
+from nlsdesign.live.live_snapshots import MOST_SNAPSHOTS
 from tests.renamed import in_words, renamed
 
 SAME = 2e-4
@@ -337,6 +338,20 @@ def test_another_deck_begins_anew(template: LiveDesign) -> None:
     assert template.shown is not None
     assert len(template.shown.mechanism(0.2).cables) == 1
     assert template.undo().controls.title == "cam-actuator"
+
+
+def test_designs_are_kept_by_name_up_to_the_most(template: LiveDesign) -> None:
+    template.snapshots.clear()
+    for k in range(MOST_SNAPSHOTS):
+        assert template.keep(str(k)).answer is template.answer
+    with pytest.raises(ValueRangeError, match="8 designs kept"):
+        template.keep("one more")
+    for name in ("", " ", "x" * 61, "two\nlines"):
+        with pytest.raises(ValueRangeError, match="1 to 60 printable characters"):
+            template.keep(name)
+    template.keep("0")
+    assert list(template.snapshots) == [str(k) for k in range(MOST_SNAPSHOTS)]
+    template.snapshots.clear()
 
 
 def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
