@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from .exports import EXPORTS, ExportDesign, ExportedDesign
     from .full_design import FullDesign
     from .gallery import GalleryCard, gallery_cards, gallery_question, question_of, question_of_deck
-    from .live_design import LiveDesign, Snapshot
+    from .live_design import LiveDesign
+    from .live_snapshots import Snapshot
     from .question import LiveQuestion, TargetPoint
     from .saved import SavedDesign, reopened
     from .work import (
@@ -95,6 +96,7 @@ _PLACES = (
     "full_design",
     "gallery",
     "live_design",
+    "live_snapshots",
     "question",
     "saved",
     "work",

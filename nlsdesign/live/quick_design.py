@@ -18,7 +18,9 @@ from ..model.derived_deck import derived
 from ..quantity import Quantity
 from .answers import DesignView
 from .question import LiveQuestion
-from .quick_program import QuickOutcome, QuickPoint, QuickProgram, structure_of
+from .quick_program import QuickProgram
+from .quick_rows import structure_of
+from .quick_search import QuickOutcome, QuickPoint
 from .views import ALLOWED, curve_columns, margins_of, shown_numbers
 
 Floats = NDArray[np.float64]
@@ -96,17 +98,14 @@ class QuickDesign:
 
     @cached_property
     def _numbers(self) -> dict[str, Floats]:
-        outputs = self.program.outputs
-        columns = outputs(self.point.unknowns, self.program.numbers_of(self.question))
-        names = self.program.output_names
-        return {name: np.array(c, dtype=float).ravel() for name, c in zip(names, columns, strict=True)}
+        return self.program.outputs.columns(self.point.unknowns, self.question)
 
     @cached_property
     def contour(self) -> Contour:
         """Contour of the cam."""
         anchor = self.question.cam.anchor_distance
         rows = self._numbers
-        if self.program.problem.contour is None:
+        if self.program.rows.problem.contour is None:
             cam = self.question.machine.assembly[self.question.cam.name]
             return contour_of_cam(cam, last_angle=self.question.target.last_angle)
         return contour_from_curvature(
@@ -121,15 +120,15 @@ class QuickDesign:
     @property
     def values(self) -> dict[str, float]:
         """Sizes of the design in SI by name."""
-        names = [v.name for v in self.program.problem.scalars]
+        names = [v.name for v in self.program.rows.problem.scalars]
         found = dict(zip(names, self._numbers["sizes"].tolist(), strict=True))
         return {name: found.get(name, n.value) for name, n in self.question.numbers.items()}
 
     @cached_property
     def numbers(self) -> DesignedNumbers:
         """What of it is kept when its program is not."""
-        chosen = self.program.chosen_values(self.point.unknowns) | self.values
-        shaped = self.program.problem.contour is not None
+        chosen = self.program.outputs.chosen_values(self.point.unknowns) | self.values
+        shaped = self.program.rows.problem.contour is not None
         return DesignedNumbers(self.question, chosen, self.contour, shaped)
 
     def view(self, revision: int) -> DesignView:
@@ -141,7 +140,7 @@ class QuickDesign:
             Of the question.
         """
         rows = self._numbers
-        pieces = list(self.program.problem.design.strains)
+        pieces = list(self.program.rows.problem.design.strains)
         strains, stresses = (rows[key].reshape(len(pieces), -1) for key in ("strains", "stresses"))
         curves = DesignCurves(
             angles=rows["angle"], lever_arms=rows["lever_arm"], radii=rows["radius"],
@@ -170,7 +169,7 @@ class QuickDesign:
     def _limits(self, rows: dict[str, Floats]) -> list[LimitState]:
         states = []
         for i, (bound, wanted) in enumerate(
-            zip(self.program.shown_bounds, self.program.values_of(self.question), strict=True)
+            zip(self.program.rows.shown_bounds, self.program.rows.values_of(self.question), strict=True)
         ):
             values = rows[f"bound {i}"]
             value = float(values.max() if bound.upper else values.min())
@@ -195,7 +194,7 @@ class QuickSolver:
             Any.
         """
         key = structure_of(question)
-        if key not in self._programs or not self._programs[key].fits(question):
+        if key not in self._programs or not self._programs[key].rows.fits(question):
             self._programs[key] = QuickProgram(question)
             self._programs[key].prepare()
         self._programs.move_to_end(key)
@@ -228,18 +227,18 @@ class QuickSolver:
             Its numbers in SI by name, where its program is not kept; empty where there is no design.
         """
         program = self.program(question)
-        values = program.scaled_values(values if last is None else last.numbers.values)
-        begin = program.completed(question, values)
+        values = program.outputs.scaled_values(values if last is None else last.numbers.values)
+        begin = program.rows.completed(question, values)
         contradicted, self._contradicted = self._contradicted is program, None
         if contradicted:
             # Limits that contradicted each other a moment ago are asked first.
-            kept = program.conflict(question, begin)
+            kept = program.softened.conflict(question, begin)
             if kept.state == "infeasible":
                 self._contradicted = program
                 return None, kept
         outcome = self._tried(program, question, last, values)
         if outcome.state != "solved" and not contradicted:
-            kept = program.conflict(question, begin)
+            kept = program.softened.conflict(question, begin)
             if kept.state == "infeasible":
                 self._contradicted = program
                 return None, kept
@@ -274,7 +273,7 @@ class QuickSolver:
             In SI by name.
         """
         program = self.program(question)
-        outcome = program.from_values(question, program.scaled_values(values))
+        outcome = program.from_values(question, program.outputs.scaled_values(values))
         if outcome.state != "solved" or outcome.point is None:
             return None
         return QuickDesign(program, question, outcome.point, outcome.cost)
@@ -308,7 +307,7 @@ def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, floa
         Finished.
     """
     values = {name: given.number for name, given in design.changes if len(given.values) == 1}
-    problem, contour = program.problem, design.contour
+    problem, contour = program.rows.problem, design.contour
     if problem.contour is None:
         return values
     for radius, value in zip(

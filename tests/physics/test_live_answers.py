@@ -35,6 +35,7 @@ from nlsdesign.live import (
 )
 from nlsdesign.live.background import BackgroundWork
 from nlsdesign.live.full_design import full_answer, whole_design
+from nlsdesign.live.live_snapshots import MOST_SNAPSHOTS
 from tests.renamed import in_words, renamed
 
 SAME = 2e-4
@@ -134,7 +135,7 @@ def path(deck: str, drags: int) -> None:
     assert fresh.answer.design is not None
     largest = live.question.target.largest
     if abs(answer.design.rms_error - fresh.answer.design.rms_error) > SAME * largest:
-        solved = live._now.solved
+        solved = live._history.now.solved
         full = whole_design(lambda _: None, live.question.actuator, live.question.target,
                             live.question.free, live.question.keep)  # fmt: skip
         assert "local optimum" in full_answer(full, live.question, answer, solved).message
@@ -268,7 +269,7 @@ def test_a_whole_design_says_where_the_quick_one_differs(
 ) -> None:
     """A quick answer at a worse optimum is stated with its numbers; the whole design takes its place."""
     monkeypatch.setattr("nlsdesign.live.full_design.STARTS", 1)
-    question, answer, solved = template.question, template.answer, template._now.solved
+    question, answer, solved = template.question, template.answer, template._history.now.solved
     assert solved is not None
     full = whole_design(lambda _: None, question.actuator, question.target, question.free, question.keep)
     same = full_answer(full, question, answer, solved)
@@ -280,7 +281,7 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert "came to no answer: stopped; shown is the quick answer, unchecked" in unanswered.message
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
     assert "worse local optimum: 0.0175 mN·m rms against 0.0175 mN·m rms now" in worse.message
-    template._settled(full)
+    template._history.settle(full)
     assert template.answer.source == "full"
     assert template.at(0.3).revision == template.answer.revision
 
@@ -339,6 +340,20 @@ def test_another_deck_begins_anew(template: LiveDesign) -> None:
     assert template.undo().controls.title == "cam-actuator"
 
 
+def test_designs_are_kept_by_name_up_to_the_most(template: LiveDesign) -> None:
+    template.snapshots.clear()
+    for k in range(MOST_SNAPSHOTS):
+        assert template.keep(str(k)).answer is template.answer
+    with pytest.raises(ValueRangeError, match="8 designs kept"):
+        template.keep("one more")
+    for name in ("", " ", "x" * 61, "two\nlines"):
+        with pytest.raises(ValueRangeError, match="1 to 60 printable characters"):
+            template.keep(name)
+    template.keep("0")
+    assert list(template.snapshots) == [str(k) for k in range(MOST_SNAPSHOTS)]
+    template.snapshots.clear()
+
+
 def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     template: LiveDesign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -347,7 +362,7 @@ def test_programs_are_not_kept_with_the_steps_that_can_be_undone(
     before = template.answer.design
     point = template.question.points[2]
     template.apply(AddPoint(0.5, 0.21))
-    assert template._past[-1].solved is None
+    assert template._history.past[-1].solved is None
     back = template.undo()
     assert back.design is not None
     assert before is not None

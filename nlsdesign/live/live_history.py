@@ -1,0 +1,77 @@
+"""The moments of one session: the present one, those that can be undone, those that can be done again."""
+
+from __future__ import annotations
+
+from .full_design import FullDesign
+from .live_moment import LiveMoment, first_moment, next_moment, settled_moment
+from .question import LiveQuestion
+from .quick_design import QuickSolver
+
+MOST_UNDO = 200
+"""Steps that can be undone."""
+
+
+class LiveHistory:
+    """The moments of one session; one whose program the solver has dropped goes on without it.
+
+    Parameters
+    ----------
+    question
+        With which it begins.
+    values
+        Numbers in SI of a design to begin beside, by name; empty without one.
+    """
+
+    def __init__(self, question: LiveQuestion, values: dict[str, float]) -> None:
+        self._solver = QuickSolver()
+        self._grip: str | None = None
+        self.past: list[LiveMoment] = []
+        self.future: list[LiveMoment] = []
+        self.now = first_moment(self._solver, question, values)
+
+    def ask(self, question: LiveQuestion, drag: str | None) -> None:
+        """Make a changed question with its answer the present moment.
+
+        Parameters
+        ----------
+        question
+            Changed.
+        drag
+            Name of what is being dragged: steps with the same name, one after the other, are one step.
+        """
+        moment = next_moment(self._solver, question, self.now)
+        if drag is None or drag != self._grip:
+            self.past = [*self.past, self.now][-MOST_UNDO:]
+        self._grip, self.future = drag, []
+        self._go_to(moment)
+
+    def undo(self) -> None:
+        """Make the moment before the present one, where there is one."""
+        self._step(self.past, self.future)
+
+    def redo(self) -> None:
+        """Make the moment after the present one, where there is one."""
+        self._step(self.future, self.past)
+
+    def settle(self, full: FullDesign) -> None:
+        """Take the whole design as the answer of the present moment.
+
+        Parameters
+        ----------
+        full
+            Of its question.
+        """
+        self.now = settled_moment(self._solver, self.now, full)
+
+    def _step(self, source: list[LiveMoment], left: list[LiveMoment]) -> None:
+        if source:
+            left.append(self.now)
+            self._grip = None
+            self._go_to(source.pop().under_revision(self.now.answer.revision + 1))
+
+    def _go_to(self, moment: LiveMoment) -> None:
+        for row in (self.past, self.future):
+            for k, each in enumerate(row):
+                if each.solved is not None and not self._solver.keeps(each.solved):
+                    row[k] = each.without_program()
+        self.now = moment.with_controls(can_undo=bool(self.past), can_redo=bool(self.future))

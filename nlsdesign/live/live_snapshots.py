@@ -1,0 +1,66 @@
+"""Designs that are kept under a name, to be shown beside others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import ValueRangeError
+from .answers import LiveAnswer
+from .question import LiveQuestion
+
+MOST_SNAPSHOTS = 8
+"""Designs that are kept side by side."""
+_NAME = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A design that was kept under a name.
+
+    Parameters
+    ----------
+    name
+        Given by the designer.
+    question
+        What was asked.
+    answer
+        What was answered.
+    """
+
+    name: str
+    question: LiveQuestion
+    answer: LiveAnswer
+
+
+class Snapshots(dict[str, Snapshot]):
+    """The designs that are kept, by name."""
+
+    def keep(self, name: str, question: LiveQuestion, answer: LiveAnswer) -> Snapshot:
+        """Keep a design under a name; one of that name is replaced.
+
+        Parameters
+        ----------
+        name
+            Up to 60 characters.
+        question
+            What was asked.
+        answer
+            What was answered.
+
+        Raises
+        ------
+        ValueRangeError
+            If the name is empty or too long, or too many are kept.
+        """
+        if not 1 <= len(name.strip()) <= _NAME or not name.isprintable():
+            raise ValueRangeError(
+                f"name of a design '{name:.80}'", f"has 1 to {_NAME} printable characters",
+                next_step="take a short name",
+            )  # fmt: skip
+        if name not in self and len(self) >= MOST_SNAPSHOTS:
+            raise ValueRangeError(
+                f"{len(self)} designs kept", f"are the most, {MOST_SNAPSHOTS}",
+                next_step="drop one of them",
+            )  # fmt: skip
+        self[name] = Snapshot(name, question, answer)
+        return self[name]

@@ -1,0 +1,207 @@
+"""Unknowns and rows of the quick program of one structure, and the numbers that a question gives them.
+
+Points of the target are parameters; numbers of limits are bounds of rows; numbers that are held are variables
+whose bounds meet. So a drag changes numbers only, and all expressions stand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, cast
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..design import Target
+from ..design.optimisation.limits import Bound
+from ..design.optimisation.problem import SymbolicTarget, design_problem
+from ..design.optimisation.solve import GOALS
+from ..design.optimisation.variables import scaled
+from ..design.statics.equilibrium import elastic_law
+from ..design.statics.rounding import has_corners
+from .movable_target import MovableTarget
+from .question import LiveQuestion
+
+Floats = NDArray[np.float64]
+
+ROUNDING = 0.003
+"""Width over which knots of a rubber's law are rounded, relative to its stretch, as a design begins."""
+_RESCALED = 8.0
+"""Factor of torque times angle from which the variables are scaled anew."""
+
+
+class QuickRows:
+    """Unknowns, rows and parameters of one structure: see :func:`structure_of`.
+
+    Parameters
+    ----------
+    question
+        One of its questions, whose sizes scale the variables.
+    """
+
+    def __init__(self, question: LiveQuestion) -> None:
+        machine, cam = question.machine, question.cam
+        # Held here: structures are told apart by the identity of their machine.
+        self.machine = machine
+        self._size = question.target_size * question.target.last_angle
+        self.target = MovableTarget(len(question.target.angles) - 1, question.target.last_angle)
+        contour = [question.contour] if question.contour in question.free else []
+        sizes = [name for name in machine.sizes if contour or name != cam.anchor_distance]
+        knots = has_corners(elastic_law(machine.model, cam.drive).function)
+        self.problem = design_problem(
+            machine.model,
+            machine.assembly[cam.name],
+            target=cast(Target, self.target),
+            free=[*contour, *sizes],
+            spring=cam.drive,
+            rounding=ROUNDING if knots else 0.0,
+            symbols=SymbolicTarget(question.target, self.target.end),
+        )
+        design = self.problem.design
+        kept: list[Bound] = []
+        watched: list[Bound] = []
+        for each in question.limit_values.values():
+            bounds = each.kind.limit(each.value).bounds(design)
+            (kept if question.keeps(each.kind) else watched).extend(bounds)
+        self.bounds: tuple[Bound, ...] = tuple(kept)
+        self.shown_bounds: tuple[Bound, ...] = (*kept, *watched)
+        self.cost = sum((goal.cost(design) for goal in GOALS), start=ca.SX(0))
+        parameters = self.target.numbers(question.target)
+        scales = ca.vertcat(*[bound.scale for bound in self.bounds])
+        self.scales = np.array(ca.Function("scales", [self.target.symbols], [scales])(parameters)).ravel()
+        self._names = [v.name for v in self.problem.variables]
+
+    @cached_property
+    def limit_rows(self) -> list[ca.SX]:
+        """Rows of the limits that are kept, each relative to its scale."""
+        return [bound.expression / scale for bound, scale in zip(self.bounds, self.scales, strict=True)]
+
+    @cached_property
+    def program(self) -> dict[str, Any]:
+        """The nonlinear program: unknowns, cost, rows and parameters."""
+        held = [row.expression for row in self.problem.structure]
+        return {
+            "x": self.problem.vector,
+            "f": self.cost,
+            "g": ca.vertcat(*held, *self.limit_rows),
+            "p": self.target.symbols,
+        }
+
+    def fits(self, question: LiveQuestion) -> bool:
+        """Tell whether the variables are scaled for a target as large as that of a question.
+
+        Parameters
+        ----------
+        question
+            Of this structure.
+        """
+        ratio = question.target_size * question.target.last_angle / self._size
+        return 1.0 / _RESCALED < ratio < _RESCALED
+
+    def limits_of(self, question: LiveQuestion) -> tuple[Floats, Floats]:
+        """Return the bounds of the rows.
+
+        Parameters
+        ----------
+        question
+            Of this structure.
+        """
+        low = [np.full(row.expression.shape[0], row.lower) for row in self.problem.structure]
+        high = [np.full(row.expression.shape[0], row.upper) for row in self.problem.structure]
+        for bound, value, scale in zip(self.bounds, self.values_of(question), self.scales, strict=False):
+            size, at = bound.expression.shape[0], value / scale
+            low.append(np.full(size, -np.inf if bound.upper else at))
+            high.append(np.full(size, at if bound.upper else np.inf))
+        return np.concatenate(low), np.concatenate(high)
+
+    def values_of(self, question: LiveQuestion) -> list[float]:
+        """Return the number of each bound, the kept ones first, as a question has it.
+
+        Parameters
+        ----------
+        question
+            Of this structure.
+        """
+        return [question.limit_values[bound.limit].value for bound in self.shown_bounds]
+
+    def ranges_of(self, question: LiveQuestion) -> tuple[Floats, Floats]:
+        """Return the bounds of the variables: what is held has no room.
+
+        Parameters
+        ----------
+        question
+            Of this structure.
+        """
+        low = np.array([v.lower for v in self.problem.variables])
+        high = np.array([v.upper for v in self.problem.variables])
+        numbers = question.numbers
+        for i, variable in enumerate(self.problem.scalars):
+            state = numbers[variable.name]
+            ends = (state.minimum, state.maximum) if state.free else (state.value, state.value)
+            low[i], high[i] = (
+                scaled(variable, end) if math.isfinite(end) else natural
+                for end, natural in zip(ends, (low[i], high[i]), strict=True)
+            )
+        if "last_direction" in self._names:
+            at, last = self._names.index("last_direction"), question.target.last_angle
+            low[at], high[at] = last, last + math.pi / 2
+        return low, high
+
+    def numbers_of(self, question: LiveQuestion) -> Floats:
+        """Return the numbers of the target.
+
+        Parameters
+        ----------
+        question
+            Of this structure.
+        """
+        return self.target.numbers(question.target)
+
+    def completed(self, question: LiveQuestion, values: Mapping[str, float]) -> Floats:
+        """Return the unknowns that follow from some of them, with held numbers as the question has them.
+
+        Parameters
+        ----------
+        question
+            Of this structure.
+        values
+            Scaled values by name.
+        """
+        low, high = self.ranges_of(question)
+        parameters = self.numbers_of(question)
+        wanted = [values.get(v.name, v.start) for v in self.problem.variables]
+        point: Floats = np.clip(np.array(wanted), low, high)
+        states, errors = self.problem.states.shape[0], self.problem.structure[-1].expression.shape[0]
+        first = len(point) - errors - states
+        follows, misses = self._following
+        if states:
+            point[first : first + states] = np.array(follows(point, parameters)).ravel()
+        point[len(point) - errors :] += np.array(misses(point, parameters)).ravel()
+        return point
+
+    @cached_property
+    def _following(self) -> tuple[ca.Function, ca.Function]:
+        given = [self.problem.vector, self.target.symbols]
+        errors = self.problem.structure[-1].expression / 0.01
+        return ca.Function("states", given, [self.problem.states]), ca.Function("errors", given, [errors])
+
+
+def structure_of(question: LiveQuestion) -> tuple[Any, ...]:
+    """Return what two questions must share for one program: equal keys, one program.
+
+    Parameters
+    ----------
+    question
+        Any.
+    """
+    free, target = question.contour in question.free, question.target
+    return (
+        id(question.machine),
+        free,
+        len(target.angles),
+        None if free else target.last_angle,
+        tuple(question.limit_values),
+    )

@@ -1,0 +1,82 @@
+"""What a search of a quick program begins with, how it is set up, and what it comes to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+"""States of the solver that count as solved."""
+MOST_ITERATIONS = 120
+"""Iterations at most of a search from a start."""
+_COMMON: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "show_eval_warnings": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.tol": 1e-9,
+    "ipopt.acceptable_tol": 1e-7,
+    "ipopt.honor_original_bounds": "yes",
+    "ipopt.mumps_permuting_scaling": 0,
+    "ipopt.mumps_scaling": 0,
+}
+_NONE: Floats = np.zeros(0)
+
+
+class QuickPoint(NamedTuple):
+    """Where a search begins or ended: unknowns and, where they are known, multipliers of one program."""
+
+    unknowns: Floats
+    of_bounds: Floats = _NONE
+    of_rows: Floats = _NONE
+
+
+@dataclass(frozen=True, eq=False)
+class QuickOutcome:
+    """What a search came to.
+
+    Parameters
+    ----------
+    state
+        ``"solved"``, ``"infeasible"`` or ``"not solved"``.
+    words
+        Of the solver, or what is in conflict.
+    point
+        Where it is solved.
+    cost
+        Sum of the goals.
+    conflicts
+        Names of the limits that contradict each other.
+    """
+
+    state: str
+    words: str
+    point: QuickPoint | None = None
+    cost: float = math.inf
+    conflicts: tuple[str, ...] = ()
+
+
+def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:
+    """Return the solver of a program.
+
+    Parameters
+    ----------
+    name
+        Of the function.
+    program
+        Unknowns ``x``, cost ``f``, rows ``g`` and parameters ``p``.
+    iterations
+        At most.
+    **options
+        Of Ipopt, besides those of all searches.
+    """
+    settings = {f"ipopt.{key}": value for key, value in options.items()}
+    return ca.nlpsol(name, "ipopt", program, {**_COMMON, **settings, "ipopt.max_iter": iterations})
