@@ -18,8 +18,19 @@ from nlsdesign.errors import UnitError
 from nlsdesign.quantity import parse_unit
 
 ROOMS = (
-    *("analysis", "cli", "components", "control", "design", "discrepancy", "export", "figures"),
-    *("identification", "model", "observer", "report", "simulation"),
+    *(
+        "analysis",
+        "calibration",
+        "cli",
+        "components",
+        "control",
+        "design",
+        "discrepancy",
+        "export",
+        "figures",
+    ),
+    *("identification", "live", "model", "observer", "report", "simulation", "sweep_report", "sweeps"),
+    "work_sharing",
     "top",
     "models",
     "studies",

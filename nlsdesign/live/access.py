@@ -141,11 +141,11 @@ class Access:
 
 def _headers(scope: Scope) -> dict[str, str]:
     """Return the headers by name; one that comes twice is of no value."""
-    found: dict[str, str] = {}
+    headers: dict[str, str] = {}
     for name, value in scope["headers"]:
         key = name.decode("latin-1").lower()
-        found[key] = "" if key in found else value.decode("latin-1")
-    return found
+        headers[key] = "" if key in headers else value.decode("latin-1")
+    return headers
 
 
 def _opened(headers: dict[str, str]) -> bool:

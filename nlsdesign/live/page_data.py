@@ -25,8 +25,8 @@ def answer_data(answer: LiveAnswer) -> dict[str, Any]:
     answer
         To an edit.
     """
-    said: dict[str, Any] = to_json(dataclasses.replace(answer, design=None))
-    return {**said, "design": design_data(answer.design), "stale": answer.stale}
+    data: dict[str, Any] = to_json(dataclasses.replace(answer, design=None))
+    return {**data, "design": design_data(answer.design), "stale": answer.stale}
 
 
 def design_data(design: DesignView | None) -> dict[str, Any] | None:
@@ -43,8 +43,8 @@ def design_data(design: DesignView | None) -> dict[str, Any] | None:
         {"name": each.name, "unit": each.unit, "values": short_numbers(each.values)}
         for each in design.columns
     ]
-    said: dict[str, Any] = to_json(dataclasses.replace(design, columns=(), contour=np.zeros((0, 2))))
-    return {**said, "columns": columns}
+    data: dict[str, Any] = to_json(dataclasses.replace(design, columns=(), contour=np.zeros((0, 2))))
+    return {**data, "columns": columns}
 
 
 def angle_data(answer: AngleAnswer) -> dict[str, Any]:

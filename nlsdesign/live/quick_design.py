@@ -121,8 +121,8 @@ class QuickDesign:
     def values(self) -> dict[str, float]:
         """Sizes of the design in SI by name."""
         names = [v.name for v in self.program.rows.problem.scalars]
-        found = dict(zip(names, self._numbers["sizes"].tolist(), strict=True))
-        return {name: found.get(name, n.value) for name, n in self.question.numbers.items()}
+        chosen = dict(zip(names, self._numbers["sizes"].tolist(), strict=True))
+        return {name: chosen.get(name, n.value) for name, n in self.question.numbers.items()}
 
     @cached_property
     def numbers(self) -> DesignedNumbers:

@@ -69,7 +69,7 @@ class SessionDesign:
         """
         if not inbox.waiting:
             choices()
-        said = time.monotonic()
+        last_news = time.monotonic()
         while True:
             waits = self._news.idle and self._file_for is None
             message = inbox.take(None if waits else _TICK)
@@ -80,8 +80,8 @@ class SessionDesign:
                 self._serve(message["server"])
             else:
                 self._questions.answer(message["page"])
-            if time.monotonic() - said >= _NEWS:
-                said = time.monotonic()
+            if time.monotonic() - last_news >= _NEWS:
+                last_news = time.monotonic()
                 self._news.news()
 
     def _begin(self, live: LiveDesign, trouble: str = "") -> None:

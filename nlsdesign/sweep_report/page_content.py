@@ -10,7 +10,7 @@ import numpy as np
 from ..sweeps import SweepColumn, SweepTable
 from ..sweeps.ranked_points import RankedPoints
 from ..sweeps.sensitivity import AnswerSensitivity
-from .shown_points import Shown
+from .shown_points import ShownPoints
 
 
 def listed_names(names: list[str], most: int = 8) -> str:
@@ -47,7 +47,7 @@ class PageContent(NamedTuple):
 
     table: SweepTable
     ranked: RankedPoints
-    shown: Shown
+    shown: ShownPoints
     answers: tuple[str, ...]
     sensitivities: dict[str, AnswerSensitivity]
     points_file: Path

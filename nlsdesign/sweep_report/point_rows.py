@@ -11,7 +11,7 @@ from ..errors import visible
 from ..quantity import typeset_unit
 from ..sweeps import SweepColumn, SweepTable
 from ..sweeps.ranked_points import RankedPoints
-from .shown_points import Shown, shown_column
+from .shown_points import ShownPoints, shown_column
 
 _DIGITS, _LONGEST = 6, 300
 
@@ -39,7 +39,7 @@ def named_columns(table: SweepTable) -> list[tuple[str, str]]:
     return [(each.name, typeset_unit(each.unit or "1")) for each in shown]
 
 
-def point_rows(table: SweepTable, ranked: RankedPoints, shown: Shown) -> dict[int, Mapping[str, Any]]:
+def point_rows(table: SweepTable, ranked: RankedPoints, shown: ShownPoints) -> dict[int, Mapping[str, Any]]:
     """Return for each point that is shown its status, reason and values, by number.
 
     Parameters
@@ -70,7 +70,7 @@ def point_rows(table: SweepTable, ranked: RankedPoints, shown: Shown) -> dict[in
     return rows
 
 
-def _texts(table: SweepTable, column: SweepColumn, shown: Shown) -> list[Any]:
+def _texts(table: SweepTable, column: SweepColumn, shown: ShownPoints) -> list[Any]:
     """Return the values of one column as JSON holds them; nothing where an answer is missing."""
     values = shown_column(table, column, shown.rows).values
     if values.dtype.kind not in "fiub":

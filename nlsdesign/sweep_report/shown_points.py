@@ -17,7 +17,7 @@ _UNITS: Final = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "m^2": ("mm^2"
 _SEED: Final = 0
 
 
-class Shown(NamedTuple):
+class ShownPoints(NamedTuple):
     """Points that the page shows.
 
     Parameters
@@ -67,7 +67,7 @@ def shown_column(
     return ShownColumn(column.name, "", values.astype(str))
 
 
-def shown_points(table: SweepTable, ranked: RankedPoints) -> Shown:
+def shown_points(table: SweepTable, ranked: RankedPoints) -> ShownPoints:
     """Return the points that are shown: failures, the front, the ends of columns, and others by lot.
 
     Parameters
@@ -106,7 +106,7 @@ def shown_points(table: SweepTable, ranked: RankedPoints) -> Shown:
         np.asarray(table.values["point"])[rows].astype(np.int64),
         on_front[rows], ranked.missed[rows], ranked.failed[rows],
     )  # fmt: skip
-    return Shown(rows, kinds, rule.strip())
+    return ShownPoints(rows, kinds, rule.strip())
 
 
 def _ends(table: SweepTable) -> NDArray[np.bool_]:

@@ -169,7 +169,7 @@ def _sensitivities(
     axes = {axis.name: np.asarray(table.values[axis.name]) for axis in table.axes}
     chosen = {name: answers[name] for name in names[:_MOST_SENSITIVITIES]}
     try:
-        found = sensitivity(axes, chosen, table.done)
+        shares = sensitivity(axes, chosen, table.done)
     except MissingLibraryError as error:
         return {}, [f"No shares of the variance: {error}"]
     left = len(names) - len(chosen)
@@ -178,7 +178,7 @@ def _sensitivities(
         if left
         else []
     )
-    return {each.answer: each for each in found}, remarks
+    return {each.answer: each for each in shares}, remarks
 
 
 def _listed_rows(table: SweepTable, ranked: RankedPoints) -> tuple[list[int], dict[int, str]]:
