@@ -66,28 +66,31 @@ def serve(
             ready(access.address)
             await sessions.prepare()
 
-    @contextlib.asynccontextmanager
-    async def kept_in_bounds() -> AsyncIterator[None]:
-        async def look() -> None:
-            while True:
-                await asyncio.sleep(_PAUSE)
-                sessions.end_the_idle()
-                if sessions.quiet:
-                    await sessions.prepare()
-
-        looking = asyncio.create_task(look())
-        try:
-            yield
-        finally:
-            looking.cancel()
-            await asyncio.gather(*(process.gone() for process in sessions.end_all()))
-
     async def run() -> None:
-        async with kept_in_bounds():
+        async with _kept_in_bounds(sessions):
             await Server(_settings(application(sessions, access))).serve(sockets=[listener])
+        # An interrupt that came when there was nothing to wait for cancels this task at its next pause.
+        await asyncio.sleep(0)
 
     with contextlib.closing(listener):
         asyncio.run(run())
+
+
+@contextlib.asynccontextmanager
+async def _kept_in_bounds(sessions: Sessions) -> AsyncIterator[None]:
+    async def look() -> None:
+        while True:
+            await asyncio.sleep(_PAUSE)
+            sessions.end_the_idle()
+            if sessions.quiet:
+                await sessions.prepare()
+
+    looking = asyncio.create_task(look())
+    try:
+        yield
+    finally:
+        looking.cancel()
+        await asyncio.gather(*(process.gone() for process in sessions.end_all()))
 
 
 def _require_libraries() -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...simulation.column_graph import Call, ColumnGraph, Operation, TableReading
+from ..files import filled, shell
 
 WIDTH = 8
 """Columns that are computed together."""
@@ -53,78 +54,6 @@ _LIBRARY: Mapping[int, str] = {
 }  # fmt: skip
 _TWO_OPERANDS = frozenset(["pow", "hypot", "atan2", "fmod"])
 
-_HEAD = """\
-#include <math.h>
-#include <stdint.h>
-#include <string.h>
-
-#define WIDTH {width}
-#ifdef _WIN32
-#define SHOWN __declspec(dllexport)
-#else
-#define SHOWN __attribute__((visibility("default")))
-#endif
-typedef double column __attribute__((vector_size(WIDTH * 8)));
-typedef int64_t mask __attribute__((vector_size(WIDTH * 8)));
-
-static inline column all(double value) {{ return (column){{0}} + value; }}
-static inline column choose(mask which, column a, column b) {{
-    return (column)(((mask)a & which) | ((mask)b & ~which));
-}}
-static inline column number(mask which) {{ return (column)((mask)all(1.0) & which); }}
-static inline column load(const double *from) {{
-    column value;
-    memcpy(&value, from, sizeof value);
-    return value;
-}}
-static inline void store(double *to, column value) {{ memcpy(to, &value, sizeof value); }}
-"""
-
-_LOOK_UP = """\
-static void look_up(const double *grid, const double *values, int64_t nodes, int64_t columns, int exact,
-                    column at, column *result) {
-    for (int j = 0; j < WIDTH; ++j) {
-        double x = at[j];
-        int64_t low = 0, high = nodes - 1;
-        if (exact) {
-            const double place = (x - grid[0]) * (double)(nodes - 1) / (grid[nodes - 1] - grid[0]);
-            low = place > 0.0 ? (int64_t)place : 0;
-            if (low > nodes - 2) low = nodes - 2;
-        } else {
-            while (high - low > 1) {
-                int64_t middle = low + (high - low) / 2;
-                if (x < grid[middle]) high = middle; else low = middle;
-            }
-        }
-        double share = (x - grid[low]) / (grid[low + 1] - grid[low]);
-        for (int64_t k = 0; k < columns; ++k)
-            result[k][j] = (1.0 - share) * values[low * columns + k]
-                           + share * values[(low + 1) * columns + k];
-    }
-}
-"""
-
-_RUN = """\
-SHOWN void run(int64_t samples, int64_t groups, double *state, const double *given,
-                  const double *parameter, double *kept) {{
-    int64_t every = groups * WIDTH;
-    for (int64_t group = 0; group < groups; ++group) {{
-        int64_t at = group * WIDTH;
-        column s[{states} + 1], p[{parameters} + 1];
-{onces}
-        for (int i = 0; i < {states}; ++i) s[i] = load(state + i * every + at);
-        for (int i = 0; i < {parameters}; ++i) p[i] = load(parameter + i * every + at);
-{fixed}
-        for (int64_t k = 0; k < samples; ++k) {{
-            const double *g = given + k * {inputs} * every + at;
-            double *out = kept + k * {shown} * every + at;
-{body}
-        }}
-        for (int i = 0; i < {states}; ++i) store(state + i * every + at, s[i]);
-    }}
-}}
-"""
-
 
 def sampled_run_in_c(graph: ColumnGraph) -> str:
     """Return C code of a run of samples, for many columns.
@@ -134,9 +63,9 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
     graph
         (state, what is given, parameters) -> (state after the sample, what is kept), parameters fixed.
     """
-    written = [_HEAD.format(width=WIDTH)]
+    written = [filled("columns.c", {"width": str(WIDTH)})]
     if graph.tables:
-        written.append(_LOOK_UP)
+        written.append(shell("columns_look_up.c"))
     used = {
         step.code for each in (graph, *graph.bodies) for step in each.steps if isinstance(step, Operation)
     }
@@ -151,7 +80,7 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
     fixed = [_operation(s, graph, names) for s in graph.steps if _is_fixed(s, graph)]
     onces = []
     for k, (place, operands) in enumerate(graph.onces):
-        onces.append(f"        column o{k}[{len(crossing[place])} + 1];")
+        onces.append(f"column o{k}[{len(crossing[place])} + 1];")
         values = "".join(f"{_name(v, graph, names)}, " for v in operands)
         fixed.append(f"{{ column a[] = {{{values}{{0}}}}; once{place}(a, o{k}); }}")
     names |= {number: f"s[{i}]" for i, number in enumerate(state)}
@@ -161,13 +90,9 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
     lines += [f"store(out + {i} * every, {_name(v, graph, names)});" for i, v in enumerate(kept)]
     lines += [f"column n{i} = {_name(v, graph, names)};" for i, v in enumerate(after)]
     lines += [f"s[{i}] = n{i};" for i in range(len(after))]
-    written.append(
-        _RUN.format(
-            states=len(state), inputs=len(given), parameters=len(parameter), shown=len(kept),
-            onces="\n".join(onces),
-            fixed="\n".join(fixed), body="\n".join(lines),
-        )
-    )  # fmt: skip
+    sizes = {"states": len(state), "inputs": len(given), "parameters": len(parameter), "shown": len(kept)}
+    rows = {"onces": onces, "fixed": fixed, "body": lines}
+    written.append(filled("columns_run.c", {**{name: str(size) for name, size in sizes.items()}, **rows}))
     return "\n".join(written)
 
 
