@@ -75,7 +75,13 @@ def start(*words: str, folder: Path | None = None) -> subprocess.Popen[str]:
         [sys.executable, "-P", "-m", "nlsdesign", "serve", "--no-browser", "--json", *words],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        # Who runs tests in the background has interrupts ignored, which processes inherit.
+        preexec_fn=None if sys.platform == "win32" else _as_in_a_terminal,
     )  # fmt: skip
+
+
+def _as_in_a_terminal() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

@@ -20,7 +20,6 @@ from nlsdesign.quantity import parse_unit
 ROOMS = (
     *(
         "analysis",
-        "calibration",
         "cli",
         "components",
         "control",
