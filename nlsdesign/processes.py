@@ -10,11 +10,16 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from multiprocessing.pool import IMapIterator
 
 T = TypeVar("T")
 
 _MOST_PROCESSES = 4
+_LONGEST_WAIT = 0.2
+"""Seconds after which a signal is handled at the latest."""
 _DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 _work: Callable[[int], Any] | None = None
@@ -49,11 +54,26 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     with signals_held():
         pool = multiprocessing.get_context("fork").Pool(cores, initializer=ready_as_helper)
     try:
-        yield from pool.imap(_call, range(count))
+        results = pool.imap(_call, range(count))
+        for _ in range(count):
+            yield _waited_for(results)
     finally:
         with signals_held():
             pool.terminate()
             pool.join()
+
+
+def _waited_for(results: IMapIterator[T]) -> T:
+    """Return the next result.
+
+    A signal that comes just before a thread begins to wait for a lock does not wake it, and Python handles it
+    only when the wait is over. So no wait is long.
+    """
+    while True:
+        try:
+            return results.next(timeout=_LONGEST_WAIT)
+        except multiprocessing.TimeoutError:
+            continue
 
 
 @contextlib.contextmanager
