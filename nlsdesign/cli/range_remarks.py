@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 _COUNT = 41
 
+_SAME_ANGLE = 1e-4
+"""Relative: a design finds the end of its contour numerically, and the remark prints four digits."""
+
 
 def range_remarks(
     declared: Assembly, *, last: float | None = None, first: float | None = None, measured: str | None = None
@@ -76,7 +79,7 @@ def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
         f"angles go to {math.degrees(furthest):.4g}°: beyond its end the lever arm stays what it is there -> "
         "stay within it (--to), or declare a longer contour"
         for cam in cams
-        if furthest > model.values[cam.last_angle or ""] * (1.0 + 1e-9)
+        if furthest > model.values[cam.last_angle or ""] * (1.0 + _SAME_ANGLE)
     ]
 
 

@@ -110,10 +110,12 @@ def test_inside_its_range_a_law_is_not_spoken_of() -> None:
 
 
 def test_beyond_the_contour_the_end_is_named() -> None:
-    (remark,) = range_remarks(
-        declare(load_template("one-sided-finger").deck), first=0.0, last=math.radians(80)
-    )
+    finger = declare(load_template("one-sided-finger").deck)
+    (remark,) = range_remarks(finger, first=0.0, last=math.radians(80))
     assert "the contour of spring.cam ends at 60°, the angles go to 80°" in remark
+    # An end that is printed alike is the same one.
+    assert range_remarks(finger, first=0.0, last=math.radians(60.001)) == []
+    assert range_remarks(finger, first=0.0, last=math.radians(60.02)) != []
 
 
 @pytest.mark.slow
