@@ -14,6 +14,7 @@ from nlsdesign.deck import load_deck
 from nlsdesign.export import Stepping, cosimulate, export_fmu
 from nlsdesign.model import FlatModel, flatten
 
+from ..child_processes import children
 from ..hand_built import controller
 from .cases import ACCEPTED, Case, Outcome, judged_by
 from .mutators import EVIL_NUMBERS, EVIL_TEXTS, damaged_bytes, damaged_tokens
@@ -78,7 +79,7 @@ class Fmus:
         return Case({FILE: _archive(entries)}, how=how)
 
     def judged(self, case: Case, folder: Path) -> Outcome:
-        before, children = tempfile.tempdir, _children()
+        before, others = tempfile.tempdir, children()
         place = folder / "temporary"
         place.mkdir()
         tempfile.tempdir = str(place)
@@ -89,13 +90,7 @@ class Fmus:
         left = sorted(each.name for each in place.iterdir())
         if left:
             return Outcome("left over", left[0].rpartition("-")[0])
-        return Outcome("left over", "a process") if _children() - children else outcome
-
-
-def _children() -> set[str]:
-    """Return the processes of this one, where the system lists them: others may have started some before."""
-    tasks = Path("/proc/self/task").glob("*/children")
-    return {number for each in tasks for number in each.read_text(encoding="ascii").split()}
+        return Outcome("left over", "a process") if children() - others else outcome
 
 
 def _run(file: Path) -> Outcome:

@@ -22,6 +22,7 @@ from nlsdesign.export import Stepping, cosimulate, export_fmu
 from nlsdesign.export.compilation.cross_compiler import compile_library
 from nlsdesign.export.cosimulation import fmu_archive
 from nlsdesign.export.fmi.fmu import fmi_headers
+from tests.child_processes import children
 from tests.hand_built import controller
 from tests.unit.test_cli import Run, run
 
@@ -41,10 +42,10 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    before = children()
     yield folder
     assert list(folder.iterdir()) == []
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+    assert children() <= before
 
 
 def step(fmu: Path, patience: float = 20.0) -> None:
