@@ -13,7 +13,6 @@ import re
 import stat
 import tomllib
 import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from ..components.assembly.deck_writer import deck_digest, declare
 from ..deck import read_deck
 from ..errors import ExportError, NlsError
 from ..export.c.provenance import SHORT, stamp_of
+from ..export.files import BROKEN_ARCHIVE
 from ..export.fmi.fmu_origin import ORIGIN_FILE, ORIGIN_FORMAT
 from ..model.derived_deck import digits_in_name
 
@@ -184,11 +184,11 @@ def _fmu(path: Path, size: int) -> ExportedFile | None:
     try:
         with zipfile.ZipFile(path) as archive:
             return _archive(path, archive)
-    except (zipfile.BadZipFile, zlib.error, EOFError) as error:
-        raise ExportError(str(path), f"is a damaged archive: {error}") from None
     except (RuntimeError, NotImplementedError) as error:
         # Encrypted, or packed in a way that the library does not know.
         raise ExportError(str(path), f"cannot be unpacked: {error}") from None
+    except BROKEN_ARCHIVE as error:
+        raise ExportError(str(path), f"is a damaged archive: {error}") from None
 
 
 def _archive(path: Path, archive: zipfile.ZipFile) -> ExportedFile | None:

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import lzma
 import re
+import struct
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 
 from ..errors import ExportError
 from ..writing import draft
+
+BROKEN_ARCHIVE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
+    OverflowError, ValueError, MemoryError,
+)  # fmt: skip
+"""What the library for archives raises for a damaged or encrypted file, or one of an unknown packing."""
 
 _PLACEHOLDER = re.compile(r"^(?P<indent> *)@(?P<row>\w+)@\n|@(?P<name>\w+)@", re.MULTILINE)
 

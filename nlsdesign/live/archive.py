@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 import zipfile
-import zlib
 
 from ..errors import DeckError, ValueRangeError
+from ..export.files import BROKEN_ARCHIVE
 from .gallery import MOST_DECK_BYTES
 from .saved import SavedDesign
 
@@ -49,13 +49,13 @@ def unarchived(content: bytes) -> SavedDesign:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             texts = [_member(archive, name) for name in MEMBERS]
-    except (zipfile.BadZipFile, KeyError, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except UnicodeDecodeError:  # one of the errors of value that follow
+        raise DeckError("saved design", "holds what is no text in UTF-8", next_step="save it again") from None
+    except (KeyError, *BROKEN_ARCHIVE) as error:
         raise DeckError(
             "saved design", f"is no archive that the live page has written: {error}",
             next_step=f"take a file with {', '.join(MEMBERS)}, or open a deck",
         ) from None  # fmt: skip
-    except UnicodeDecodeError:
-        raise DeckError("saved design", "holds what is no text in UTF-8", next_step="save it again") from None
     return SavedDesign(*texts)
 
 

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import lzma
 import shutil
 import stat
-import struct
 import zipfile
-import zlib
 from pathlib import Path, PurePosixPath
 
 from ...errors import ExportError
+from ..files import BROKEN_ARCHIVE
 from .foreign_text import fit_to_show
 
 MOST_ENTRIES = 10_000
 """Entries of an archive; assumed: fifty times those of an FMU with sources and documentation."""
 MOST_BYTES = 2**30
 """Bytes of all unpacked entries; assumed: more than any FMU seen, less than a usual disk has left."""
-
-_BROKEN = (
-    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
-    OverflowError, ValueError, MemoryError,
-)  # fmt: skip
-"""What the library for archives raises for a damaged or encrypted file."""
 
 
 def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
@@ -53,7 +45,7 @@ def unpack(what: str, archive: Path, folder: Path, *, needs: str) -> None:
                 _write(opened, entry, folder)
     except OSError as error:
         raise ExportError(what, f"cannot be read ({error.strerror or error})") from error
-    except _BROKEN as error:
+    except BROKEN_ARCHIVE as error:
         raise ExportError(
             what,
             f"is not a valid archive, or damaged: {fit_to_show(error)}",
