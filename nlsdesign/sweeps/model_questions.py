@@ -18,6 +18,7 @@ from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from ..observer import CascadeGain, design_observer, observer_bench, observer_errors
+from .same_bits import same_bits
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer, worst
 
@@ -124,7 +125,9 @@ class SpreadQuestion(SweepQuestion):
         gain = None if self.adaptive else CascadeGain()
         observer = design_observer(model, sample_time=self.sample_time, gain=gain)
         bench = observer_bench(model, estimate=torque, measured=angle, sample_time=self.sample_time)
-        errors = observer_errors({"observer": observer}, bench, draws=self.draws, seed=self.seed, bounded=0)
+        errors = observer_errors(
+            {"observer": observer}, bench, draws=self.draws, seed=self.seed, bounded=0, translate=same_bits
+        )
         return {
             "error.exact": float(np.max(errors.exact[0])),
             "error.median": float(np.max(errors.quantile("observer", 0.5))),
@@ -193,7 +196,9 @@ class LoopQuestion(SweepQuestion):
             "bandwidth": self._bandwidth(loop, margins.linear),
         }
         if self.amplitude > 0.0:
-            response = sine_response(loop, amplitude=self.amplitude, frequencies=[self.frequency])
+            response = sine_response(
+                loop, amplitude=self.amplitude, frequencies=[self.frequency], translate=same_bits
+            )
             verdict = response.verdicts[0]
             values["sine.holds"] = float(verdict.holds)
             values["sine.decibel"] = float(response.decibel[0]) if verdict.holds else math.nan
