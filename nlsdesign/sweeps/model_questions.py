@@ -13,7 +13,7 @@ from ..components.assembly.named_parts import Assembly
 from ..control import TorqueGains, encoder_loop, loop_margins, sine_response, torque_controller
 from ..control.evaluation.linear_loop import LinearLoop
 from ..control.loop.closed_loop import ClosedLoop
-from ..errors import ArrangementError
+from ..errors import ArrangementError, ValueRangeError, brief
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
@@ -90,12 +90,25 @@ class SpreadQuestion(SweepQuestion):
         In s.
     adaptive
         Whether the observer may learn deviations, where that helps; otherwise it is the cascade.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no draw, or the seed is negative.
     """
 
     draws: int = 32
     seed: int = 0
     sample_time: float = 1e-3
     adaptive: bool = False
+
+    def __post_init__(self) -> None:
+        for name, given, least in (("draws", self.draws, 1), ("seed", self.seed, 0)):
+            if isinstance(given, bool) or not isinstance(given, int) or given < least:
+                raise ValueRangeError(
+                    f"SpreadQuestion: {name} = {brief(given)}", f"must be a whole number from {least} on",
+                    next_step=f"write for instance {name} = {32 if name == 'draws' else 0}",
+                )  # fmt: skip
 
     def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return errors in the unit of the torque."""

@@ -9,7 +9,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -66,6 +66,22 @@ def about_sweep(
         "points": len(plan),
         "plan": plan.digest(),
     }
+
+
+def contents_of(
+    words: Mapping[str, Sequence[str]], stands_for: Callable[[str, str], str]
+) -> dict[str, dict[str, str]]:
+    """Return a digest of what the words of axes stand for, by axis and word; nothing for mere words.
+
+    Parameters
+    ----------
+    words
+        By the name of their axis.
+    stands_for
+        Of the question: what a word of an axis stands for, as text.
+    """
+    known = {name: {word: stands_for(name, word) for word in given} for name, given in words.items()}
+    return {name: given for name, given in known.items() if any(given.values())}
 
 
 @contextlib.contextmanager
@@ -209,6 +225,11 @@ def _require_same(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) 
         raise _another(
             folder, f"its question ({old.get('question')}) is another one, or its source was changed"
         )
+    for name, given in new["contents"].items():
+        before = old.get("contents", {}).get(name, {})
+        changed = [word for word, digest in given.items() if before.get(word, digest) != digest]
+        if changed:
+            raise _another(folder, f"the files of axis {name} in {changed[0]} were others")
 
 
 def _listed(libraries: Any) -> str:

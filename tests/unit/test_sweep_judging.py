@@ -237,9 +237,8 @@ def test_points_of_a_plan_that_are_no_whole_plan_get_no_shares() -> None:
     sample = pytest.importorskip("SALib.sample.sobol")
     problem = {"num_vars": 2, "names": list("ab"), "bounds": [[0.0, 1.0]] * 2}
     points = sample.sample(problem, 128, calc_second_order=False, seed=1)
-    crossed = {
-        "a": np.tile(points[:, 0], 3), "b": np.tile(points[:, 1], 3), "c": np.repeat([1.0, 2.0, 3.0], len(points)),
-    }  # fmt: skip
+    crossed = {"a": np.tile(points[:, 0], 3), "b": np.tile(points[:, 1], 3)}
+    crossed["c"] = np.repeat([1.0, 2.0, 3.0], len(points))
     kinds = {"a": "saltelli", "b": "saltelli", "c": "grid"}
     holes = {name: np.delete(points[:, k], [7, 30]) for k, name in enumerate("ab")}
     for axes in (crossed, holes):
