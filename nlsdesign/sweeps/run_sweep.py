@@ -14,11 +14,12 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ArrangementError, ValueRangeError
 from ..progress import Progress, Quiet
 from ..work_sharing import Executor, PointOutcome, Processes, shared_map
+from .arrow_columns import libraries
 from .axes import AxisSet
 from .axis_values import Subject
 from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
-from .sweep_parts import Parts, libraries
+from .sweep_parts import Parts
 from .sweep_plan import PointPlan
 from .sweep_question import PointWork, SweepQuestion
 from .sweep_table import SweepTable, read_sweep

@@ -20,6 +20,7 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ExportError, MeasurementError
 from ..work_sharing import CodeIdentity, code_identity
 from ..writing import make_folder, write_text
+from .arrow_columns import arrow_column, libraries, numpy_column, read_columns
 from .sweep_columns import RESULTS_FILE, SweepColumn
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
 from .sweep_plan import PointPlan
@@ -265,18 +266,16 @@ def _emptied(folder: Path) -> None:
 
 def _adopted(folder: Path, axes: list[str], plan: PointPlan) -> Iterator[Any]:
     """Yield the parts of other axes with the numbers that their points have now; -1 for those that left."""
-    import pyarrow
-    from pyarrow import parquet
-
+    pyarrow, _ = libraries()
     marks = np.fromiter((_mark(values) for _, values in plan.points()), dtype=np.uint64, count=len(plan))
     order = np.argsort(marks)
     ranked = marks[order]
     for path in part_files(folder):
-        table = parquet.read_table(path)
-        rows = zip(*(table.column(name).to_pylist() for name in axes), strict=True)
+        table = read_columns(path)
+        rows = zip(*(numpy_column(table.column(name)).tolist() for name in axes), strict=True)
         numbers = [_place(values, plan, ranked, order) for values in rows]
         place = table.schema.get_field_index("point")
-        yield table.set_column(place, "point", pyarrow.array(numbers, pyarrow.int64())).cast(table.schema)
+        yield table.set_column(place, "point", arrow_column(numbers, pyarrow.int64())).cast(table.schema)
 
 
 def _mark(values: tuple[Any, ...]) -> int:
