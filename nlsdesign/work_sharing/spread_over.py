@@ -22,12 +22,19 @@ def spread_over(executor: Executor) -> Iterator[None]:
 
     These are the starts of a design, the refits of a diagnosis, the candidates for the next record, the draws
     of a regeneration and the causes of a tolerance analysis. The results are the same. Each map sends what it
-    works on once, and begins with a connection, so this pays where a single result takes long.
+    works on once, and begins with a connection, so this pays where a single result takes long. What a
+    diagnosis works on cannot be sent: it takes processes of this machine, or its sets of records are the
+    points of a sweep.
 
     Parameters
     ----------
     executor
         For instance :class:`DaskScheduler`.
+
+    Raises
+    ------
+    WorkSharingError
+        Within the block, if the work cannot be sent to the workers or they come to no result.
 
     Examples
     --------
@@ -64,8 +71,14 @@ class _Caller:
         # Expressions that the work holds share nodes, which CasADi sends only within a context of its own.
         import casadi
 
-        with casadi.global_pickle_context():
-            return _received, (sendable(self.work),)
+        try:
+            with casadi.global_pickle_context():
+                return _received, (sendable(self.work),)
+        except WorkSharingError as error:
+            raise WorkSharingError(
+                error.thing, error.rule,
+                next_step="spread it over Processes, or make what differs the points of a sweep",
+            ) from None  # fmt: skip
 
 
 def _received(content: bytes) -> _Caller:

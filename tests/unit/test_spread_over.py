@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,6 +20,8 @@ from nlsdesign.errors import UnitError, WorkSharingError
 from nlsdesign.processes import parallel_map
 from nlsdesign.sweeps.design_question import QUICK
 from nlsdesign.work_sharing import DaskScheduler, Executor, InThisProcess, Processes, spread_over
+from nlsdesign.work_sharing.refusals import sendable
+from nlsdesign.work_sharing.spread_over import _Caller
 
 BOTH = [InThisProcess(), Processes(2)]
 CURVE = PowerTorque(coefficient=4.35, exponent=2.09, angle=0.87)
@@ -92,6 +95,13 @@ def cluster() -> Iterator[DaskScheduler]:
         n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
     ) as running:
         yield DaskScheduler(running.scheduler_address)
+
+
+def test_work_that_cannot_be_sent_says_what_else_there_is() -> None:
+    lock = threading.Lock()
+    work = _Caller(lambda _: lock)
+    with pytest.raises(WorkSharingError, match=r"cannot be sent to workers: .*lock.* -> spread it over Proc"):
+        sendable(work)
 
 
 @pytest.mark.slow
