@@ -46,9 +46,9 @@ def arrow_column(values: Sequence[Any] | NDArray[Any], kind: Any) -> Any:
     if kind != pyarrow.string():
         numbers = np.ascontiguousarray(values, dtype=np.int64 if kind == pyarrow.int64() else np.float64)
         return pyarrow.Array.from_buffers(kind, len(numbers), [None, pyarrow.py_buffer(numbers)])
-    words = [word.encode("utf-8", errors="replace") for word in values]
+    words = [text.encode("utf-8", errors="replace") for text in values]
     ends = np.zeros(len(words) + 1, dtype=np.int32)
-    np.cumsum([len(word) for word in words], out=ends[1:])
+    np.cumsum([len(each) for each in words], out=ends[1:])
     content = [None, pyarrow.py_buffer(ends), pyarrow.py_buffer(b"".join(words))]
     return pyarrow.Array.from_buffers(kind, len(words), content)
 

@@ -97,14 +97,14 @@ class DiagnosisQuestion(SweepQuestion):
         """Return the question with a digest of the records, so that changed records are another question."""
         return f"{super().describe()} {_content(Path(self.records))}"
 
-    def stands_for(self, name: str, word: str) -> str:
+    def stands_for(self, name: str, text: str) -> str:
         """Return the digest of the records in a folder that an axis lists.
 
         Parameters
         ----------
         name
             Of the axis.
-        word
+        text
             The folder.
 
         Raises
@@ -112,7 +112,7 @@ class DiagnosisQuestion(SweepQuestion):
         MeasurementError
             If there is no such folder.
         """
-        return _content(Path(word)) if name == RECORDS else ""
+        return _content(Path(text)) if name == RECORDS else ""
 
 
 def _content(folder: Path) -> str:

@@ -81,7 +81,7 @@ def contents_of(
     stands_for
         Of the question: what a word of an axis stands for, as text.
     """
-    known = {name: {word: stands_for(name, word) for word in given} for name, given in words.items()}
+    known = {name: {text: stands_for(name, text) for text in given} for name, given in words.items()}
     return {name: given for name, given in known.items() if any(given.values())}
 
 
@@ -228,7 +228,7 @@ def _require_same(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) 
         )
     for name, given in new["contents"].items():
         before = old.get("contents", {}).get(name, {})
-        changed = [word for word, digest in given.items() if before.get(word, digest) != digest]
+        changed = [text for text, digest in given.items() if before.get(text, digest) != digest]
         if changed:
             raise _another(folder, f"the files of axis {name} in {changed[0]} were others")
 

@@ -70,13 +70,13 @@ class PointPlan:
 
     def words(self) -> dict[str, tuple[str, ...]]:
         """Return the words of each axis that holds words, each once, in their order."""
-        found: dict[str, tuple[str, ...]] = {}
+        known: dict[str, tuple[str, ...]] = {}
         for each in self._sets:
             for place, column in enumerate(each.columns):
                 if column.lower is None:
                     rows = (str(each.row(k)[place]) for k in range(each.count))
-                    found[column.name] = tuple(dict.fromkeys(rows))
-        return found
+                    known[column.name] = tuple(dict.fromkeys(rows))
+        return known
 
     def digest(self) -> str:
         """Return the SHA-256 of the plan: its columns, its size, and points all over it."""

@@ -54,14 +54,14 @@ class SweepQuestion(ABC):
         """Return what is asked as a text that changes when the question does."""
         return f"{type(self).__qualname__}({_described(self)})"
 
-    def stands_for(self, name: str, word: str) -> str:
+    def stands_for(self, name: str, text: str) -> str:
         """Return what a word of an axis stands for, as a text that changes with it; empty for a mere word.
 
         Parameters
         ----------
         name
             Of the axis.
-        word
+        text
             One of its words, such as the name of a folder.
 
         Raises
@@ -69,7 +69,7 @@ class SweepQuestion(ABC):
         NlsError
             If it stands for something that is not there.
         """
-        del name, word
+        del name, text
         return ""
 
 
