@@ -10,12 +10,14 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     from multiprocessing.pool import IMapIterator
 
 T = TypeVar("T")
+Mapper: TypeAlias = Callable[[Callable[[int], Any], int], Iterator[Any]]
+"""Takes what :func:`parallel_map` takes and yields what it yields."""
 
 _MOST_PROCESSES = 4
 _LONGEST_WAIT = 0.2
@@ -24,6 +26,7 @@ _DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 _work: Callable[[int], Any] | None = None
 _alone = False
+_mapper: Mapper | None = None
 
 
 def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
@@ -31,7 +34,7 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
 
     Processes are forked, so that they see all data of the work without copying; only results are pickled.
     Without fork, on one core, or inside such a process or a worker of a sweep, the work is done in this
-    process.
+    process. Within :func:`mapped_by` it is done wherever that says.
 
     Parameters
     ----------
@@ -41,6 +44,9 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
         Number of calls.
     """
     global _work
+    if _mapper is not None and not _alone and not multiprocessing.current_process().daemon:
+        yield from _mapper(work, count)
+        return
     cores = min(
         _MOST_PROCESSES, count, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     )
@@ -88,6 +94,23 @@ def alone() -> Iterator[None]:
         yield
     finally:
         _alone = before
+
+
+@contextlib.contextmanager
+def mapped_by(mapper: Mapper) -> Iterator[None]:
+    """Let another map do the work of :func:`parallel_map` until the end of the block.
+
+    Parameters
+    ----------
+    mapper
+        Takes work and count, and yields the results in order; what the work raises, it raises.
+    """
+    global _mapper
+    before, _mapper = _mapper, mapper
+    try:
+        yield
+    finally:
+        _mapper = before
 
 
 def run_to_end(

@@ -190,8 +190,24 @@ def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool, only_own: 
     sys.exit(1 if refused else 0)
 
 
-def _can_be_made(_: click.Context, __: click.Parameter, folder: Path) -> Path:
+def folder_option(name: str, text: str) -> Callable[[F], F]:
+    """Return an option for a folder besides that of ``--out``; none by default.
+
+    Parameters
+    ----------
+    name
+        Such as ``--report``.
+    text
+        Help.
+    """
+    kind = click.Path(path_type=Path, file_okay=False)
+    return click.option(name, type=kind, default=None, metavar="FOLDER", help=text, callback=_can_be_made)
+
+
+def _can_be_made(_: click.Context, __: click.Parameter, folder: Path | None) -> Path | None:
     """Refuse, before any work, a folder that could not be written into; it is made with its first file."""
+    if folder is None:
+        return None
     try:
         place = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import time
 from pathlib import Path
@@ -10,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ValueRangeError
+from ..errors import ExportError, ValueRangeError
 from .output import examples, json_option, show_json, show_table
+from .overwriting import folder_option, kept
 
 if TYPE_CHECKING:
     from ..progress import Progress
@@ -26,6 +28,7 @@ _MOST_REASONS = 8
 @click.command(
     epilog=examples(
         "nlsdesign sweep sweep.toml --out out/sweep",
+        "nlsdesign sweep sweep.toml --out out/sweep --report out/sweep_report",
         "nlsdesign sweep sweep.toml --out out/sweep --workers 2 --retry-failed",
         "nlsdesign sweep sweep.toml --out out/sweep --scheduler tcp://10.0.0.1:8786 --json",
         "nlsdesign sweep sweep.toml --dry-run",
@@ -43,6 +46,9 @@ _MOST_REASONS = 8
 @click.option("--mpi", is_flag=True, help="Ranks of MPI, started by mpiexec -n N python -m mpi4py.futures.")
 @click.option("--again", is_flag=True, help="Throw away what the folder holds of a sweep, compute anew.")
 @click.option("--retry-failed", is_flag=True, help="Compute points again that failed.")
+@folder_option(
+    "--report", "Write the page of the sweep into this folder at the end, as nlsdesign report does."
+)
 @click.option("--dry-run", is_flag=True, help="Only check the sweep, and say how many points stand already.")
 @json_option
 @click.pass_context
@@ -56,25 +62,75 @@ def sweep(ctx: click.Context, /, file: Path, out: Path, as_json: bool, **given: 
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     executor = _executor(given)
+    from ..sweeps.arrow_columns import libraries
     from ..sweeps.sweep_file import read_sweep_file
-    from ..sweeps.sweep_parts import libraries
 
     libraries()
     task = read_sweep_file(file)
     if given["dry_run"]:
         _show_plan(task, out, as_json)
         return
+    pages: Path | None = given["report"]
+    if pages is not None:
+        _require_room(pages)
     table = _run(task, out, executor, given)
+    page = None if pages is None else _page(table, pages, out)
+    _show_result(table, out, page, as_json=as_json)
+    ctx.exit(0 if table.done.all() else 1)
+
+
+def _require_room(folder: Path) -> None:
+    """Refuse, before any point is computed, a page that would replace what somebody has changed."""
+    from ..written_files import WORDS, file_state
+
+    for path in (folder / name for name in ("sweep.html", "points.csv")):
+        state = file_state(path)
+        if state not in ("new", "as written"):
+            raise ExportError(
+                str(path), WORDS[state],
+                next_step="nothing was computed; name another folder for --report, or move that file away",
+            )  # fmt: skip
+
+
+def _page(table: SweepTable, folder: Path, source: Path) -> Path:
+    from ..sweep_report import write_sweep_report
+
+    with kept(folder, []):
+        return write_sweep_report(table, folder, source=source).page
+
+
+def _show_result(table: SweepTable, out: Path, page: Path | None, *, as_json: bool) -> None:
+    """Show how many points there are, why some failed, and the commands that come next."""
+    file, reasons, following = out / "results.parquet", _reasons(table), _following(table, out, page)
     failed = len(table) - int(table.done.sum())
     if as_json:
-        content = {"points": len(table), "failed": failed, "reasons": dict(_reasons(table))}
-        show_json({**content, "file": out / "results.parquet", "about": dict(table.about)})
-    else:
-        click.echo(f"{len(table)} points, {failed} failed: {out / 'results.parquet'}")
-        if failed:
-            rows = [(str(count), reason) for reason, count in _reasons(table)[:_MOST_REASONS]]
-            show_table("Failed", ("points", "reason"), rows)
-    ctx.exit(1 if failed else 0)
+        content = {"points": len(table), "failed": failed, "reasons": {r: n for r, n, _ in reasons}}
+        firsts = {reason: first for reason, _, first in reasons}
+        show_json({**content, "first_failed": firsts, "file": file, "page": page,
+                   "next": list(following), "about": dict(table.about)})  # fmt: skip
+        return
+    click.echo(f"{len(table)} points, {failed} failed: {file}")
+    if failed:
+        rows = [(str(count), str(first), reason) for reason, count, first in reasons[:_MOST_REASONS]]
+        show_table("Failed", ("points", "first", "reason"), rows)
+        left = reasons[_MOST_REASONS:]
+        if left:
+            click.echo(f"and {sum(count for _, count, _ in left)} points for {len(left)} other reasons")
+    if page is not None:
+        click.echo(f"written: {page}")
+    for command, what in following.items():
+        click.echo(f"next: {command}    # {what}")
+
+
+def _following(table: SweepTable, out: Path, page: Path | None) -> dict[str, str]:
+    """Return the commands that come next, each with what it does."""
+    folder, commands = shlex.quote(str(out)), {}
+    if page is None:
+        commands[f"nlsdesign report {folder}"] = "the page: points, reasons of failures, causes, decks"
+    if not table.done.all():
+        first = int(table.values["point"][~table.done][0])
+        commands[f"nlsdesign report {folder} --deck-of {first}"] = "the deck behind a point that failed"
+    return commands
 
 
 def _executor(given: dict[str, Any]) -> Executor:
@@ -133,7 +189,12 @@ def _show_plan(task: SweepTask, out: Path, as_json: bool) -> None:
     click.echo(f"{len(task.plan)} points, {standing} of them stand in {out}; nothing was computed")
 
 
-def _reasons(table: SweepTable) -> list[tuple[str, int]]:
-    from collections import Counter
-
-    return Counter(table.values["reason"][~table.done].tolist()).most_common()
+def _reasons(table: SweepTable) -> list[tuple[str, int, int]]:
+    """Return each reason of failures, the most frequent first, with its number of points and the first."""
+    counts: dict[str, list[int]] = {}
+    failed = ~table.done
+    for point, reason in zip(table.values["point"][failed], table.values["reason"][failed], strict=True):
+        counts.setdefault(str(reason), [0, int(point)])[0] += 1
+    return sorted(
+        ((reason, count, first) for reason, (count, first) in counts.items()), key=lambda each: -each[1]
+    )

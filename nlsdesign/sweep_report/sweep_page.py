@@ -169,7 +169,8 @@ def _sensitivities(
     axes = {axis.name: np.asarray(table.values[axis.name]) for axis in table.axes}
     chosen = {name: answers[name] for name in names[:_MOST_SENSITIVITIES]}
     try:
-        shares = sensitivity(axes, chosen, table.done)
+        kinds = {axis.name: axis.kind for axis in table.axes}
+        shares = sensitivity(axes, chosen, table.done, kinds=kinds)
     except MissingLibraryError as error:
         return {}, [f"No shares of the variance: {error}"]
     left = len(names) - len(chosen)

@@ -113,9 +113,10 @@ class GridAxis(AxisSet):
                 next_step='take spacing = "even"',
             )  # fmt: skip
         space = np.geomspace if self.spacing == "ratio" else np.linspace
-        values = [float(each) for each in space(lower, upper, self.count)]
-        _distinct(self.name, values)
-        return BoundAxes((column,), self.count, lambda number: (values[number],))
+        values: NDArray[np.float64] = space(lower, upper, self.count)
+        if not np.all(np.diff(values) > 0.0):
+            _distinct(self.name, values.tolist())
+        return BoundAxes((column,), self.count, lambda number: (float(values[number]),))
 
 
 @dataclass(frozen=True)

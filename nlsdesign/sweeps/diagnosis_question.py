@@ -7,16 +7,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+import numpy as np
 
 from ..components.assembly.named_parts import Assembly
 from ..discrepancy import diagnose
 from ..discrepancy.effects import catalogue
-from ..errors import MeasurementError
+from ..errors import MeasurementError, unknown_name
 from ..identification import load_records
 from ..model import flatten
+from .changes import ASK
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer
 
+RECORDS: Final = f"{ASK}.records"
+"""Name of the axis that lists folders of records."""
 _VERDICTS = ("none", "named", "unknown", "undecidable", "data_suspect")
 
 
@@ -30,10 +36,21 @@ class DiagnosisQuestion(SweepQuestion):
         Folder of the records; an axis ``ask.records`` lists several, absolute where workers run elsewhere.
     effects
         Names of the catalogue that get a column; all by default.
+
+    Raises
+    ------
+    UnknownNameError
+        If the catalogue has no effect of a name.
     """
 
     records: str
     effects: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        known = [each.__name__ for each in catalogue()]
+        for name in self._names():
+            if name not in known:
+                raise unknown_name("effect of the catalogue", name, known)
 
     def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return which verdict it is, errors, and of each effect whether it is named and how probable."""
@@ -57,11 +74,13 @@ class DiagnosisQuestion(SweepQuestion):
     def ask(self, assembly: Assembly) -> Mapping[str, float]:
         """Return the verdict in numbers."""
         verdict = diagnose(assembly, load_records(Path(self.records), flatten(assembly)))
-        named = {each.name: each.probability for each in verdict.effects}
-        held_out = any(gap.role == "held_out" for gap in verdict.gaps)
+        named: dict[str, float] = {}
+        for each in verdict.effects:  # one effect may be named at several places
+            named[each.name] = float(np.fmax(each.probability, named.get(each.name, math.nan)))
+        held_out = any(each.role == "held_out" and each.block == verdict.block for each in verdict.gaps)
         values = {f"verdict.{name}": float(verdict.verdict == name) for name in _VERDICTS}
         values |= {
-            "named": float(len(named)),
+            "named": float(len(verdict.effects)),
             "held_out_ratio": verdict.held_out_ratio if held_out else math.nan,
             "closed": verdict.closed if held_out else math.nan,
         }
@@ -77,6 +96,23 @@ class DiagnosisQuestion(SweepQuestion):
     def describe(self) -> str:
         """Return the question with a digest of the records, so that changed records are another question."""
         return f"{super().describe()} {_content(Path(self.records))}"
+
+    def stands_for(self, name: str, text: str) -> str:
+        """Return the digest of the records in a folder that an axis lists.
+
+        Parameters
+        ----------
+        name
+            Of the axis.
+        text
+            The folder.
+
+        Raises
+        ------
+        MeasurementError
+            If there is no such folder.
+        """
+        return _content(Path(text)) if name == RECORDS else ""
 
 
 def _content(folder: Path) -> str:

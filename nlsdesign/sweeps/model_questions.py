@@ -13,11 +13,12 @@ from ..components.assembly.named_parts import Assembly
 from ..control import TorqueGains, encoder_loop, loop_margins, sine_response, torque_controller
 from ..control.evaluation.linear_loop import LinearLoop
 from ..control.loop.closed_loop import ClosedLoop
-from ..errors import ArrangementError
+from ..errors import ArrangementError, ValueRangeError, brief
 from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from ..observer import CascadeGain, design_observer, observer_bench, observer_errors
+from .same_bits import same_bits
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer, worst
 
@@ -89,12 +90,25 @@ class SpreadQuestion(SweepQuestion):
         In s.
     adaptive
         Whether the observer may learn deviations, where that helps; otherwise it is the cascade.
+
+    Raises
+    ------
+    ValueRangeError
+        If there is no draw, or the seed is negative.
     """
 
     draws: int = 32
     seed: int = 0
     sample_time: float = 1e-3
     adaptive: bool = False
+
+    def __post_init__(self) -> None:
+        for name, given, least in (("draws", self.draws, 1), ("seed", self.seed, 0)):
+            if isinstance(given, bool) or not isinstance(given, int) or given < least:
+                raise ValueRangeError(
+                    f"SpreadQuestion: {name} = {brief(given)}", f"must be a whole number from {least} on",
+                    next_step=f"write for instance {name} = {32 if name == 'draws' else 0}",
+                )  # fmt: skip
 
     def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
         """Return errors in the unit of the torque."""
@@ -124,7 +138,9 @@ class SpreadQuestion(SweepQuestion):
         gain = None if self.adaptive else CascadeGain()
         observer = design_observer(model, sample_time=self.sample_time, gain=gain)
         bench = observer_bench(model, estimate=torque, measured=angle, sample_time=self.sample_time)
-        errors = observer_errors({"observer": observer}, bench, draws=self.draws, seed=self.seed, bounded=0)
+        errors = observer_errors(
+            {"observer": observer}, bench, draws=self.draws, seed=self.seed, bounded=0, translate=same_bits
+        )
         return {
             "error.exact": float(np.max(errors.exact[0])),
             "error.median": float(np.max(errors.quantile("observer", 0.5))),
@@ -193,7 +209,9 @@ class LoopQuestion(SweepQuestion):
             "bandwidth": self._bandwidth(loop, margins.linear),
         }
         if self.amplitude > 0.0:
-            response = sine_response(loop, amplitude=self.amplitude, frequencies=[self.frequency])
+            response = sine_response(
+                loop, amplitude=self.amplitude, frequencies=[self.frequency], translate=same_bits
+            )
             verdict = response.verdicts[0]
             values["sine.holds"] = float(verdict.holds)
             values["sine.decibel"] = float(response.decibel[0]) if verdict.holds else math.nan

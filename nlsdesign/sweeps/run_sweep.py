@@ -14,11 +14,12 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ArrangementError, ValueRangeError
 from ..progress import Progress, Quiet
 from ..work_sharing import Executor, PointOutcome, Processes, shared_map
+from .arrow_columns import libraries
 from .axes import AxisSet
 from .axis_values import Subject
 from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn
-from .sweep_folder import about_sweep, only_run, opened, written_about
-from .sweep_parts import Parts, libraries
+from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
+from .sweep_parts import Parts
 from .sweep_plan import PointPlan
 from .sweep_question import PointWork, SweepQuestion
 from .sweep_table import SweepTable, read_sweep
@@ -118,6 +119,7 @@ def sweep_task(
             )  # fmt: skip
     seeds = [int(each.seed) for each in axes if hasattr(each, "seed")]
     about = about_sweep(assemblies, plan, question=type(ask).__name__, asked=ask.describe(), seeds=seeds)
+    about["contents"] = contents_of(plan.words(), ask.stands_for)
     point, *states = STATE_COLUMNS
     return SweepTask(assemblies, plan, ask, (point, *plan.columns, *answers, *states), about)
 

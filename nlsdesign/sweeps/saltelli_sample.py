@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import ValueRangeError, missing_library
 from .axes import AxisSet, BoundAxes
 from .axis_values import Given, Subject
+from .sweep_columns import SALTELLI
 
 _MOST_BLOCKS = 2**24
 
@@ -19,7 +20,7 @@ class SaltelliSample(AxisSet):
     """Blocks of points of Saltelli's plan, from a scrambled Sobol sequence of twice as many dimensions.
 
     A block has two points more than there are axes; with second order two more than twice the axes. The page
-    of the sweep sees the plan in the points, so it must be the only set of axes.
+    of the sweep sees the plan in the points, so it must be the only set of axes with more than one row.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class SaltelliSample(AxisSet):
             raise missing_library("a Saltelli sample", "SALib", "sensitivity") from None
         columns, ends = [], []
         for name, given in self.ranges.items():
-            column, values = subject.column(name, tuple(given), "saltelli")
+            column, values = subject.column(name, tuple(given), SALTELLI)
             if column.lower is None or len(values) != 2 or not values[0] < values[1]:
                 raise ValueRangeError(
                     f"range of {name}", "must be two ascending numbers", next_step='write ["1 mm", "2 mm"]'

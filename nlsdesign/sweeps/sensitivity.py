@@ -18,11 +18,16 @@ from numpy.typing import NDArray
 from ..errors import missing_library
 from .axis_dependence import codes, dependent_axes
 from .saltelli_plan import SaltelliForm, saltelli_plan
+from .sweep_columns import SALTELLI
 
 Floats = NDArray[np.float64]
 FEWEST_POINTS: Final = 200
 FEWEST_BLOCKS: Final = 16
 MOST_FAILED: Final = 0.1
+_NO_PLAN: Final = (
+    "the points were made by a Saltelli sample and are no whole plan: the sweep is not finished, or the plan "
+    "is crossed with other axes; finish it, or sweep the plan alone"
+)
 _MOST_LEVELS, _DRAWS, _SEED = 20, 100, 1
 
 
@@ -78,7 +83,11 @@ class AnswerSensitivity:
 
 
 def sensitivity(
-    axes: Mapping[str, NDArray[Any]], answers: Mapping[str, Floats], done: NDArray[np.bool_]
+    axes: Mapping[str, NDArray[Any]],
+    answers: Mapping[str, Floats],
+    done: NDArray[np.bool_],
+    *,
+    kinds: Mapping[str, str] | None = None,
 ) -> list[AnswerSensitivity]:
     """Return how each answer depends on each axis.
 
@@ -90,6 +99,8 @@ def sensitivity(
         Numbers of each answer, shape (n,).
     done
         Which points have answers.
+    kinds
+        How each axis was made, where that is known, as the column of a sweep states it.
 
     Raises
     ------
@@ -98,6 +109,9 @@ def sensitivity(
     """
     varying = {name: values for name, values in axes.items() if len(np.unique(codes(values))) > 1}
     plan = saltelli_plan(np.column_stack([codes(v) for v in varying.values()])) if varying else None
+    if plan is None and any((kinds or {}).get(name) == SALTELLI for name in varying):
+        # Its points belong together in blocks, so methods for independent points do not hold for them.
+        return [AnswerSensitivity(name, "", len(done), refusal=_NO_PLAN) for name in answers]
     return [_of_answer(name, varying, values, np.asarray(done, dtype=bool), plan)
             for name, values in answers.items()]  # fmt: skip
 

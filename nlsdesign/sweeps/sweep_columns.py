@@ -8,6 +8,8 @@ from typing import Final, Literal
 DONE: Final = "done"
 FAILED: Final = "failed"
 RESULTS_FILE: Final = "results.parquet"
+SALTELLI: Final = "saltelli"
+"""Kind of the axes of a Saltelli plan."""
 Role = Literal["axis", "answer", "state"]
 
 

@@ -19,7 +19,7 @@ from ..reading import text_of
 from ..written_numbers import split_number
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
 from .design_question import QUICK, DesignQuestion
-from .diagnosis_question import DiagnosisQuestion
+from .diagnosis_question import RECORDS, DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
 from .run_sweep import SweepTask, sweep_task
 from .saltelli_sample import SaltelliSample
@@ -90,7 +90,9 @@ def read_sweep_file(path: Path | str) -> SweepTask:
         if key not in _TABLES:
             raise unknown_name(deck.place(key), key, _TABLES)
     assemblies = _assemblies(deck, file.parent)
-    axes = [_axes(deck, number, given) for number, given in enumerate(_axes_tables(deck))]
+    axes = [
+        _beside(_axes(deck, number, given), file.parent) for number, given in enumerate(_axes_tables(deck))
+    ]
     return sweep_task(assemblies, axes=axes, ask=_question(deck))
 
 
@@ -169,9 +171,23 @@ def _question(deck: Deck) -> SweepQuestion:
         fields = {**fields, "gains": built(deck, TorqueGains, fields["gains"], f"{place}: gains")}
     made: SweepQuestion = _made(_QUESTIONS[name], _in_si(_QUESTIONS[name], fields, place), place)
     if isinstance(made, DiagnosisQuestion):
-        beside = deck.path.parent / made.records
-        made = dataclasses.replace(made, records=str(beside.resolve() if beside.is_dir() else made.records))
+        made = dataclasses.replace(made, records=_folder(made.records, deck.path.parent))
     return made
+
+
+def _folder(name: str, beside: Path) -> str:
+    """Return a folder of records that stands beside the sweep file in full, so that workers find it."""
+    return str((beside / name).resolve() if (beside / name).is_dir() else name)
+
+
+def _beside(axes: AxisSet, folder: Path) -> AxisSet:
+    """Return a list of folders of records in full; any other set of axes as it is."""
+    if not isinstance(axes, Listed) or not isinstance(axes.values, Mapping) or RECORDS not in axes.values:
+        return axes
+    given = axes.values[RECORDS]
+    if isinstance(given, str):  # refused as the row of one name
+        return axes
+    return Listed({**axes.values, RECORDS: [_folder(str(each), folder) for each in given]})
 
 
 def _in_si(kind: type, fields: Any, place: str) -> Any:

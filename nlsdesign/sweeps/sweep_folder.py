@@ -9,7 +9,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +20,7 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ExportError, MeasurementError
 from ..work_sharing import CodeIdentity, code_identity
 from ..writing import make_folder, write_text
+from .arrow_columns import arrow_column, libraries, numpy_column, read_columns
 from .sweep_columns import RESULTS_FILE, SweepColumn
 from .sweep_parts import PARTS_FOLDER, TIMINGS_FILE, Parts, part_files, rows_in_order
 from .sweep_plan import PointPlan
@@ -66,6 +67,22 @@ def about_sweep(
         "points": len(plan),
         "plan": plan.digest(),
     }
+
+
+def contents_of(
+    words: Mapping[str, Sequence[str]], stands_for: Callable[[str, str], str]
+) -> dict[str, dict[str, str]]:
+    """Return a digest of what the words of axes stand for, by axis and word; nothing for mere words.
+
+    Parameters
+    ----------
+    words
+        By the name of their axis.
+    stands_for
+        Of the question: what a word of an axis stands for, as text.
+    """
+    known = {name: {text: stands_for(name, text) for text in given} for name, given in words.items()}
+    return {name: given for name, given in known.items() if any(given.values())}
 
 
 @contextlib.contextmanager
@@ -209,6 +226,11 @@ def _require_same(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) 
         raise _another(
             folder, f"its question ({old.get('question')}) is another one, or its source was changed"
         )
+    for name, given in new["contents"].items():
+        before = old.get("contents", {}).get(name, {})
+        changed = [text for text, digest in given.items() if before.get(text, digest) != digest]
+        if changed:
+            raise _another(folder, f"the files of axis {name} in {changed[0]} were others")
 
 
 def _listed(libraries: Any) -> str:
@@ -244,18 +266,16 @@ def _emptied(folder: Path) -> None:
 
 def _adopted(folder: Path, axes: list[str], plan: PointPlan) -> Iterator[Any]:
     """Yield the parts of other axes with the numbers that their points have now; -1 for those that left."""
-    import pyarrow
-    from pyarrow import parquet
-
+    pyarrow, _ = libraries()
     marks = np.fromiter((_mark(values) for _, values in plan.points()), dtype=np.uint64, count=len(plan))
     order = np.argsort(marks)
     ranked = marks[order]
     for path in part_files(folder):
-        table = parquet.read_table(path)
-        rows = zip(*(table.column(name).to_pylist() for name in axes), strict=True)
+        table = read_columns(path)
+        rows = zip(*(numpy_column(table.column(name)).tolist() for name in axes), strict=True)
         numbers = [_place(values, plan, ranked, order) for values in rows]
         place = table.schema.get_field_index("point")
-        yield table.set_column(place, "point", pyarrow.array(numbers, pyarrow.int64())).cast(table.schema)
+        yield table.set_column(place, "point", arrow_column(numbers, pyarrow.int64())).cast(table.schema)
 
 
 def _mark(values: tuple[Any, ...]) -> int:

@@ -15,8 +15,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ExportError, MeasurementError, missing_library
+from ..errors import ExportError, MeasurementError
 from ..writing import draft
+from .arrow_columns import arrow_column, give_back, libraries, numpy_column, read_columns
 from .sweep_columns import DONE, RESULTS_FILE, SweepColumn
 
 PARTS_FOLDER: Final = "parts"
@@ -27,22 +28,6 @@ _MOST_SMALL: Final = 24
 _LARGE: Final = 16384
 """Rows from which on a part is not small."""
 Row = Mapping[str, Any]
-
-
-def libraries() -> tuple[Any, Any]:
-    """Return the modules ``pyarrow`` and ``pyarrow.parquet``.
-
-    Raises
-    ------
-    MissingLibraryError
-        If pyarrow is not installed.
-    """
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ModuleNotFoundError:
-        raise missing_library("a sweep", "pyarrow", "scale") from None
-    return pyarrow, parquet
 
 
 def _kind(pyarrow: Any, column: SweepColumn, words: bool) -> Any:
@@ -139,17 +124,16 @@ class Parts:
         """
         mask = np.zeros(count, dtype=bool)
         for table in self._tables(["point", "status"]):
-            points = table.column("point").to_numpy()
+            points = numpy_column(table.column("point"))
             inside = (points >= 0) & (points < count)
             if not with_failed:
-                inside &= table.column("status").to_numpy(zero_copy_only=False) == DONE
+                inside &= numpy_column(table.column("status")) == DONE
             mask[points[inside]] = True
         return mask
 
     def _tables(self, names: list[str]) -> Iterator[Any]:
-        _, parquet = libraries()
         for path in part_files(self._folder):
-            yield parquet.read_table(path, columns=names)
+            yield read_columns(path, names)
 
     def write(self, rows: Sequence[Row]) -> None:
         """Write rows as one more part.
@@ -167,9 +151,10 @@ class Parts:
         if not rows:
             return
         pyarrow, _ = libraries()
-        columns = {field.name: [row[field.name] for row in rows] for field in self._schema}
-        self._write_table(pyarrow.table(columns, schema=self._schema))
+        columns = [arrow_column([row[field.name] for row in rows], field.type) for field in self._schema]
+        self._write_table(pyarrow.Table.from_arrays(columns, schema=self._schema))
         self._merge_small()
+        give_back()
 
     def _write_table(self, table: Any) -> None:
         _write(self._folder / PARTS_FOLDER / f"{self._next:08d}.parquet", [table], table.schema)
@@ -181,7 +166,7 @@ class Parts:
         small = [path for path in part_files(self._folder) if parquet.read_metadata(path).num_rows < _LARGE]
         if len(small) <= _MOST_SMALL:
             return
-        self._write_table(pyarrow.concat_tables([parquet.read_table(path) for path in small]))
+        self._write_table(pyarrow.concat_tables([read_columns(path) for path in small]))
         for path in small:
             path.unlink(missing_ok=True)
 
@@ -228,12 +213,11 @@ class _Order:
         self._files = part_files(folder)
         self._schema = schema(columns, timed=True)
         self._open: dict[int, Any] = {}
-        _, parquet = libraries()
         points, parts, rows, done = [], [], [], []
         for number, path in enumerate(self._files):
-            table = parquet.read_table(path, columns=["point", "status"])
-            points.append(table.column("point").to_numpy())
-            done.append(table.column("status").to_numpy(zero_copy_only=False) == DONE)
+            table = read_columns(path, ["point", "status"])
+            points.append(numpy_column(table.column("point")))
+            done.append(numpy_column(table.column("status")) == DONE)
             parts.append(np.full(table.num_rows, number, dtype=np.int32))
             rows.append(np.arange(table.num_rows, dtype=np.int32))
         if not self._files:
@@ -258,18 +242,23 @@ class _Order:
             taken, places = [], []
             for each in np.unique(part):
                 here = np.flatnonzero(part == each)
-                taken.append(self._table(int(each)).select(names).take(row[here]))
+                taken.append(self._table(int(each)).select(names).take(_places(row[here])))
                 places.append(here)
             back = np.argsort(np.concatenate(places), kind="stable")
-            yield pyarrow.concat_tables(taken).take(back).combine_chunks()
+            yield pyarrow.concat_tables(taken).take(_places(back)).combine_chunks()
+            give_back()
 
     def _table(self, number: int) -> Any:
-        _, parquet = libraries()
         if number not in self._open:
             while len(self._open) >= 4:
                 self._open.pop(next(iter(self._open)))
-            self._open[number] = parquet.read_table(self._files[number])
+            self._open[number] = read_columns(self._files[number])
         return self._open[number]
+
+
+def _places(rows: NDArray[Any]) -> Any:
+    pyarrow, _ = libraries()
+    return arrow_column(rows, pyarrow.int64())
 
 
 def rows_in_order(folder: Path, columns: Sequence[SweepColumn]) -> dict[str, NDArray[Any]]:
@@ -296,7 +285,7 @@ def rows_in_order(folder: Path, columns: Sequence[SweepColumn]) -> dict[str, NDA
             next_step="run the same sweep again: it computes what is missing",
         ) from None  # fmt: skip
     table = pyarrow.concat_tables(blocks) if blocks else schema(columns).empty_table()
-    return {c.name: table.column(c.name).to_numpy(zero_copy_only=False) for c in columns}
+    return {c.name: numpy_column(table.column(c.name)) for c in columns}
 
 
 def _write(path: Path, tables: Iterator[Any] | list[Any], kind: Any) -> None:

@@ -11,10 +11,10 @@ from dataclasses import asdict
 from typing import Any
 
 from ..errors import ValueRangeError
-from .axes import AxisSet
+from .axes import AxisSet, BoundAxes
 from .axis_values import Subject
 from .changes import row_of_factor
-from .sweep_columns import SweepColumn
+from .sweep_columns import SALTELLI, SweepColumn
 
 _PROBES = 64
 
@@ -32,7 +32,7 @@ class PointPlan:
     Raises
     ------
     ValueRangeError
-        If there are no axes, or two of them change the same number.
+        If there are no axes, two of them change the same number, or a Saltelli plan is crossed with others.
     NlsError
         If a name does not exist, or a value does not fit it.
     """
@@ -45,6 +45,7 @@ class PointPlan:
         self._sets = [each.bound(subject) for each in axes]
         self.columns: tuple[SweepColumn, ...] = tuple(c for each in self._sets for c in each.columns)
         _require_apart(self.columns)
+        _require_alone(self._sets)
 
     def __len__(self) -> int:
         return math.prod(each.count for each in self._sets)
@@ -66,6 +67,16 @@ class PointPlan:
     def points(self) -> Iterator[tuple[int, tuple[Any, ...]]]:
         """Yield all points with their numbers."""
         return ((number, self.point(number)) for number in range(len(self)))
+
+    def words(self) -> dict[str, tuple[str, ...]]:
+        """Return the words of each axis that holds words, each once, in their order."""
+        known: dict[str, tuple[str, ...]] = {}
+        for each in self._sets:
+            for place, column in enumerate(each.columns):
+                if column.lower is None:
+                    rows = (str(each.row(k)[place]) for k in range(each.count))
+                    known[column.name] = tuple(dict.fromkeys(rows))
+        return known
 
     def digest(self) -> str:
         """Return the SHA-256 of the plan: its columns, its size, and points all over it."""
@@ -95,4 +106,16 @@ def _require_apart(columns: Sequence[SweepColumn]) -> None:
             raise ValueRangeError(
                 f"axes '{name}' and '{inside[0]}'", "change the same number: their points collide",
                 next_step="keep one of them",
+            )  # fmt: skip
+
+
+def _require_alone(sets: Sequence[BoundAxes]) -> None:
+    """Refuse a Saltelli plan that is crossed: crossed blocks are no plan, and what they give is no share."""
+    for plan in sets:
+        others = [c.name for each in sets if each is not plan and each.count > 1 for c in each.columns]
+        if others and any(column.kind == SALTELLI for column in plan.columns):
+            raise ValueRangeError(
+                f"Saltelli sample over {', '.join(column.name for column in plan.columns)}",
+                f"is crossed with axis {', '.join(others)}: shares of the variance need it to be alone",
+                next_step="put a number among its ranges, and give each word a sweep and a folder of its own",
             )  # fmt: skip

@@ -54,6 +54,24 @@ class SweepQuestion(ABC):
         """Return what is asked as a text that changes when the question does."""
         return f"{type(self).__qualname__}({_described(self)})"
 
+    def stands_for(self, name: str, text: str) -> str:
+        """Return what a word of an axis stands for, as a text that changes with it; empty for a mere word.
+
+        Parameters
+        ----------
+        name
+            Of the axis.
+        text
+            One of its words, such as the name of a folder.
+
+        Raises
+        ------
+        NlsError
+            If it stands for something that is not there.
+        """
+        del name, text
+        return ""
+
 
 @dataclass(frozen=True)
 class FunctionQuestion(SweepQuestion):

@@ -16,9 +16,10 @@ from ..components.assembly.named_parts import Assembly
 from ..deck import read_deck
 from ..errors import DeckError, MeasurementError, unknown_name
 from ..reading import is_there, text_of
+from .arrow_columns import give_back, libraries, numpy_column, read_columns
 from .changes import changed_assembly
 from .sweep_columns import DONE, RESULTS_FILE, STATE_COLUMNS, SweepColumn
-from .sweep_parts import libraries, rows_in_order
+from .sweep_parts import rows_in_order
 
 __all__ = ["STATE_COLUMNS", "SweepColumn", "SweepTable", "about_text", "read_about", "read_sweep"]
 
@@ -196,15 +197,18 @@ def read_sweep(folder: Path | str) -> SweepTable:
 
 
 def _columns_of(path: Path, columns: tuple[SweepColumn, ...]) -> dict[str, NDArray[Any]]:
-    pyarrow, parquet = libraries()
+    pyarrow, _ = libraries()
     try:
-        table = parquet.read_table(path, memory_map=True)
-        return {column.name: table.column(column.name).to_numpy() for column in columns}
+        table = read_columns(path)
+        values = {column.name: numpy_column(table.column(column.name)) for column in columns}
     except (OSError, KeyError, pyarrow.ArrowException) as error:
         raise MeasurementError(
             str(path), f"cannot be read as the table of a sweep ({error})",
             next_step="remove it and run the same sweep again: finished points are not computed again",
         ) from None  # fmt: skip
+    del table
+    give_back()
+    return values
 
 
 def _decks(folder: Path, about: Mapping[str, Any]) -> dict[str, str]:

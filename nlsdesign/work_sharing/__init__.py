@@ -10,6 +10,7 @@ from .identity import CodeIdentity, code_identity
 from .in_this_process import InThisProcess
 from .mpi_ranks import MpiRanks
 from .shared_map import ChunkSizes, shared_map
+from .spread_over import spread_over
 from .team import Executor
 from .worker_processes import Processes
 
@@ -24,4 +25,5 @@ __all__ = [
     "Processes",
     "code_identity",
     "shared_map",
+    "spread_over",
 ]

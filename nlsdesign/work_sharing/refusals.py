@@ -45,6 +45,8 @@ def sendable(work: Callable[[Any], Any]) -> bytes:
         library = pickle
     try:
         content: bytes = library.dumps(work, protocol=pickle.HIGHEST_PROTOCOL)
+    except WorkSharingError:  # of a part of it, which says more
+        raise
     except Exception as error:  # whatever an object answers to being pickled
         raise WorkSharingError(
             "the work", f"cannot be sent to workers: {reason_of(error)}",

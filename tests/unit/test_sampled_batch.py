@@ -7,14 +7,19 @@ import pytest
 
 from nlsdesign.components import CoulombFriction, Inertia, assembly, tie
 from nlsdesign.control import ClosedLoop, torque_controller
-from nlsdesign.errors import UnknownNameError, ValueRangeError
+from nlsdesign.errors import ExportError, UnknownNameError, ValueRangeError
 from nlsdesign.export import natively
+from nlsdesign.export.compilation import compiled_step
+from nlsdesign.export.compilation.columns_in_c import ColumnsInC, sampled_run_in_c
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.observer import CascadeGain, FixedGrid, design_observer
 from nlsdesign.quantity import quantity
 from nlsdesign.simulation import column_runs, sampled_batch
 from nlsdesign.simulation.buffered import Translate, as_it_is
+from nlsdesign.simulation.column_graph import ColumnGraph
 from nlsdesign.simulation.sampled_batch import SampledSystem, run_batch
+from nlsdesign.sweeps import same_bits as same_bits_module
+from nlsdesign.sweeps.same_bits import same_bits
 from tests import observed as ob
 
 DESIRED = "controller.spring.torque.desired"
@@ -111,6 +116,60 @@ def test_columns_are_the_runs_alone(
             allowed = 0.0 if translate is natively else 1e-10 * size
             assert size > 1e-6
             assert np.max(np.abs(batch[name][i] - alone[name][0])) <= allowed, (i, name)
+
+
+def test_without_a_compiler_a_sweep_has_the_bits_of_compiled_code(
+    monkeypatch: pytest.MonkeyPatch, system: SampledSystem
+) -> None:
+    """Also with so many columns that NumPy would be quicker, and where compiling fails in mid-run."""
+    monkeypatch.setattr(column_runs, "MANY", 2)
+    given = {"inputs": {DESIRED: wanted}, "keep": KEPT}
+    numbers = {"plant.motor.inertia": np.linspace(4e-4, 9e-4, 9)}
+
+    def without(*_: object, **__: object) -> None:
+        raise ExportError("compiler", "is not there")
+
+    runs = []
+    broken_places = (
+        None,
+        (same_bits_module, "quickest", lambda: as_it_is),
+        (compiled_step, "_built", without),
+    )
+    for place in broken_places:
+        column_runs._column_run.cache_clear()
+        with monkeypatch.context() as broken:
+            if place is not None:
+                broken.setattr(*place)
+            runs.append(run_batch(system, 0.3, parameters=numbers, translate=same_bits, **given))
+    column_runs._column_run.cache_clear()
+    for name in KEPT:
+        assert np.max(np.abs(runs[0][name])) > 0.05
+        assert runs[0][name].tobytes() == runs[1][name].tobytes() == runs[2][name].tobytes(), name
+
+
+def test_observers_of_other_numbers_share_compiled_code(
+    monkeypatch: pytest.MonkeyPatch, plant: FlatModel
+) -> None:
+    """Tables and gains are given to the code, so a sweep of machines compiles once and gives each its own."""
+    codes = []
+
+    def noted(graph: ColumnGraph) -> ColumnsInC:
+        codes.append(sampled_run_in_c(graph))
+        return codes[-1]
+
+    monkeypatch.setattr(compiled_step, "sampled_run_in_c", noted)
+    for inertia in (5.3e-4, 7.1e-4):
+        machine = plant.with_values({"motor.inertia": inertia})
+        observer = design_observer(machine, gain=CascadeGain(), grid=FixedGrid(-1.2, 1.2, points=31))
+        made = ClosedLoop(
+            plant=machine, observer=observer, controller=torque_controller(machine), wires=WIRES
+        ).system([DESIRED])
+        given = {"inputs": {DESIRED: wanted}, "keep": KEPT, "start": {"plant.motor.angle": np.zeros(8)}}
+        batch = run_batch(made, 0.02, translate=natively, **given)
+    alone = run_batch(made, 0.02, translate=as_it_is, **given)
+    assert all(np.array_equal(batch[name], alone[name]) for name in KEPT), "the second has its own numbers"
+    assert codes[0].text == codes[1].text
+    assert not np.array_equal(codes[0].numbers, codes[1].numbers)
 
 
 def test_a_plant_whose_laws_jump_is_refused(loop: ClosedLoop) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -158,6 +159,44 @@ def test_points_that_fail_are_a_finding(tmp_path: Path, run: Run) -> None:
     status, _, err = run("sweep", str(tmp_path / "sweep.toml"), "--workers", "1", "--mpi")
     assert status == 2
     assert "--workers and --mpi: name two places for the work" in err
+
+
+def test_a_sweep_ends_with_what_to_look_at(tmp_path: Path, run: Run) -> None:
+    """Each command that is named as the next one does what is written beside it."""
+    text = ANGLE.replace('lower = "1e-6 kg*m^2"', 'lower = "-2 mg*m^2"')
+    words = ("sweep", str(written(tmp_path, text)), "--out", "my sweep", "--workers", "1")
+    status, out, _ = run(*words)
+    assert status == 1
+    commands = [line.partition("#")[0].split(": ", 1)[1] for line in out.splitlines() if "next: " in line]
+    assert [shlex.split(each)[1:] for each in commands] == [
+        ["report", "my sweep"], ["report", "my sweep", "--deck-of", "0"],
+    ]  # fmt: skip
+    assert "first" in out
+    status, out, _ = run(*shlex.split(commands[0])[1:])
+    assert status == 0
+    assert "4 of them failed" in out
+    # The deck behind a point that failed says why it did.
+    status, _, err = run(*shlex.split(commands[1])[1:])
+    assert status == 2
+    assert "inertia = -2e-06" in err
+
+
+def test_a_page_is_written_at_the_end_and_no_changed_one_is_replaced(tmp_path: Path, run: Run) -> None:
+    pytest.importorskip("SALib")
+    words = ("sweep", str(written(tmp_path, ANGLE)), "--workers", "1", "--report", "pages")
+    status, out, _ = run(*words)
+    assert status == 0
+    page = tmp_path / "pages" / "sweep.html"
+    assert "nlsdesign report out/sweep --deck-of POINT" in page.read_text(encoding="utf-8")
+    assert f"written: {Path('pages') / 'sweep.html'}" in out
+    assert "next:" not in out
+    content = json.loads(run(*words, "--json")[1])
+    assert (content["page"], content["next"]) == ("pages/sweep.html", [])
+    page.write_text("of somebody", encoding="utf-8")
+    status, _, err = run(*words, "--again")
+    assert status == 2
+    assert "was changed" in err
+    assert page.read_text(encoding="utf-8") == "of somebody"
 
 
 def test_a_file_that_is_not_there(run: Run) -> None:

@@ -232,6 +232,26 @@ def test_a_plan_is_seen_from_its_points_and_a_shuffled_one_is_none() -> None:
     assert saltelli_plan(np.random.default_rng(0).uniform(size=(40, 3))) is None
 
 
+def test_points_of_a_plan_that_are_no_whole_plan_get_no_shares() -> None:
+    """Its points belong together in blocks, so a method for independent points would be surer than it is."""
+    sample = pytest.importorskip("SALib.sample.sobol")
+    problem = {"num_vars": 2, "names": list("ab"), "bounds": [[0.0, 1.0]] * 2}
+    points = sample.sample(problem, 128, calc_second_order=False, seed=1)
+    crossed = {"a": np.tile(points[:, 0], 3), "b": np.tile(points[:, 1], 3)}
+    crossed["c"] = np.repeat([1.0, 2.0, 3.0], len(points))
+    kinds = {"a": "saltelli", "b": "saltelli", "c": "grid"}
+    holes = {name: np.delete(points[:, k], [7, 30]) for k, name in enumerate("ab")}
+    for axes in (crossed, holes):
+        answers = {"y": axes["a"] + 2.0 * axes["b"]}
+        done = np.ones(len(axes["a"]), dtype=bool)
+        result = sensitivity(axes, answers, done, kinds=kinds)[0]
+        assert not result.indices
+        assert "no whole plan" in result.refusal
+    whole = {"a": points[:, 0], "b": points[:, 1], "c": np.ones(len(points))}
+    result = sensitivity(whole, {"y": points[:, 0]}, np.ones(len(points), dtype=bool), kinds=kinds)[0]
+    assert len(result.indices) == 2, "an axis of one value takes nothing from the plan"
+
+
 def test_a_block_with_a_failed_point_is_left_out_whole_and_many_are_refused() -> None:
     sample = pytest.importorskip("SALib.sample.sobol")
     problem = {"num_vars": 2, "names": list("ab"), "bounds": [[0.0, 1.0]] * 2}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,26 +15,36 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.control import loop_margins
 from nlsdesign.deck import load_deck
 from nlsdesign.design import ExponentialTorque, MaximumCamRadius, design_cam
-from nlsdesign.errors import UnknownNameError
+from nlsdesign.errors import UnknownNameError, ValueRangeError
+from nlsdesign.export import natively
 from nlsdesign.model import flatten
 from nlsdesign.model.transform import with_outputs
+from nlsdesign.observer import CascadeGain, design_observer, observer_bench, observer_errors
+from nlsdesign.simulation import column_runs
+from nlsdesign.simulation.buffered import as_it_is
 from nlsdesign.simulation.prior import declared_prior
 from nlsdesign.sweeps import (
     AngleQuestion,
     DesignQuestion,
     LatinHypercube,
+    Listed,
     LoopQuestion,
     PointPlan,
     RandomDraws,
     SobolSample,
     SpreadQuestion,
     Subject,
+    SweepTable,
+    same_bits,
+    sweep,
 )
 from nlsdesign.sweeps.changes import changed_assembly
 from nlsdesign.sweeps.design_question import QUICK
+from nlsdesign.work_sharing import Executor, InThisProcess, Processes
 from tests.sweeping import AREA, INERTIA, actuator, question
 
 CONSISTENT = declare(load_deck("austin2015_figure_consistent"))
+SOFT = declare(load_deck("austin2015_soft_spring"))
 
 
 def test_the_angle_is_that_of_the_analysis() -> None:
@@ -77,6 +88,58 @@ def test_errors_over_the_spread_grow_with_the_spread() -> None:
     answers = asked.ask(CONSISTENT)
     assert answers["error.exact"] < answers["error.median"] < answers["error.most"]
     assert set(answers) == {c.name for c in asked.answers(CONSISTENT)}
+
+
+def spread_of(out: Path, inertias: list[float], executor: Executor) -> SweepTable:
+    """Errors over the spread of the soft spring, for machines and seeds."""
+    axes = [Listed({INERTIA: inertias}), Listed({"ask.seed": [0, 1]})]
+    asked = SpreadQuestion(draws=4, sample_time=2e-3)
+    return sweep(SOFT, axes=axes, ask=asked, out=out, executor=executor)
+
+
+def test_errors_over_the_spread_are_those_of_the_observer_and_a_seed_draws_other_machines(
+    tmp_path: Path,
+) -> None:
+    inertia = SOFT.quantities()[INERTIA].number
+    table = spread_of(tmp_path, [1.5 * inertia, -inertia], InThisProcess())
+    assert table.done.tolist() == [True, True, False, False]
+    assert all("inertia = -" in reason for reason in table.values["reason"][2:])
+    answers = {column.name: table.values[column.name] for column in table.answers}
+    assert answers["error.exact"][0] == answers["error.exact"][1]
+    assert answers["error.median"][0] != answers["error.median"][1]
+    # The same as a direct call for the second seed.
+    machine = SOFT.with_values({INERTIA: 1.5 * inertia})
+    model = with_outputs(flatten(machine), ["motor.angle", "spring.torque"])
+    observer = design_observer(model, sample_time=2e-3, gain=CascadeGain())
+    bench = observer_bench(model, estimate="spring.torque", measured="motor.angle", sample_time=2e-3)
+    errors = observer_errors({"observer": observer}, bench, draws=4, seed=1, bounded=0, translate=natively)
+    assert answers["error.exact"][1] == errors.exact[0].max()
+    assert answers["error.median"][1] == errors.quantile("observer", 0.5).max()
+    assert answers["error.most"][1] == errors.quantile("observer", 0.9).max()
+    assert answers["error.lost"][1] == errors.lost
+
+
+@pytest.mark.slow
+def test_workers_without_a_compiler_write_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inertia = SOFT.quantities()[INERTIA].number
+    machines = [inertia, 1.3 * inertia, 1.5 * inertia]
+    spread_of(tmp_path / "compiled", machines, Processes(2))
+    monkeypatch.setattr(same_bits, "quickest", lambda: as_it_is)
+    monkeypatch.setattr(column_runs, "MANY", 2)
+    column_runs._column_run.cache_clear()
+    table = spread_of(tmp_path / "interpreted", machines, InThisProcess())
+    column_runs._column_run.cache_clear()
+    assert table.done.all()
+    one, other = ((tmp_path / name / "results.parquet").read_bytes() for name in ("compiled", "interpreted"))
+    assert one == other
+
+
+@pytest.mark.parametrize(("given", "words"), [({"draws": 0}, "draws = 0"), ({"seed": -1}, "seed = -1")])
+def test_draws_that_cannot_be_are_refused(given: dict[str, int], words: str) -> None:
+    with pytest.raises(ValueRangeError, match=words):
+        SpreadQuestion(**given)
 
 
 def test_draws_follow_the_spread_of_the_deck() -> None:

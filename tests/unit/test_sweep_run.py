@@ -23,6 +23,7 @@ from nlsdesign.sweeps import (
     LatinHypercube,
     Listed,
     RandomDraws,
+    SaltelliSample,
     SobolSample,
     SweepSettings,
     sweep,
@@ -236,6 +237,26 @@ def test_axes_that_cannot_be_are_refused_before_anything_runs(
     with pytest.raises(kind, match=words):
         sweep(actuator(), axes=axes, ask=question(), out=tmp_path / "none", executor=HERE)
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        GridAxis(INERTIA, 1e-6, 2e-6, 2),
+        Listed({"spring.rubber": ["PMC-770", "Dragon_Skin_30"]}),
+        SaltelliSample({INERTIA: (1e-6, 2e-6)}, 4),
+    ],
+)
+def test_a_saltelli_plan_is_not_crossed(other: AxisSet) -> None:
+    pytest.importorskip("SALib")
+    plan = SaltelliSample({AREA: (1e-5, 2e-5)}, 4)
+    for axes in ([plan, other], [other, plan]):
+        with pytest.raises(
+            ValueRangeError, match=r"Saltelli sample over .* is crossed with axis .*among its"
+        ):
+            sweep_task(actuator(), axes=axes, ask=question())
+    alone = sweep_task(actuator(), axes=[plan, Listed({INERTIA: [1e-6]})], ask=question())
+    assert len(alone.plan) == 12, "one value crosses nothing"
 
 
 def test_an_answer_that_was_not_announced_is_the_failure_of_its_point(tmp_path: Path) -> None:

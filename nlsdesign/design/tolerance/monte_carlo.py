@@ -13,6 +13,7 @@ from ...components.assembly.named_parts import Assembly
 from ...errors import ValueRangeError
 from ...model import FlatModel, flatten
 from ...model.roles import series_cam
+from ...processes import parallel_map
 from ..curves.target import Target
 from ..statics.smooth_cables import with_smooth_cables
 from .causes import NumberCause, SpreadReading, draw_deviations, shown_unit
@@ -242,26 +243,26 @@ def _effects(
     left = rows if best is None else _without(rows, rows[best.column], made.weights)
     sizes, sizes_left = ((part[list(acting)] ** 2 @ made.weights) for part in (rows, left))
     totals = [float(np.sum(each)) or 1.0 for each in (sizes, sizes_left)]
-    effects = []
-    for k, size, size_left in zip(acting, sizes, sizes_left, strict=True):
-        shares = float(size) / totals[0], float(size_left) / totals[1]
+
+    def effect(place: int) -> CauseEffect:
+        k, size, size_left = acting[place], float(sizes[place]), float(sizes_left[place])
+        shares = size / totals[0], size_left / totals[1]
         if max(shares) < _SMALL:
             halved, measured = (with_less.small((rows[k], left[k]), k, part) for part in (0.5, 1.0))
         else:
             halved, measured = (with_less(k, part) for part in (0.5, 1.0))
-        effects.append(
-            CauseEffect(
-                cause=made.causes[k],
-                share=shares[0],
-                share_after_trim=shares[1],
-                alone=_alone(made, k, reading),
-                halved=halved[0],
-                measured=measured[0],
-                halved_after_trim=halved[1],
-                measured_after_trim=measured[1],
-            )
+        return CauseEffect(
+            cause=made.causes[k],
+            share=shares[0],
+            share_after_trim=shares[1],
+            alone=_alone(made, k, reading),
+            halved=halved[0],
+            measured=measured[0],
+            halved_after_trim=halved[1],
+            measured_after_trim=measured[1],
         )
-    return effects
+
+    return list(parallel_map(effect, len(acting)))
 
 
 def _without(rows: Floats, tangent: Floats, weights: Floats) -> Floats:

@@ -2,13 +2,15 @@
 
 The types are vectors of the compiler, so that one instruction of the processor works on several columns.
 Sums, products, quotients, roots and comparisons have the bits of the single column; elementary functions are
-those of the C library, column by column.
+those of the C library, column by column. Constants and tables are no part of the code but are given to it, so
+that machines of one structure, each with an observer of its own numbers, share what was compiled once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -55,7 +57,55 @@ _LIBRARY: Mapping[int, str] = {
 _TWO_OPERANDS = frozenset(["pow", "hypot", "atan2", "fmod"])
 
 
-def sampled_run_in_c(graph: ColumnGraph) -> str:
+_WRITTEN = frozenset([0.0, 0.5, 1.0, 2.0])
+"""Sizes of constants that stand in the code: they belong to formulas, not to a machine."""
+
+
+class ColumnsInC(NamedTuple):
+    """Code of a run, and what is given to it.
+
+    Parameters
+    ----------
+    text
+        C code with a function ``run``.
+    numbers
+        Constants, then grid and values of each table.
+    """
+
+    text: str
+    numbers: NDArray[np.float64]
+
+
+class _Given:
+    """Numbers that are given to the code, and where each stands."""
+
+    def __init__(self, graph: ColumnGraph) -> None:
+        self._numbers: list[float] = []
+        self.constants = {id(each): self._places(each) for each in (graph, *graph.bodies)}
+        self.grids, self.tables = [], []
+        for table in graph.tables:
+            self.grids.append(self._added(table.grid))
+            self.tables.append(self._added(table.values.ravel()))
+
+    def _places(self, graph: ColumnGraph) -> dict[int, str]:
+        names = {}
+        for number, value in graph.constants.items():
+            given = math.isfinite(value) and abs(value) not in _WRITTEN
+            names[number] = f"all({f'c[{self._added([value])}]' if given else _number(value)})"
+        return names
+
+    def _added(self, values: Iterable[float]) -> int:
+        first = len(self._numbers)
+        self._numbers.extend(map(float, values))
+        return first
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """All of them; at least one, so that there is something to point at."""
+        return np.array(self._numbers or [0.0])
+
+
+def sampled_run_in_c(graph: ColumnGraph) -> ColumnsInC:
     """Return C code of a run of samples, for many columns.
 
     Parameters
@@ -70,30 +120,31 @@ def sampled_run_in_c(graph: ColumnGraph) -> str:
         step.code for each in (graph, *graph.bodies) for step in each.steps if isinstance(step, Operation)
     }
     written += [_by_columns(name) for name in sorted({_LIBRARY[code] for code in used & set(_LIBRARY)})]
-    for k, table in enumerate(graph.tables):
-        written.append(_numbers(f"grid{k}", table.grid) + _numbers(f"table{k}", table.values.ravel()))
+    held = _Given(graph)
+    constants = held.constants
     crossing = [_crossing(body) for body in graph.bodies]
     for k, body in enumerate(graph.bodies):
-        written.append(_once(k, body, crossing[k]) + _each(k, body, crossing[k]))
+        names = constants[id(body)]
+        written.append(_once(k, body, crossing[k], names) + _each(k, body, crossing[k], names))
     state, given, parameter = graph.arguments
-    names = {number: f"p[{i}]" for i, number in enumerate(parameter)}
+    names = constants[id(graph)] | {number: f"p[{i}]" for i, number in enumerate(parameter)}
     fixed = [_operation(s, graph, names) for s in graph.steps if _is_fixed(s, graph)]
     onces = []
     for k, (place, operands) in enumerate(graph.onces):
         onces.append(f"column o{k}[{len(crossing[place])} + 1];")
-        values = "".join(f"{_name(v, graph, names)}, " for v in operands)
-        fixed.append(f"{{ column a[] = {{{values}{{0}}}}; once{place}(a, o{k}); }}")
+        values = "".join(f"{_name(v, names)}, " for v in operands)
+        fixed.append(f"{{ column a[] = {{{values}{{0}}}}; once{place}(c, a, o{k}); }}")
     names |= {number: f"s[{i}]" for i, number in enumerate(state)}
     names |= {number: f"load(g + {i} * every)" for i, number in enumerate(given)}
-    lines = [_step(step, graph, names) for step in graph.steps if not _is_fixed(step, graph)]
+    lines = [_step(step, graph, names, held) for step in graph.steps if not _is_fixed(step, graph)]
     after, kept = graph.results
-    lines += [f"store(out + {i} * every, {_name(v, graph, names)});" for i, v in enumerate(kept)]
-    lines += [f"column n{i} = {_name(v, graph, names)};" for i, v in enumerate(after)]
+    lines += [f"store(out + {i} * every, {_name(v, names)});" for i, v in enumerate(kept)]
+    lines += [f"column n{i} = {_name(v, names)};" for i, v in enumerate(after)]
     lines += [f"s[{i}] = n{i};" for i in range(len(after))]
     sizes = {"states": len(state), "inputs": len(given), "parameters": len(parameter), "shown": len(kept)}
     rows = {"onces": onces, "fixed": fixed, "body": lines}
     written.append(filled("columns_run.c", {**{name: str(size) for name, size in sizes.items()}, **rows}))
-    return "\n".join(written)
+    return ColumnsInC("\n".join(written), held.numbers)
 
 
 def _is_fixed(step: object, graph: ColumnGraph) -> bool:
@@ -106,10 +157,6 @@ def _number(value: float) -> str:
     if math.isinf(value):
         return "INFINITY" if value > 0.0 else "-INFINITY"
     return f"({value.hex()})"
-
-
-def _numbers(name: str, values: NDArray[np.float64]) -> str:
-    return f"static const double {name}[] = {{{', '.join(_number(float(v)) for v in values)}}};\n"
 
 
 def _by_columns(name: str) -> str:
@@ -137,39 +184,39 @@ def _fixed_arguments(body: ColumnGraph) -> list[int]:
     return [k for argument in body.arguments for k in argument if k in body.fixed]
 
 
-def _once(number: int, body: ColumnGraph, crossing: Sequence[int]) -> str:
-    names = {k: f"a[{i}]" for i, k in enumerate(_fixed_arguments(body))}
+def _once(number: int, body: ColumnGraph, crossing: Sequence[int], constants: Mapping[int, str]) -> str:
+    names = dict(constants) | {k: f"a[{i}]" for i, k in enumerate(_fixed_arguments(body))}
     lines = [_operation(s, body, names) for s in body.steps if _is_fixed(s, body)]
-    lines += [f"o[{i}] = {_name(k, body, names)};" for i, k in enumerate(crossing)]
+    lines += [f"o[{i}] = {_name(k, names)};" for i, k in enumerate(crossing)]
     text = "\n    ".join(lines)
     return (
-        f"static __attribute__((noinline)) void once{number}(const column *a, column *o) {{\n    {text}\n}}\n"
+        f"static __attribute__((noinline)) void once{number}(const double *restrict c, const column *a, "
+        f"column *o) {{\n    (void)c;\n    {text}\n}}\n"
     )
 
 
-def _each(number: int, body: ColumnGraph, crossing: Sequence[int]) -> str:
-    names = {k: f"o[{i}]" for i, k in enumerate(crossing)}
+def _each(number: int, body: ColumnGraph, crossing: Sequence[int], constants: Mapping[int, str]) -> str:
+    names = dict(constants) | {k: f"o[{i}]" for i, k in enumerate(crossing)}
     moving = [k for argument in body.arguments for k in argument if k not in body.fixed]
     names |= {k: f"a[{i}]" for i, k in enumerate(moving)}
     lines = [_operation(s, body, names) for s in body.steps if not _is_fixed(s, body)]
     results = [k for result in body.results for k in result]
-    lines += [f"r[{i}] = {_name(k, body, names)};" for i, k in enumerate(results)]
+    lines += [f"r[{i}] = {_name(k, names)};" for i, k in enumerate(results)]
     text = "\n    ".join(lines)
     return (
-        f"static __attribute__((noinline)) void each{number}(const column *restrict o, "
-        f"const column *restrict a, column *restrict r) {{\n    {text}\n}}\n"
+        f"static __attribute__((noinline)) void each{number}(const double *restrict c, "
+        f"const column *restrict o, const column *restrict a, column *restrict r) {{\n    (void)c;\n"
+        f"    {text}\n}}\n"
     )
 
 
-def _name(number: int, graph: ColumnGraph, names: Mapping[int, str]) -> str:
-    if number in graph.constants:
-        return f"all({_number(graph.constants[number])})"
+def _name(number: int, names: Mapping[int, str]) -> str:
     return names.get(number, f"v{number}")
 
 
 def _operation(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> str:
     assert isinstance(step, Operation)
-    operands = [_name(k, graph, names) for k in step.operands]
+    operands = [_name(k, names) for k in step.operands]
     result = step.result
     if step.code in _CONDITIONS:
         condition = _CONDITIONS[step.code].format(*operands)
@@ -188,26 +235,27 @@ def _is_condition(number: int, graph: ColumnGraph) -> bool:
     return number in graph.conditions
 
 
-def _step(step: object, graph: ColumnGraph, names: Mapping[int, str]) -> str:
+def _step(step: object, graph: ColumnGraph, names: Mapping[int, str], held: _Given) -> str:
     if isinstance(step, Operation):
         return _operation(step, graph, names)
     if isinstance(step, TableReading):
         table, first = graph.tables[step.table], step.results[0]
         exact = int(table.breakpoints is None)
         call = (
-            f"column t{first}[{len(step.results)}]; look_up(grid{step.table}, table{step.table}, "
-            f"{len(table.grid)}, {len(step.results)}, {exact}, {_name(step.at, graph, names)}, t{first});"
+            f"column t{first}[{len(step.results)}]; look_up(c + {held.grids[step.table]}, "
+            f"c + {held.tables[step.table]}, {len(table.grid)}, {len(step.results)}, {exact}, "
+            f"{_name(step.at, names)}, t{first});"
         )
         return " ".join([call, *(f"column v{k} = t{first}[{i}];" for i, k in enumerate(step.results))])
     assert isinstance(step, Call)
     first, body = step.results[0], graph.bodies[step.body]
     places = [k for argument in body.arguments for k in argument]
     moving = "".join(
-        f"{_name(value, graph, names)}, "
+        f"{_name(value, names)}, "
         for value, own in zip(step.operands, places, strict=True) if own not in body.fixed
     )  # fmt: skip
     call = (
         f"column r{first}[{len(step.results)}]; {{ column a[] = {{{moving}{{0}}}}; "
-        f"each{step.body}(o{step.once}, a, r{first}); }}"
+        f"each{step.body}(c, o{step.once}, a, r{first}); }}"
     )
     return " ".join([call, *(f"column v{k} = r{first}[{i}];" for i, k in enumerate(step.results))])

@@ -21,7 +21,7 @@ from ...simulation.buffered import Translate, as_it_is
 from ...simulation.column_graph import ColumnGraph
 from ...simulation.column_runs import ColumnRun
 from ...writing import write_bytes
-from .columns_in_c import WIDTH, sampled_run_in_c
+from .columns_in_c import WIDTH, ColumnsInC, sampled_run_in_c
 from .cross_compiler import BASELINE, THIS_PROCESSOR, cache_folder, compile_library
 
 Array = NDArray[np.float64]
@@ -93,8 +93,8 @@ class CompiledColumns:
 
     Parameters
     ----------
-    text
-        C code with a function ``run``.
+    code
+        With a function ``run``, and the numbers that are given to it.
     kept
         How many values are kept of a sample.
 
@@ -104,8 +104,9 @@ class CompiledColumns:
         If the compiler is missing or fails, or its result cannot be loaded.
     """
 
-    def __init__(self, text: str, kept: int) -> None:
-        path = _built(text, _COLUMN_FLAGS, this_processor=True)
+    def __init__(self, code: ColumnsInC, kept: int) -> None:
+        path = _built(code.text, _COLUMN_FLAGS, this_processor=True)
+        self._numbers = np.ascontiguousarray(code.numbers)
         try:
             self._run = ctypes.CDLL(str(path)).run
         except OSError as error:
@@ -128,7 +129,9 @@ class CompiledColumns:
         after, inputs, numbers = (_filled_up(each) for each in (state, given, parameter))
         after = after.copy() if after is state else after
         kept = np.empty((len(given), self._kept, after.shape[1]))
-        arrays = (array.ctypes.data_as(ctypes.c_void_p) for array in (after, inputs, numbers, kept))
+        arrays = (
+            array.ctypes.data_as(ctypes.c_void_p) for array in (after, inputs, numbers, self._numbers, kept)
+        )
         self._run(ctypes.c_int64(len(given)), ctypes.c_int64(after.shape[1] // WIDTH), *arrays)
         return after[:, :count], kept[:, :, :count]
 

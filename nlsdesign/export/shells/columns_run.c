@@ -1,5 +1,6 @@
 SHOWN void run(int64_t samples, int64_t groups, double *state, const double *given,
-                  const double *parameter, double *kept) {
+                  const double *parameter, const double *c, double *kept) {
+    (void)c;
     int64_t every = groups * WIDTH;
     for (int64_t group = 0; group < groups; ++group) {
         int64_t at = group * WIDTH;
