@@ -15,14 +15,14 @@ from tests import browser
 
 low = [os.open(os.devnull, os.O_RDONLY) for _ in range(2)]
 assert low == [3, 4], low
-popen = subprocess.Popen
+fork = subprocess._fork_exec
 
-def beside_a_thread_that_closes_files(*words, **options):
+def beside_a_thread_that_closes_files(*words):
     for each in low:
         os.close(each)
-    return popen(*words, **options)
+    return fork(*words)
 
-subprocess.Popen = beside_a_thread_that_closes_files
+subprocess._fork_exec = beside_a_thread_that_closes_files
 answer = [sys.executable, "-c", "import os; os.write(4, os.read(3, 5)[::-1])"]
 started, commands, answers = browser._started(answer)
 commands.write(b"hello")
