@@ -130,7 +130,7 @@ export class AtAngle {
     if (work.state === "computing") text(this.loop.state, `computing: ${work.message}, for ${Math.round(work.seconds)} s`);
     if (work.state === "computing") this.run.hidden = true;
     if (work.state === "failed" || work.state === "cancelled") {
-      text(this.loop.state, `${work.state}: ${work.message}`);
+      text(this.loop.state, work.state === "cancelled" ? "stopped" : `${work.state}: ${work.message}`);
       this.run.hidden = false;
     }
   }
