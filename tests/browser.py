@@ -137,6 +137,25 @@ class Tab:
             "Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", buttons=1, clickCount=1
         )
 
+    def touch(self, *places: tuple[float, float]) -> None:
+        """Put a finger at the first place, lead it over the others and lift it."""
+        self.ask("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=1)
+        for number, (x, y) in enumerate(places):
+            kind = "touchMove" if number else "touchStart"
+            self.ask("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
+        self.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        self.ask("Emulation.setTouchEmulationEnabled", enabled=False)
+
+    def choose(self, name: str, *files: Path) -> None:
+        """Choose files in the field of an id, as the dialog of the system would."""
+        expression = f"document.getElementById({name!r})"
+        field = self.ask("Runtime.evaluate", expression=expression)["result"]["objectId"]
+        self.ask("DOM.setFileInputFiles", objectId=field, files=[str(each) for each in files])
+
+    def downloads_to(self, folder: Path) -> None:
+        """Let what is saved appear in a folder."""
+        self.ask("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+
     def picture(self, path: Path) -> Path:
         """Write the whole page as PNG."""
         data = self.ask("Page.captureScreenshot", captureBeyondViewport=True)["data"]
