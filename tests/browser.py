@@ -191,8 +191,8 @@ class Tab:
         return answer
 
 
-# The browser listens at 3 and answers at 4. Which numbers are free here changes while other threads, and the
-# collection of what was forgotten, open and close files: a helper that has nothing else open puts the ends there.
+# The browser listens at 3 and answers at 4. Which numbers are free here changes while other threads, and
+# the collection of what was forgotten, close files: a helper that has nothing else open puts the ends there.
 _PLACE = """
 import os, sys
 ends = [int(each) for each in sys.argv[1:3]]

@@ -23,7 +23,7 @@ from nlsdesign.live.session_design import SessionDesign
 Message = dict[str, Any]
 
 
-class _Enough(Exception):
+class _EnoughError(Exception):
     """What a test waits for is there."""
 
 
@@ -34,7 +34,7 @@ class _Asked(Inbox):
 
     def take(self, seconds: float | None) -> Message | None:  # type: ignore[override]
         if self.enough():
-            raise _Enough
+            raise _EnoughError
         return super().take(0.02 if seconds is None else min(seconds, 0.02))  # type: ignore[return-value]
 
 
@@ -71,7 +71,7 @@ class Session:
             return enough()
 
         self._inbox.enough = over
-        with suppress(_Enough):
+        with suppress(_EnoughError):
             self.design.run(self._inbox)
 
     def write(self, line: bytes) -> None:
@@ -86,7 +86,11 @@ class Session:
         """Nothing is held back."""
 
     def ask(self, **message: Any) -> Message:
-        """Ask as a page does, and return the answer that has the number of the question."""
+        """Ask as a page does, and return the answer that has the number of the question.
+
+        What was sent before is forgotten.
+        """
+        self.pages.clear()
         self._number += 1
         number = self._number
         self._inbox.put({"page": {**message, "number": number}})
@@ -111,16 +115,15 @@ class Session:
         return dict(found["work"])
 
     def until(self, wanted: Callable[[Message], bool]) -> Message:
-        """Return the last message to the page that is wanted; what was sent before it is forgotten."""
-        found: list[int] = []
+        """Return the last message to the page that is wanted, since the last question."""
+        found: list[Message] = []
 
         def there() -> bool:
-            found[:] = [k for k, each in enumerate(self.pages) if wanted(each)][-1:]
+            found[:] = [each for each in self.pages if wanted(each)][-1:]
             return bool(found)
 
         self._run(there)
-        del self.pages[: found[0]]
-        return self.pages[0]
+        return found[0]
 
     def server(self, **question: Any) -> Message:
         """Ask as the server does."""

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import asyncio
+import io
+import json
 import random
+import subprocess
+import zipfile
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 import nlsdesign as nls
 from nlsdesign.design import tolerance_analysis
+from nlsdesign.design.statics.equilibrium import equilibrium_torque
 from nlsdesign.errors import NlsError
 from nlsdesign.identification import load_records
 from nlsdesign.live import gallery_question
 from nlsdesign.live.uploads import Uploads
+from tests.command_line import Run, run
 from tests.live_session import Message, Session, as_csv, bench_records, session
 from tests.unit.test_identification_tables import WRITERS
+
+__all__ = ["run"]
 
 
 @pytest.fixture(scope="module")
@@ -247,6 +256,71 @@ def test_a_saved_design_comes_back_with_its_numbers_and_a_damaged_one_leaves_the
     for name, value in numbers(before).items():
         assert numbers(again)[name] == pytest.approx(value, rel=1e-6)
     np.testing.assert_allclose(rows(again)["torque"], rows(before)["torque"], rtol=1e-4, atol=1e-6)
+
+
+def test_the_deck_of_a_design_is_sound_and_repeats_its_torque(one: Session, run: Run, tmp_path: Path) -> None:
+    answer = one.edit("MovePoint", index=2, angle=0.41, torque=0.17)["answer"]
+    name, content = one.file("deck")
+    (tmp_path / name).write_bytes(content)
+    status, out, err = run("deck", "check", name)
+    assert status == 0, err
+    assert "no problem" in out
+    machine = nls.declare(nls.load_deck(str(tmp_path / name)))
+    columns = rows(answer)
+    torque = equilibrium_torque(nls.flatten(machine), "spring", columns["angle"])
+    # The quick answer sees the nodes of the contour, and knots of the rubber rounded.
+    np.testing.assert_allclose(torque, columns["torque"], atol=2e-3 * max(columns["torque"]))
+    for name, value in numbers(answer).items():
+        assert machine.quantities()[name].number == pytest.approx(value, rel=1e-6)
+
+
+def test_a_file_that_cannot_be_made_is_refused_in_words(one: Session) -> None:
+    assert "dxf" in one.server(what="file", kind="dwg")["refused"]
+
+
+@pytest.mark.slow
+def test_drawings_code_and_unit_of_a_design_are_sound(one: Session, tmp_path: Path) -> None:
+    """Read by others: ezdxf, an XML parser, the C compiler with the code's own test, fmpy."""
+    from fmpy.validation import validate_fmu
+
+    ezdxf = pytest.importorskip("ezdxf")
+    reach = 1e3 * max(rows(shown(one))["radius"])
+    for kind in ("dxf", "svg", "c", "fmu"):
+        name, content = one.file(kind)
+        (tmp_path / name).write_bytes(content)
+    drawing = ezdxf.readfile(tmp_path / "cam.dxf")
+    assert not drawing.audit().errors
+    outline = [
+        each for each in drawing.modelspace() if each.dxftype() in ("LWPOLYLINE", "SPLINE", "POLYLINE")
+    ]
+    assert outline
+    corners = np.array([point[:2] for each in outline for point in points_of(each)])
+    assert np.hypot(*corners.T).max() == pytest.approx(reach, rel=0.05)
+    assert ElementTree.parse(tmp_path / "cam.svg").getroot().tag.endswith("svg")
+    with zipfile.ZipFile(tmp_path / "observer_and_controller.zip") as archive:
+        archive.extractall(tmp_path)
+    sources = sorted(str(each) for each in tmp_path.glob("*.c"))
+    assert len(sources) == 2
+    words = ["-std=c99", "-Wall", "-Wextra", "-Werror", *sources, "-lm", "-o", str(tmp_path / "selftest")]
+    subprocess.run(["gcc", *words], check=True, timeout=120)
+    subprocess.run([str(tmp_path / "selftest")], check=True, timeout=60)
+    assert validate_fmu(str(tmp_path / "plant.fmu")) == []
+
+
+def points_of(entity: Any) -> list[Any]:
+    return list(entity.flattening(0.01)) if hasattr(entity, "flattening") else list(entity.get_points())
+
+
+@pytest.mark.slow
+def test_a_saved_design_is_designed_again_by_the_command_line(one: Session, run: Run, tmp_path: Path) -> None:
+    answer = one.edit("MovePoint", index=2, angle=0.41, torque=0.17)["answer"]
+    with zipfile.ZipFile(io.BytesIO(one.file("design")[1])) as archive:
+        archive.extractall(tmp_path)
+    words = ["--deck", "deck.toml", "--job", "design.toml", "--draws", "0", "--json", "--out", "out"]
+    status, out, err = run("design", *words)
+    assert status == 0, err
+    error = json.loads(out)["rms_error"]
+    assert error == pytest.approx(answer["design"]["rms_error"], abs=1e-3 * max(rows(answer)["torque"]))
 
 
 # --- edits ----------------------------------------------------------------------------------------
