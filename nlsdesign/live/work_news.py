@@ -99,9 +99,8 @@ class WorkNews:
         return news
 
     def all(self) -> list[dict[str, Any]]:
-        """Return the news of all work, as for a page that was loaded just now."""
-        names = dict.fromkeys([*self._states, DiagnoseRecords.__name__])
-        return [self.of(name) for name in names]
+        """Return the news of all work, as for a page that was loaded just now or showed another design."""
+        return [self.of(name) for name in TASKS]
 
     def of(self, name: str) -> dict[str, Any]:
         """Return the news of work of a kind.

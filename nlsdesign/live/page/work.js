@@ -10,6 +10,7 @@ export class Tolerance {
     this.run = byId("tolerance-run");
     this.stop = byId("tolerance-stop");
     this.words = byId("tolerance-state");
+    this.purpose = this.words.textContent;
     this.run.addEventListener("click", () => ask({ what: "work", name: "ToleranceCloud" }));
     this.stop.addEventListener("click", () => ask({ what: "work", name: "ToleranceCloud", stop: true }));
     this.chart = new Chart(byId("tolerance-chart"), { title: "Torque of made springs", x: { name: "angle θ", unit: "rad" }, y: { name: "torque", unit: "N*m" }, height: 220, zero: true });
@@ -17,7 +18,6 @@ export class Tolerance {
   }
 
   show(work, answer) {
-    if (work.state === "not begun") return;
     const running = work.state === "computing";
     this.stop.hidden = !running;
     this.run.disabled = running || !answer?.design;
@@ -26,7 +26,8 @@ export class Tolerance {
     const old = work.old || work.revision !== answer?.revision;
     byId("tolerance").classList.toggle("stale", old && cloud !== null);
     if (!cloud) {
-      text(this.words, running ? `${work.message}, for ${Math.round(work.seconds)} s` : ended(work));
+      if (work.state === "not begun") text(this.words, this.purpose);
+      else text(this.words, running ? `${work.message}, for ${Math.round(work.seconds)} s` : ended(work));
       byId("tolerance-chart").hidden = true;
       return;
     }
@@ -55,6 +56,7 @@ export class Diagnosis {
     this.run = byId("diagnosis-run");
     this.stop = byId("diagnosis-stop");
     this.words = byId("diagnosis-state");
+    this.purpose = this.words.textContent;
     this.stages = byId("stages");
     this.gap = byId("gap");
     this.stages.hidden = true;
@@ -110,8 +112,10 @@ export class Diagnosis {
     }
     this.loaded = work.files.length > 0;
     if (work.state === "not begun") {
+      this.clear();
+      this.stop.hidden = true;
       this.run.disabled = !this.loaded;
-      if (this.loaded) text(this.words, there(work.files));
+      text(this.words, this.loaded ? there(work.files) : this.purpose);
       return;
     }
     const running = work.state === "computing";
