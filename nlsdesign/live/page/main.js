@@ -368,6 +368,7 @@ byId("open").addEventListener("change", async (event) => {
   byId("files").open = false;
   if (!file) return;
   const wrong = await upload("/api/open", file);
+  byId("notice").hidden = true;
   if (wrong) refuse({ reason: wrong });
   else angle = null;
 });

@@ -132,7 +132,8 @@ export class Diagnosis {
     this.stages.scrollTop = this.stages.scrollHeight;
     const result = work.value;
     if (!result) {
-      text(this.words, running ? `running for ${Math.round(work.seconds)} s` : `${ended(work)}${this.loaded ? `; ${there(work.files)}` : ""}`);
+      const files = this.loaded ? there(work.files) : "";
+      text(this.words, running ? `running for ${Math.round(work.seconds)} s` : work.old ? files : `${ended(work)}${files && `; ${files}`}`);
       this.gap.replaceChildren();
       return;
     }
