@@ -147,7 +147,9 @@ def _in_long_work(stage: object, machine: object) -> tuple[bool, str]:
     return "Gent" in component_classes(), model.name
 
 
-@pytest.mark.parametrize("as_file", [True, False], ids=["file", "package"])
+@pytest.mark.parametrize(
+    "as_file", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["file", "package"]
+)
 def test_long_work_of_the_live_page_knows_them_too(lab: Path, tmp_path: Path, as_file: bool) -> None:
     from nlsdesign.live.background import BackgroundWork
 
