@@ -140,18 +140,21 @@ class WorkNews:
         live = self._live
         if name == DiagnoseRecords.__name__:
             # Points and limits belong to the design, not to the machine.
-            return (self._listed(), live.question.machine, dict(live.question.given))
+            return (_listed(self._records), live.question.machine, dict(live.question.given))
         design = live.answer.design
         return live.answer.revision, design is not None and design.checked
 
     def _files(self, name: str) -> dict[str, Any]:
-        return {"files": [each[0] for each in self._listed()]} if name == DiagnoseRecords.__name__ else {}
+        if name != DiagnoseRecords.__name__:
+            return {}
+        return {"files": [each[0] for each in _listed(self._records)]}
 
-    def _listed(self) -> list[tuple[str, int, int]]:
-        """Return the records that are there: name, size and time; one that is being replaced is left out."""
-        listed = []
-        for file in sorted(self._records.glob("*")):
-            with contextlib.suppress(FileNotFoundError):
-                seen = file.stat()
-                listed.append((file.name, seen.st_size, seen.st_mtime_ns))
-        return listed
+
+def _listed(folder: Path) -> list[tuple[str, int, int]]:
+    """Return the records that are there: name, size and time; one that is being replaced is left out."""
+    listed = []
+    for file in sorted(folder.glob("*")):
+        with contextlib.suppress(FileNotFoundError):
+            seen = file.stat()
+            listed.append((file.name, seen.st_size, seen.st_mtime_ns))
+    return listed

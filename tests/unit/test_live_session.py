@@ -134,11 +134,15 @@ def test_the_loop_is_that_of_the_angle_and_of_the_design(one: Session) -> None:
 
 
 @pytest.mark.slow
-def test_what_was_computed_of_a_quick_answer_is_not_shown_beside_the_checked_one(tmp_path: Path) -> None:
+def test_what_was_computed_of_a_quick_answer_is_not_shown_beside_the_checked_one(
+    quiet: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Both have one revision; the whole design may be another."""
     with session("", tmp_path) as one:
         one.work("ToleranceCloud")
         one.work("TorqueLoop")
+        monkeypatch.setattr("nlsdesign.live.session_news._REST", 0.0)
+        one.ask(what="show")
         one.until(lambda each: each["what"] == "answer" and each["answer"]["source"] == "full")
         assert one.news("ToleranceCloud", lambda work: work["state"] == "done" and work["old"])
         loop(one, 0.3, "asked for later")
