@@ -17,6 +17,8 @@ from typing import Final
 from .errors import NlsError
 
 _PRESENT: Final[ContextVar[tuple[ModuleType, ...]]] = ContextVar("extensions", default=())
+_OF_A_FILE = "nlsdesign_extension_"
+"""With which the name of a module of one file begins."""
 
 
 @contextmanager
@@ -63,6 +65,11 @@ def extension_files(name: str) -> tuple[Path, ...]:
     return tuple(file for file in (folder / name for folder in folders) if file.is_file())
 
 
+def extension_names() -> tuple[str, ...]:
+    """Return the names by which another process loads the packages that are there: :func:`load_extension`."""
+    return tuple(_name_of(package) for package in _PRESENT.get())
+
+
 def load_extension(name: str) -> ModuleType:
     """Import a package, or the module of one Python file.
 
@@ -89,6 +96,11 @@ def load_extension(name: str) -> ModuleType:
         raise _failed(name, error) from error
 
 
+def _name_of(module: ModuleType) -> str:
+    of_a_file = module.__name__.startswith(_OF_A_FILE)
+    return str(Path(str(module.__file__)).absolute()) if of_a_file else module.__name__
+
+
 def _failed(name: str, error: Exception) -> NlsError:
     """Return the error of a module that raised one while it was imported."""
     rule = f"cannot be imported: {type(error).__name__}: {error}"
@@ -98,7 +110,7 @@ def _failed(name: str, error: Exception) -> NlsError:
 def _from_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise NlsError(str(path), "no such file", next_step="give a .py file or an installed package")
-    name = f"nlsdesign_extension_{path.stem}"
+    name = f"{_OF_A_FILE}{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise NlsError(str(path), "cannot be loaded as Python")

@@ -7,12 +7,14 @@ console are collected.
 from __future__ import annotations
 
 import base64
+import contextlib
 import fcntl
 import itertools
 import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -135,6 +137,25 @@ class Tab:
             "Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", buttons=1, clickCount=1
         )
 
+    def touch(self, *places: tuple[float, float]) -> None:
+        """Put a finger at the first place, lead it over the others and lift it."""
+        self.ask("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=1)
+        for number, (x, y) in enumerate(places):
+            kind = "touchMove" if number else "touchStart"
+            self.ask("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
+        self.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        self.ask("Emulation.setTouchEmulationEnabled", enabled=False)
+
+    def choose(self, name: str, *files: Path) -> None:
+        """Choose files in the field of an id, as the dialog of the system would."""
+        expression = f"document.getElementById({name!r})"
+        field = self.ask("Runtime.evaluate", expression=expression)["result"]["objectId"]
+        self.ask("DOM.setFileInputFiles", objectId=field, files=[str(each) for each in files])
+
+    def downloads_to(self, folder: Path) -> None:
+        """Let what is saved appear in a folder."""
+        self.ask("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+
     def picture(self, path: Path) -> Path:
         """Write the whole page as PNG."""
         data = self.ask("Page.captureScreenshot", captureBeyondViewport=True)["data"]
@@ -170,37 +191,71 @@ class Tab:
         return answer
 
 
+# The browser listens at 3 and answers at 4. Which numbers are free here changes while other threads, and
+# the collection of what was forgotten, close files: a helper that has nothing else open puts the ends there.
+_PLACE = """
+import os, sys
+ends = [int(each) for each in sys.argv[1:3]]
+for end, number in zip(ends, (3, 4)):
+    os.dup2(end, number)
+for end in ends:
+    os.close(end)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+
+
 @contextmanager
 def browser() -> Iterator[Tab]:
-    """Start a browser with an empty profile; it has ended on leaving."""
+    """Start a browser with an empty profile; it has ended on leaving.
+
+    Where this process is killed, the browser ends with the pipes.
+    """
     program = chromium()
     assert program is not None
-    command_end, our_commands = os.pipe()
-    our_answers, answer_end = os.pipe()
-    # The browser listens at 3 and answers at 4; copies far above leave those two free.
-    ends = [fcntl.fcntl(each, fcntl.F_DUPFD_CLOEXEC, 64) for each in (command_end, answer_end)]
-
-    def place() -> None:
-        for end, number in zip(ends, (3, 4), strict=True):
-            os.dup2(end, number)
-
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+    with contextlib.ExitStack() as left:
+        profile = left.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True))
         options = [
             "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--remote-debugging-pipe",
             "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run",
             f"--user-data-dir={profile}",
         ]  # fmt: skip
+        started, commands, answers = _started([program, *options])
+        left.callback(answers.close)
+        left.callback(_closed, commands)
+        left.callback(_ended, started)
+        yield Tab(commands, answers, {})
+
+
+def _started(words: list[str]) -> tuple[subprocess.Popen[bytes], IO[bytes], IO[bytes]]:
+    """Start a browser and return it with our ends of its two pipes."""
+    command_end, our_commands = os.pipe()
+    our_answers, answer_end = os.pipe()
+    # Far above 3 and 4, so that the helper can put one there before it has read the other.
+    ends = [fcntl.fcntl(each, fcntl.F_DUPFD_CLOEXEC, 64) for each in (command_end, answer_end)]
+    try:
+        helper = [sys.executable, "-I", "-S", "-c", _PLACE, *map(str, ends)]
         started = subprocess.Popen(
-            [program, *options], pass_fds=(3, 4), preexec_fn=place,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        for end in ends:
+            [*helper, *words], pass_fds=ends, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+    except BaseException:
+        os.close(our_commands)
+        os.close(our_answers)
+        raise
+    finally:
+        for end in (*ends, command_end, answer_end):
             os.close(end)
-        os.close(command_end)
-        os.close(answer_end)
-        with os.fdopen(our_commands, "wb") as commands, os.fdopen(our_answers, "rb", 1 << 20) as answers:
-            try:
-                yield Tab(commands, answers, {})
-            finally:
-                started.terminate()
-                started.wait(20)
+    return started, os.fdopen(our_commands, "wb"), os.fdopen(our_answers, "rb", 1 << 20)
+
+
+def _closed(commands: IO[bytes]) -> None:
+    with contextlib.suppress(BrokenPipeError):  # it has ended before it read everything
+        commands.close()
+
+
+def _ended(started: subprocess.Popen[bytes]) -> None:
+    started.terminate()
+    try:
+        started.wait(20)
+    except subprocess.TimeoutExpired:
+        started.kill()
+        started.wait(20)

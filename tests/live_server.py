@@ -69,10 +69,10 @@ class Server:
         return self.process.wait(20)
 
 
-def start(*words: str, folder: Path | None = None) -> subprocess.Popen[str]:
-    """Start the command."""
+def start(*words: str, before: tuple[str, ...] = (), folder: Path | None = None) -> subprocess.Popen[str]:
+    """Start the command, with words before its name, in a folder."""
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "nlsdesign", "serve", "--no-browser", "--json", *words],
+        [sys.executable, "-P", "-m", "nlsdesign", *before, "serve", "--no-browser", "--json", *words],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
         # Who runs tests in the background has interrupts ignored, which processes inherit.
@@ -85,9 +85,9 @@ def _as_in_a_terminal() -> None:
 
 
 @contextmanager
-def running(*words: str) -> Iterator[Server]:
+def running(*words: str, before: tuple[str, ...] = (), folder: Path | None = None) -> Iterator[Server]:
     """Start a server and wait until it answers."""
-    process = start(*words)
+    process = start(*words, before=before, folder=folder)
     try:
         assert process.stdout is not None
         shown = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import time
@@ -14,6 +15,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from ..errors import NlsError
+from ..extensions import extended_by, extension_names, load_extension
 from ..processes import signals_held
 
 _ENDED = "its process ended without an answer"
@@ -73,7 +75,9 @@ class BackgroundWork:
         context = _context()
         self._end, other = context.Pipe(duplex=False)
         # Not a daemon: a design has helpers of its own. It ends by itself when its pipe is closed.
-        self._process = context.Process(target=_run, args=(other, work, arguments), daemon=False)  # type: ignore[attr-defined]
+        # What a part of another package is made of is unknown there until that package is loaded.
+        packed = extension_names(), pickle.dumps((work, arguments))
+        self._process = context.Process(target=_run, args=(other, *packed), daemon=False)  # type: ignore[attr-defined]
         with signals_held():
             self._process.start()
         other.close()
@@ -161,8 +165,8 @@ def warm_up() -> None:
         forkserver.ensure_running()
 
 
-def _run(pipe: Connection, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    """Call the work and send what came out."""
+def _run(pipe: Connection, packages: tuple[str, ...], packed: bytes) -> None:
+    """Call the work, within the packages that the session is extended by, and send what came out."""
     if sys.platform != "win32":
         os.setpgid(0, 0)
     _end_with_parent()
@@ -172,7 +176,9 @@ def _run(pipe: Connection, work: Callable[..., Any], arguments: tuple[Any, ...])
         pipe.send(("stage", words))
 
     try:
-        answer = ("done", work(stage, *arguments))
+        with extended_by(*map(load_extension, packages)):
+            work, arguments = pickle.loads(packed)
+            answer = ("done", work(stage, *arguments))
     except NlsError as error:
         answer = ("failed", str(error))
     except MemoryError:

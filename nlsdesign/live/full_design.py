@@ -100,7 +100,8 @@ def full_answer(
         sentence = f"the whole design came to no answer: {full.message}; shown is the quick answer, unchecked"
         return replace(quick, source="full", message=sentence)
     view = view_of(question, quick.revision, full.design)
-    sentences = [*([] if full.design.miss is None else [str(full.design.miss)])]
+    missed = full.design.miss
+    sentences = [] if missed is None else [f"misses its target: {missed.words}"]
     if solved is not None and quick.design is not None:
         sentences += _differences(full.design, solved, quick.design)
     elif quick.state != "solved":

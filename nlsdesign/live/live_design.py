@@ -12,7 +12,7 @@ from .live_history import LiveHistory
 from .live_snapshots import Snapshot, Snapshots
 from .question import LiveQuestion, finite_in
 from .saved import SavedDesign, saved
-from .work import LiveTask, LiveWork
+from .work import LiveTask, LiveWork, ToleranceCloud
 
 _LARGEST_ANGLE = 6.3
 
@@ -96,7 +96,7 @@ class LiveDesign:
         finite_in("angle", angle, -_LARGEST_ANGLE, _LARGEST_ANGLE)
         if self.shown is None:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
-        return self.shown.answer(angle, self.work.loop_at(angle, self.shown.view.revision))
+        return self.shown.answer(angle, self.work.loop_at(angle, self.shown))
 
     def start(self, task: LiveTask) -> WorkState:
         """Start a piece of long work on the design as it stands; one of its kind that runs is cancelled.
@@ -109,8 +109,13 @@ class LiveDesign:
         Raises
         ------
         ValueRangeError
-            If it needs a design and there is none.
+            If it needs a design and there is none, or one of this question and there is only an earlier one.
         """
+        if isinstance(task, ToleranceCloud) and self.answer.stale:
+            raise ValueRangeError(
+                "tolerance cloud", "would hold an earlier design against the target of now",
+                next_step="widen a limit until there is a design",
+            )  # fmt: skip
         return self.work.start(task, self.question, self.answer.revision, self.shown)
 
     def poll(self) -> tuple[WorkState, ...]:
@@ -133,7 +138,7 @@ class LiveDesign:
         Raises
         ------
         ValueRangeError
-            If the name is empty or too long, or too many are kept.
+            If the name is empty or too long, too many are kept, or there is no design of this question.
         """
         return self.snapshots.keep(name, self.question, self.answer)
 

@@ -50,8 +50,13 @@ class Snapshots(dict[str, Snapshot]):
         Raises
         ------
         ValueRangeError
-            If the name is empty or too long, or too many are kept.
+            If the name is empty or too long, too many are kept, or there is no design of this question.
         """
+        if answer.design is None or answer.stale:
+            raise ValueRangeError(
+                f"design '{name:.80}'", "is not there: what is shown belongs to an earlier question",
+                next_step="widen a limit until there is a design, or take the edit back",
+            )  # fmt: skip
         if not 1 <= len(name.strip()) <= _NAME or not name.isprintable():
             raise ValueRangeError(
                 f"name of a design '{name:.80}'", f"has 1 to {_NAME} printable characters",

@@ -75,19 +75,22 @@ class SoftenedProgram:
 
     @cached_property
     def _softened(self) -> ca.Function:
+        return interior_point("softened", self.program, iterations=MOST_ITERATIONS)
+
+    @cached_property
+    def program(self) -> dict[str, ca.SX]:
         """The program with a slack for each limit; their sum, relative to the limits, is made small."""
         problem, bounds = self._rows.problem, self._rows.bounds
         slacks, prices = ca.SX.sym("slack", len(bounds)), ca.SX.sym("price", len(bounds))
         rows = [row.expression for row in problem.structure]
         for i, row in enumerate(self._rows.limit_rows):
             rows.append(row + (-slacks[i] if bounds[i].upper else slacks[i]))
-        program = {
+        return {
             "x": ca.vertcat(problem.vector, slacks),
             "f": ca.dot(slacks, prices),
             "g": ca.vertcat(*rows),
             "p": ca.vertcat(self._rows.target.symbols, prices),
         }
-        return interior_point("softened", program, iterations=MOST_ITERATIONS)
 
     def _words(self, question: LiveQuestion, involved: Sequence[int], gives: Floats) -> str:
         bounds = self._rows.bounds

@@ -20,7 +20,7 @@ from .question import ChosenMachine, LiveQuestion, TargetPoint
 
 _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
 _MOST_VALUES = 200
-_HEAD = "# Asked on the live page. `nlsdesign design --deck deck.toml --job design.toml` designs it anew."
+_HEAD = "# Asked on the live page. `nlsdesign design --deck deck.toml --task design.toml` designs it anew."
 
 
 @dataclass(frozen=True)

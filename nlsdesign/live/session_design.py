@@ -124,6 +124,7 @@ class SessionDesign:
                 raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
             live = LiveDesign(question_of_deck(text, "deck.toml"))
         self._news.live.work.close()
+        live.snapshots.update(self._news.live.snapshots)
         self._begin(live)
         self._news.everything(None)
 

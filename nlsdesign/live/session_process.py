@@ -62,7 +62,10 @@ class SessionProcess:
             env={**os.environ, **threads, "PYTHONPATH": path, "TMPDIR": str(self.folder)},
         )  # fmt: skip
         self._relay = asyncio.create_task(self._read())
-        await self._send({"deck": self._deck, "packages": self._packages, "folder": str(self.folder)})
+        # Where packages were found stands here too: the folder of the command may be one of the places.
+        places = [os.path.abspath(each) for each in sys.path] if self._packages else []
+        begin = {"deck": self._deck, "packages": self._packages, "places": places}
+        await self._send({**begin, "folder": str(self.folder)})
 
     @property
     def alive(self) -> bool:

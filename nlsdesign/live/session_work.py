@@ -26,6 +26,7 @@ def main() -> None:
     threading.Thread(target=_read, args=(inbox,), daemon=True).start()
     begin = inbox.take(None)
     assert begin is not None
+    sys.path.extend(each for each in begin["places"] if each not in sys.path)
     from ..extensions import extended_by, load_extension
     from .session_design import SessionDesign
 

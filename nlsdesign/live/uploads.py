@@ -37,6 +37,7 @@ class Uploads:
 
     folder: Path
     _sizes: dict[str, int] = field(default_factory=dict)
+    _names: dict[str, str] = field(default_factory=dict)
 
     async def keep(self, name: str, parts: AsyncIterator[bytes], announced: int | None) -> str:
         """Write one file and return the name under which it stands.
@@ -55,9 +56,10 @@ class Uploads:
         TooLargeError
             If the file, or all together, or their number is too large; nothing of the file is kept.
         NlsError
-            If its ending is none of records.
+            If its ending is none of records, or another file that is called differently has its place.
         """
         kept = plain_name(name)
+        self._require_place(kept, name)
         others = sum(size for each, size in self._sizes.items() if each != kept)
         if kept not in self._sizes and len(self._sizes) >= FILES:
             raise TooLargeError(
@@ -81,8 +83,23 @@ class Uploads:
             place.unlink(missing_ok=True)
             self._sizes.pop(kept, None)
             raise
-        self._sizes[kept] = size
+        self._sizes[kept], self._names[kept] = size, name
         return kept
+
+    def _require_place(self, kept: str, name: str) -> None:
+        """Refuse a file that would take the place of another: one of two records would be lost unseen.
+
+        Raises
+        ------
+        NlsError
+            If another file stands under that name.
+        """
+        other = self._names.get(kept, name) if kept in self._sizes else name
+        if other != name:
+            raise NlsError(
+                f"file '{name[:80]}'", f"would take the place of '{other[:80]}': here both are called {kept}",
+                next_step="rename one of them, with letters of English, digits, '-' and '_'",
+            )  # fmt: skip
 
     def clear(self) -> None:
         """Remove all files."""
@@ -138,5 +155,6 @@ def plain_letters(name: str) -> str:
         With its ending.
     """
     stem, dot, ending = name.rpartition(".")
-    kept = (re.sub(r"[^A-Za-z0-9_-]+", "_", part).strip("_")[:80] for part in (stem, ending.lower()))
+    # Points within a name stay: sine_2.0Hz is how records.toml calls it too.
+    kept = (re.sub(r"[^A-Za-z0-9_.-]+", "_", part).strip("_.")[:80] for part in (stem, ending.lower()))
     return f"{next(kept) or 'record'}{dot}{next(kept)}"

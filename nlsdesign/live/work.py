@@ -151,6 +151,7 @@ class LiveWork:
 
     def __init__(self) -> None:
         self._running: dict[str, BackgroundWork] = {}
+        self._designs: dict[str, AngleView | None] = {}
 
     def start(
         self, task: LiveTask, question: LiveQuestion, revision: int, shown: AngleView | None
@@ -173,6 +174,7 @@ class LiveWork:
         name = type(task).__name__
         self.cancel(name)
         self._running[name] = BackgroundWork(name, revision, work, arguments)
+        self._designs[name] = shown
         return self._running[name].state()
 
     def states(self) -> tuple[WorkState, ...]:
@@ -206,19 +208,21 @@ class LiveWork:
         for each in self._running.values():
             each.cancel()
 
-    def loop_at(self, angle: float, revision: int) -> Lazy:
+    def loop_at(self, angle: float, shown: AngleView) -> Lazy:
         """Return the torque loop at one angle, where it was asked for and computed for this design.
 
         Parameters
         ----------
         angle
             In rad.
-        revision
-            Of the design that is shown.
+        shown
+            The design.
         """
-        work = self._running.get(TorqueLoop.__name__)
+        work, revision = self._running.get(TorqueLoop.__name__), shown.view.revision
         state = None if work is None else work.state()
-        if state is None or state.revision != revision:
+        begun = self._designs.get(TorqueLoop.__name__)
+        # A checked design has the revision of the quick one whose place it takes, but not its contour.
+        if state is None or begun is None or begun.contour is not shown.contour:
             return Lazy("asked for later", revision)
         if state.state != "done":
             return Lazy(state.state, revision, None, state.message)

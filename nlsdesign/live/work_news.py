@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -40,6 +41,7 @@ class WorkNews:
         self._last: dict[str, tuple[Any, ...]] = {}
         self._stages: dict[str, list[str]] = {}
         self._states: dict[str, WorkState] = {}
+        self._began_with: dict[str, tuple[Any, ...]] = {}
 
     @property
     def running(self) -> bool:
@@ -62,8 +64,10 @@ class WorkNews:
         task = TASKS[name](self._records)
         if isinstance(task, DiagnoseRecords):
             self._records.mkdir(parents=True, exist_ok=True)
+        state = self._live.start(task)
         self._stages[name] = []
-        self._noted(self._live.start(task))
+        self._began_with[name] = self._basis(name)
+        self._noted(state)
 
     def stop(self, name: str) -> None:
         """End work of a kind.
@@ -95,8 +99,8 @@ class WorkNews:
         return news
 
     def all(self) -> list[dict[str, Any]]:
-        """Return the news of all work, as for a page that was loaded just now."""
-        return [self.of(name) for name in self._states]
+        """Return the news of all work, as for a page that was loaded just now or showed another design."""
+        return [self.of(name) for name in TASKS]
 
     def of(self, name: str) -> dict[str, Any]:
         """Return the news of work of a kind.
@@ -109,13 +113,13 @@ class WorkNews:
         state = self._states.get(name)
         if state is None:
             return {"name": name, "state": "not begun", "message": "", "revision": 0, "seconds": 0.0,
-                    "stages": [], "value": None}  # fmt: skip
+                    "stages": [], "value": None, "old": False, **self._files(name)}  # fmt: skip
         # The whole design becomes the answer, and the loop is asked for angle by angle.
         shown = not isinstance(state.value, FullDesign) and name != TorqueLoop.__name__
         return {
             "name": name, "state": state.state, "message": state.message, "revision": state.revision,
             "seconds": state.seconds, "stages": self._stages.get(name, []),
-            "value": to_json(state.value) if shown else None,
+            "value": to_json(state.value) if shown else None, "old": self._old(name), **self._files(name),
         }  # fmt: skip
 
     def _noted(self, state: WorkState) -> tuple[Any, ...]:
@@ -125,4 +129,32 @@ class WorkNews:
         if state.state == "computing" and state.message and state.message not in stages[-1:]:
             stages.append(state.message)
             del stages[:-_MOST_STAGES]
-        return state.state, state.message, state.revision, int(state.seconds)
+        return state.state, state.message, state.revision, int(state.seconds), self._old(state.name)
+
+    def _old(self, name: str) -> bool:
+        """Tell whether work of a kind was begun for something else than what is there now."""
+        return name in self._began_with and self._began_with[name] != self._basis(name)
+
+    def _basis(self, name: str) -> tuple[Any, ...]:
+        """Return what work of a kind is about: a diagnosis the records and the machine as it is declared."""
+        live = self._live
+        if name == DiagnoseRecords.__name__:
+            # Points and limits belong to the design, not to the machine.
+            return (_listed(self._records), live.question.machine, dict(live.question.given))
+        design = live.answer.design
+        return live.answer.revision, design is not None and design.checked
+
+    def _files(self, name: str) -> dict[str, Any]:
+        if name != DiagnoseRecords.__name__:
+            return {}
+        return {"files": [each[0] for each in _listed(self._records)]}
+
+
+def _listed(folder: Path) -> list[tuple[str, int, int]]:
+    """Return the records that are there: name, size and time; one that is being replaced is left out."""
+    listed = []
+    for file in sorted(folder.glob("*")):
+        with contextlib.suppress(FileNotFoundError):
+            seen = file.stat()
+            listed.append((file.name, seen.st_size, seen.st_mtime_ns))
+    return listed

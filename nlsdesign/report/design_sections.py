@@ -82,7 +82,8 @@ def write_design_report(
     ExportError
         If the file cannot be written.
     """
-    words = [*(f"Missed: {design.miss}." for _ in range(design.miss is not None)), *remarks]
+    missed = [] if design.miss is None else [f"The design misses its target: {design.miss.words}."]
+    words = [*missed, *remarks]
     sections: list[Section] = [NumbersSection("Key numbers", _key_numbers(design))]
     if words:
         sections.append(

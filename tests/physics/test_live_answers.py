@@ -14,6 +14,7 @@ from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
+from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.errors import ValueRangeError
 from nlsdesign.live import (
     AddPoint,
@@ -279,6 +280,12 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert same.design.checked
     unanswered = full_answer(replace(full, design=None, message="stopped"), question, answer, solved)
     assert "came to no answer: stopped; shown is the quick answer, unchecked" in unanswered.message
+    miss = Miss(0.05, 0.01, 0.3, 1e-3, ("MaximumStrain",), None, ())
+    missed = full_answer(
+        replace(full, design=replace(full.design, miss=miss)), question, answer, solved
+    ).message  # fmt: skip
+    assert missed.startswith("misses its target: 5 % rms of the largest torque, 1 % allowed; worst at 17.2°")
+    assert missed.lower().count("misses") == 1
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
     assert "worse local optimum: 0.0175 mN·m rms against 0.0175 mN·m rms now" in worse.message
     template._history.settle(full)

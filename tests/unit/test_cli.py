@@ -95,7 +95,8 @@ def test_a_design_that_misses_is_no_success(run: Run, tmp_path: Path) -> None:
     assert "no drawings are written" in out
     assert not list((tmp_path / "o").glob("*.dxf"))
     page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
-    assert "misses its target" in page
+    assert "The design misses its target: " in page
+    assert "Missed:" not in page, "it misses is said twice in one sentence"
     assert "Torque against the target" in page
     assert json.loads((tmp_path / "o" / "design.json").read_text(encoding="utf-8"))["met"] is False
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -27,6 +28,7 @@ from nlsdesign.design import (
 )
 from nlsdesign.design.optimisation.design_search import row_of
 from nlsdesign.design.optimisation.problem import design_problem
+from nlsdesign.design.optimisation.program import Program, Rows
 from nlsdesign.design.optimisation.starts import Start
 from nlsdesign.errors import ArrangementError, UnitError, ValueRangeError
 from nlsdesign.model import flatten
@@ -133,3 +135,13 @@ def _extension(found: object) -> np.ndarray:
 def _force(found: object) -> np.ndarray:
     stretch = 1 + _extension(found) / 12.5e-3
     return 84.56 * (stretch - stretch**-2)
+
+
+def test_a_program_without_anything_to_make_small_is_solved() -> None:
+    """So is asked whether any cam keeps the rules of the contour, where there is no limit that could give."""
+    unknown = ca.SX.sym("x")
+    rows = (Rows(unknown * unknown, 4.0, 4.0),)
+    program = Program(unknown, np.array([0.0]), np.array([9.0]), ca.SX(1, 1), rows)
+    solution = program.solve(np.array([1.0]))
+    assert solution.solved
+    assert solution.point[0] == pytest.approx(2.0)

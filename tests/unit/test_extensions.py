@@ -139,3 +139,23 @@ def test_modules_that_are_private_are_left_alone(tmp_path: Path, monkeypatch: py
     monkeypatch.syspath_prepend(str(tmp_path))
     with extended_by(load_extension("shy")):
         assert "Law" in component_classes()
+
+
+def _in_long_work(stage: object, machine: object) -> tuple[bool, str]:
+    """What the process of a piece of long work knows and makes of a machine with an own law."""
+    model = nls.flatten(machine)  # type: ignore[arg-type]
+    return "Gent" in component_classes(), model.name
+
+
+@pytest.mark.parametrize(
+    "as_file", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["file", "package"]
+)
+def test_long_work_of_the_live_page_knows_them_too(lab: Path, tmp_path: Path, as_file: bool) -> None:
+    from nlsdesign.live.background import BackgroundWork
+
+    (tmp_path / "mine.py").write_text((lab / "src/rubber_lab/laws.py").read_text("utf-8"), "utf-8")
+    with extended_by(load_extension(str(tmp_path / "mine.py") if as_file else "rubber_lab")):
+        machine = nls.declare(nls.load_deck(str(lab / DECK)))
+        done = BackgroundWork("flatten", 1, _in_long_work, (machine,)).wait(120.0)
+    assert (done.state, done.message) == ("done", "")
+    assert done.value[0]

@@ -116,6 +116,34 @@ def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back
     settled(tab, point, after)
 
 
+def test_a_finger_drags_a_point_and_the_slider(tab: Tab) -> None:
+    point, at = POINT.format(2), "document.getElementById('linear-angle').textContent"
+    before, angle = tab.evaluate(point), tab.evaluate(at)
+    x, y = tab.evaluate(HANDLE.format(2))
+    tab.evaluate(
+        """document.querySelectorAll(".handle")[2].addEventListener(
+          "pointermove", (event) => { window.pointer = event.pointerType; })"""
+    )
+    tab.touch((x, y), *((x, y - step) for step in range(2, 14, 2)))
+    resting(tab)
+    after = settled(tab, point, before)
+    assert float(str(after)) > float(before)
+    assert tab.evaluate("window.pointer") == "touch"
+    box = tab.evaluate(
+        "(({x, y, width, height}) => [x, y, width, height])"
+        "(document.getElementById('angle').getBoundingClientRect())"
+    )
+    middle = box[1] + box[3] / 2
+    tab.touch(*((box[0] + share * box[2], middle) for share in (0.6, 0.5, 0.4, 0.3)))
+    settled(tab, at, angle)
+    assert tab.evaluate("(({value, max}) => value / max)(document.getElementById('angle'))") == pytest.approx(
+        0.3, abs=0.04
+    )
+    tab.evaluate("document.activeElement.blur()")
+    tab.press("z", control=True)
+    assert settled(tab, point, after) == before, "a finger's drag is one step back"
+
+
 def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
     reached: list[str] = []
     tab.evaluate("document.querySelector('.skip').focus()")

@@ -83,9 +83,9 @@ class Limit(ABC):
         unit: str,
         scale: float | None = None,
     ) -> Bound:
-        return Bound(
-            type(self).__name__, of, ca.SX(expression), value, upper, unit, scale or abs(value) or 1.0
-        )
+        # A scale that follows from the target is symbolic where the target can be moved.
+        size = abs(value) or 1.0 if scale is None else scale
+        return Bound(type(self).__name__, of, ca.SX(expression), value, upper, unit, size)
 
 
 def _store(limit: Limit, name: str, unit: str, minimum: float, maximum: float) -> None:

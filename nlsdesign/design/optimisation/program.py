@@ -175,7 +175,7 @@ class Program:
     def _solver(self) -> ca.Function:
         problem: dict[str, Any] = {
             "x": self.unknowns,
-            "f": self.cost,
+            "f": ca.densify(ca.SX(self.cost)),  # no limit that could give leaves a zero without an entry
             "g": ca.vertcat(*[r.expression for r in self.rows]),
         }
         if self.parameters is not None:

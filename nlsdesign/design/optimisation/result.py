@@ -196,13 +196,18 @@ class Miss:
     remedies: Remedies | None
     advice: tuple[str, ...]
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """How far it is off, where most, and what holds it."""
         held = f"held by {', '.join(self.binding)}" if self.binding else "no limit binds"
         return (
-            f"MISSES ITS TARGET: {100 * self.error:.3g} % rms of the largest torque, "
+            f"{100 * self.error:.3g} % rms of the largest torque, "
             f"{100 * self.allowed:g} % allowed; worst at {np.degrees(self.worst_angle):.3g}°: "
             f"{1e3 * self.worst_error:+.3g} mN·m; {held}"
         )
+
+    def __str__(self) -> str:
+        return f"MISSES ITS TARGET: {self.words}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,12 +14,13 @@ export class Compare {
     this.kept = [];
   }
 
+  // now: { name, title, material, design } of what is shown at present, or null.
   show(kept, now) {
     if (kept) this.kept = kept;
     const section = byId("compare");
     section.hidden = this.kept.length === 0;
     if (section.hidden) return;
-    const columns = [...this.kept, ...(now ? [{ name: "now", design: now, title: "", material: "" }] : [])].filter((each) => each.design);
+    const columns = [...this.kept, ...(now ? [now] : [])].filter((each) => each.design);
     const names = [...new Set(columns.flatMap(({ design }) => design.numbers.map((each) => each.name)))];
     const row = (head, words) => make("tr", {}, make("th", { scope: "row" }, head), ...columns.map((each) => make("td", { class: "numeric" }, words(each))));
     const number = (design, name) => {
@@ -27,11 +28,12 @@ export class Compare {
       return given ? `${withUnit(given.value, given.unit)}${given.free ? " (free)" : ""}` : "–";
     };
     const heads = columns.map((each) => make("th", { scope: "col", class: "numeric" }, each.name, " ",
-      each.design === now ? null : make("button", { type: "button", "aria-label": `Forget ${each.name}`, onclick: () => this.ask({ what: "keep", forget: true, name: each.name }) }, "×")));
+      each === now ? null : make("button", { type: "button", "aria-label": `Forget ${each.name}`, onclick: () => this.ask({ what: "keep", forget: true, name: each.name }) }, "×")));
     byId("compare-table").replaceChildren(
       make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "design"), ...heads)),
       make("tbody", {},
-        row("actuator", (each) => each.title || "as above"),
+        row("actuator", (each) => each.title),
+        row("rubber of the library", (each) => each.material || "that of the deck"),
         row("answer", ({ design }) => (design.checked ? "checked" : "quick")),
         row("torque error, rms", ({ design }) => `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`),
         row("torque error, largest", ({ design }) => withUnit(design.largest_error, "N*m", 3)),
@@ -42,7 +44,7 @@ export class Compare {
     const column = (design, name) => design.columns.find((each) => each.name === name).values;
     this.chart.show(columns.map((each, k) => ({
       name: each.name, x: column(each.design, "angle"), y: column(each.design, "torque"),
-      tone: each.design === now ? "blue" : TONES[k % TONES.length], dash: each.design === now ? "" : DASHES[k % 3],
+      tone: each === now ? "blue" : TONES[k % TONES.length], dash: each === now ? "" : DASHES[k % 3],
     })));
   }
 

@@ -75,7 +75,7 @@ const live = new Connection(receive, (words, lost) => {
 function receive(message) {
   const kinds = {
     gallery: () => showGallery(message), answer: () => takeAnswer(message), at: () => takeAngle(message),
-    refused: () => refuse(message), work: () => takeWork(message.work), kept: () => compare.show(message.kept, answer?.design),
+    refused: () => refuse(message), work: () => takeWork(message.work), kept: () => compare.show(message.kept, present()),
   };
   kinds[message.what]?.();
   if (typeof message.number === "number") questions.answered(message.number);
@@ -146,7 +146,7 @@ function showAnswer() {
     panels.show(design, frozen);
     showNumbers(design);
     slider(design.columns[0].values);
-    if (!frozen) compare.show(null, design);
+    if (!frozen) compare.show(null, present());
   }
   const card = byId("gallery");
   if (document.activeElement !== card) card.value = cards.some((each) => each.name === controls.title) ? controls.title : "";
@@ -154,6 +154,13 @@ function showAnswer() {
   fade();
   cursor();
   editor.say(design ? `rms error ${withUnit(design.rms_error, "N*m", 3)}` : "no design", byId("state-name").textContent);
+}
+
+// What is compared with kept designs; actuator and rubber are those of the question, not of an earlier one.
+function present() {
+  if (!answer?.design) return null;
+  const { stale, design, controls: { title, material } } = answer;
+  return stale ? { name: "last good design", title: "–", material: "–", design } : { name: "now", title, material, design };
 }
 
 function showCurve(frozen) {
@@ -358,6 +365,7 @@ byId("open").addEventListener("change", async (event) => {
   byId("files").open = false;
   if (!file) return;
   const wrong = await upload("/api/open", file);
+  byId("notice").hidden = true;
   if (wrong) refuse({ reason: wrong });
   else angle = null;
 });

@@ -117,7 +117,7 @@ export class AtAngle {
     }
     this.state(this.poles, at.poles, (groups) => groups.map((each) => each.words).join("; "));
     if (at.poles.value) this.poles.chart.show(at.poles.value.map((each, k) => ({ name: each.mode, x: each.real, y: each.imaginary, points: true, tone: TONES[k % 4] })));
-    this.state(this.loop, at.loop, (loop) => `${loop.stable ? "Stable." : "UNSTABLE."} ${loop.words}`);
+    this.state(this.loop, at.loop, (loop) => `${loop.stable ? "Stable" : "UNSTABLE"} ${at.loop.message}: ${loop.words}.`);
     const loop = at.loop.value;
     this.run.hidden = at.loop.state === "done" || at.loop.state === "computing";
     if (loop) {
@@ -130,7 +130,7 @@ export class AtAngle {
     if (work.state === "computing") text(this.loop.state, `computing: ${work.message}, for ${Math.round(work.seconds)} s`);
     if (work.state === "computing") this.run.hidden = true;
     if (work.state === "failed" || work.state === "cancelled") {
-      text(this.loop.state, `${work.state}: ${work.message}`);
+      text(this.loop.state, work.state === "cancelled" ? "stopped" : `${work.state}: ${work.message}`);
       this.run.hidden = false;
     }
   }

@@ -10,6 +10,7 @@ export class Tolerance {
     this.run = byId("tolerance-run");
     this.stop = byId("tolerance-stop");
     this.words = byId("tolerance-state");
+    this.purpose = this.words.textContent;
     this.run.addEventListener("click", () => ask({ what: "work", name: "ToleranceCloud" }));
     this.stop.addEventListener("click", () => ask({ what: "work", name: "ToleranceCloud", stop: true }));
     this.chart = new Chart(byId("tolerance-chart"), { title: "Torque of made springs", x: { name: "angle θ", unit: "rad" }, y: { name: "torque", unit: "N*m" }, height: 220, zero: true });
@@ -17,16 +18,17 @@ export class Tolerance {
   }
 
   show(work, answer) {
-    if (work.state === "not begun") return;
     const running = work.state === "computing";
     this.stop.hidden = !running;
     this.run.disabled = running || !answer?.design;
     byId("tolerance").setAttribute("aria-busy", String(running));
     const cloud = work.value;
-    const old = work.revision !== answer?.revision;
+    const old = work.old || work.revision !== answer?.revision;
     byId("tolerance").classList.toggle("stale", old && cloud !== null);
     if (!cloud) {
-      text(this.words, running ? `${work.message}, for ${Math.round(work.seconds)} s` : `${work.state}: ${work.message}`);
+      if (work.state === "not begun") text(this.words, this.purpose);
+      else text(this.words, running ? `${work.message}, for ${Math.round(work.seconds)} s` : ended(work));
+      byId("tolerance-chart").hidden = true;
       return;
     }
     const sorted = [...cloud.errors].sort((a, b) => a - b);
@@ -54,9 +56,12 @@ export class Diagnosis {
     this.run = byId("diagnosis-run");
     this.stop = byId("diagnosis-stop");
     this.words = byId("diagnosis-state");
+    this.purpose = this.words.textContent;
     this.stages = byId("stages");
     this.gap = byId("gap");
     this.stages.hidden = true;
+    this.loaded = false;
+    this.loading = false;
     this.files.addEventListener("change", () => this.load([...this.files.files]));
     this.run.addEventListener("click", () => ask({ what: "work", name: "DiagnoseRecords" }));
     this.stop.addEventListener("click", () => ask({ what: "work", name: "DiagnoseRecords", stop: true }));
@@ -69,7 +74,17 @@ export class Diagnosis {
   async load(files) {
     this.files.value = "";
     if (files.length === 0) return;
+    if (!this.stop.hidden) this.ask({ what: "work", name: "DiagnoseRecords", stop: true });
     this.run.disabled = true;
+    this.loaded = false;
+    this.loading = true;
+    this.clear();
+    await this.send(files);
+    this.loading = false;
+    this.run.disabled = !this.loaded;
+  }
+
+  async send(files) {
     for (const [k, file] of files.entries()) {
       text(this.words, `loading ${file.name} …`);
       const wrong = await upload(`/api/records?name=${encodeURIComponent(file.name)}${k === 0 ? "&first=1" : ""}`, file);
@@ -79,14 +94,30 @@ export class Diagnosis {
         return;
       }
     }
-    text(this.words, `${files.length} ${files.length === 1 ? "file is" : "files are"} loaded: ${files.map((each) => each.name).join(", ").slice(0, 300)}`);
+    text(this.words, there(files.map((each) => each.name)));
     announce(this.words.textContent);
     this.loaded = true;
-    this.run.disabled = false;
+  }
+
+  clear() {
+    this.gap.replaceChildren();
+    this.stages.replaceChildren();
+    this.stages.hidden = true;
   }
 
   show(work) {
-    if (work.state === "not begun") return;
+    if (this.loading) {
+      this.stop.hidden = work.state !== "computing";
+      return;
+    }
+    this.loaded = work.files.length > 0;
+    if (work.state === "not begun") {
+      this.clear();
+      this.stop.hidden = true;
+      this.run.disabled = !this.loaded;
+      text(this.words, this.loaded ? there(work.files) : this.purpose);
+      return;
+    }
     const running = work.state === "computing";
     this.stop.hidden = !running;
     this.run.disabled = running || !this.loaded;
@@ -101,12 +132,15 @@ export class Diagnosis {
     this.stages.scrollTop = this.stages.scrollHeight;
     const result = work.value;
     if (!result) {
-      text(this.words, running ? `running for ${Math.round(work.seconds)} s` : `${work.state}: ${work.message}`);
+      const files = this.loaded ? there(work.files) : "";
+      text(this.words, running ? `running for ${Math.round(work.seconds)} s` : work.old ? files : `${ended(work)}${files && `; ${files}`}`);
       this.gap.replaceChildren();
       return;
     }
     const words = VERDICTS[result.verdict] ?? result.verdict;
-    const named = result.effects.length ? `${words}: ${result.effects.join("; ")}` : words;
+    const verdict = result.effects.length ? `${words}: ${result.effects.join("; ")}` : words;
+    const named = work.old ? `Of other records or another machine, diagnose anew. ${verdict}` : verdict;
+    this.gap.classList.toggle("stale", work.old);
     if (this.words.textContent === named) return;
     text(this.words, named);
     announce(named);
@@ -117,6 +151,14 @@ export class Diagnosis {
     new Chart(chart, { title: `Error of ${quantity}, ${record}`, x: { name: "time", unit: "s" }, y: { name: "error", unit }, height: 190 })
       .show([{ name: "as declared", x: time, y: error(before), tone: "vermillion", dash: "thin" }, { name: "with what was named", x: time, y: error(after), tone: "blue", dash: "thin" }]);
   }
+}
+
+function ended(work) {
+  return work.state === "cancelled" ? "stopped" : `${work.state}: ${work.message}`;
+}
+
+function there(names) {
+  return `${names.length} ${names.length === 1 ? "file is" : "files are"} loaded: ${names.join(", ").slice(0, 300)}`;
 }
 
 const VERDICTS = {

@@ -1,0 +1,47 @@
+"""Limits that give: a slack moves each of them to the side on which more designs keep it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from nlsdesign.live import gallery_question
+from nlsdesign.live.limit_kinds import LIMIT_KINDS
+from nlsdesign.live.quick_conflict import SoftenedProgram
+from nlsdesign.live.quick_rows import QuickRows
+
+
+def test_a_slack_widens_its_limit_and_no_other() -> None:
+    """Of all kinds, by differences: the distance to what the limit allows grows by the slack."""
+    question = gallery_question("cam-actuator")
+    question = replace(question, limits={n: each.value for n, each in question.limit_values.items()})
+    question = replace(
+        question, limits={"MaximumCamRadius": 0.03, "PositiveStiffness": 0.1, **question.limits}
+    )
+    assert set(question.limits) == set(LIMIT_KINDS)
+    rows = QuickRows(question)
+    program = SoftenedProgram(rows).program
+    count, values = len(rows.bounds), rows.numbers_of(question)
+    given = ca.Function("rows", [program["x"], program["p"]], [program["g"], program["f"]])
+    draw = np.random.default_rng(1)
+    point = rows.completed(question, {}) + 1e-3 * draw.standard_normal(rows.problem.vector.shape[0])
+    prices = draw.uniform(1.0, 2.0, count)
+
+    def at(slacks: np.ndarray) -> tuple[np.ndarray, float]:
+        answer = given(np.concatenate([point, slacks]), np.concatenate([values, prices]))
+        return np.array(answer[0]).ravel(), float(answer[1])
+
+    low, high = rows.limits_of(question)
+    sizes = [row.expression.shape[0] for row in rows.problem.structure]
+    sizes += [bound.expression.shape[0] for bound in rows.bounds]
+    of_row = np.repeat(np.arange(len(sizes)) - len(rows.problem.structure), sizes)
+    before, nothing = at(np.zeros(count))
+    assert nothing == 0.0
+    for i, bound in enumerate(rows.bounds):
+        moved, cost = at(np.eye(count)[i] * 0.25)
+        room = np.minimum(moved - low, high - moved) - np.minimum(before - low, high - before)
+        np.testing.assert_allclose(room[of_row == i], 0.25, atol=1e-12, err_msg=str(bound.limit))
+        np.testing.assert_array_equal(moved[of_row != i], before[of_row != i])
+        assert cost == 0.25 * prices[i]
