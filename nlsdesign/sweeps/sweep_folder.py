@@ -154,6 +154,8 @@ def opened(
     parts = Parts(folder, columns)
     if old[0].get("plan") != about["plan"]:
         (folder / RESULTS_FILE).unlink(missing_ok=True)
+        # Until the new points are all numbered, a run of either plan has to number them by their values.
+        write_text(folder / ABOUT_FILE, about_text({**old[0], "plan": ""}, old[1]))
         parts.replace_all(_adopted(folder, [c.name for c in columns if c.role == "axis"], plan))
     return parts
 
@@ -273,7 +275,9 @@ def _place(values: tuple[Any, ...], plan: PointPlan, ranked: Any, order: Any) ->
     return -1
 
 
-def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> int:
+def standing_points(
+    folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...], *, plan: PointPlan
+) -> int:
     """Return how many points of a sweep stand in a folder; nothing is written.
 
     Parameters
@@ -282,6 +286,8 @@ def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Sweep
         That may not exist.
     about, columns
         Of the sweep.
+    plan
+        Its points; those of other axes count that it has too.
 
     Raises
     ------
@@ -295,5 +301,7 @@ def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Sweep
     if _names(old[1]) != _names(columns):
         raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
     if old[0].get("plan") != about["plan"]:
-        return 0
+        names = [c.name for c in columns if c.role == "axis"]
+        numbers = [table.column("point").to_numpy() for table in _adopted(folder, names, plan)]
+        return len(np.setdiff1d(np.concatenate(numbers), [-1])) if numbers else 0
     return len(rows_in_order(folder, columns)["point"])

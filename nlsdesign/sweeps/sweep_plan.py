@@ -17,6 +17,7 @@ from .changes import row_of_factor
 from .sweep_columns import SweepColumn
 
 _PROBES = 64
+_MOST_POINTS = 100_000_000
 
 
 class PointPlan:
@@ -32,7 +33,7 @@ class PointPlan:
     Raises
     ------
     ValueRangeError
-        If there are no axes, or two of them change the same number.
+        If there are no axes or too many points, or two of them change the same number.
     NlsError
         If a name does not exist, or a value does not fit it.
     """
@@ -45,6 +46,12 @@ class PointPlan:
         self._sets = [each.bound(subject) for each in axes]
         self.columns: tuple[SweepColumn, ...] = tuple(c for each in self._sets for c in each.columns)
         _require_apart(self.columns)
+        count = math.prod(each.count for each in self._sets)
+        if count > _MOST_POINTS:
+            raise ValueRangeError(
+                f"sweep of {count:.4g} points", f"has more than {_MOST_POINTS}, for which no driver has room",
+                next_step="split it by an axis, with a folder for each stretch",
+            )  # fmt: skip
 
     def __len__(self) -> int:
         return math.prod(each.count for each in self._sets)
