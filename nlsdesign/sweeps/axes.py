@@ -286,9 +286,10 @@ class RandomDraws(AxisSet):
         """
         _count("random draws", self.count, 1, _MOST_SOBOL)
         require_seed("random draws", self.seed)
-        if isinstance(self.names, str):
-            raise ValueRangeError(f"random draws: names = '{self.names}'", "is one text, not a list",
-                                  next_step=f"write names = ['{self.names}']")  # fmt: skip
+        given: object = self.names
+        if isinstance(given, str):
+            raise ValueRangeError(f"random draws: names = '{given}'", "is one text, not a list",
+                                  next_step=f"write names = ['{given}']")  # fmt: skip
         prior = declared_prior(flatten(subject.base))
         groups = {key: list(inner) for key, inner in itertools.groupby(prior.names, key=_head)}
         places: dict[str, tuple[int, bool]] = {}

@@ -302,6 +302,6 @@ def standing_points(
         raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
     if old[0].get("plan") != about["plan"]:
         names = [c.name for c in columns if c.role == "axis"]
-        numbers = [table.column("point").to_numpy() for table in _adopted(folder, names, plan)]
-        return len(np.setdiff1d(np.concatenate(numbers), [-1])) if numbers else 0
+        taken = (table.column("point").to_pylist() for table in _adopted(folder, names, plan))
+        return len({number for numbers in taken for number in numbers} - {-1})
     return len(rows_in_order(folder, columns)["point"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from nlsdesign.progress import Quiet
 from nlsdesign.sweeps import (
     AngleQuestion,
     DesignQuestion,
+    DiagnosisQuestion,
     GridAxis,
     LatinHypercube,
     Listed,
@@ -25,6 +27,7 @@ from nlsdesign.sweeps import (
     RandomDraws,
     SaltelliSample,
     SobolSample,
+    SpreadQuestion,
     Subject,
     SweepSettings,
     read_sweep_file,
@@ -222,3 +225,18 @@ def test_a_kill_while_points_are_numbered_anew_mixes_no_rows(
 
 def finished(out: Path, task: Any) -> Any:
     return run_task(task, out, executor=InThisProcess(), settings=SweepSettings(), progress=Quiet())
+
+
+def test_the_files_of_the_page_are_read_and_its_fields_are_all_there_are(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "how_to" / "sweep_designs.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    counts = []
+    for block in blocks:
+        path = tmp_path / "sweep.toml"
+        path.write_text(block, encoding="utf-8")
+        counts.append(len(read_sweep_file(path).plan))
+    assert counts == [24, 16]
+    for kind in (AngleQuestion, SpreadQuestion, LoopQuestion, DiagnosisQuestion):
+        row = re.search(rf"\| `{kind.__name__}` \| (.*) \|\n", page)
+        assert row is not None
+        assert re.findall(r"`(\w+)`", row[1]) == [field.name for field in dataclasses.fields(kind)]
