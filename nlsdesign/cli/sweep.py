@@ -177,7 +177,7 @@ class _Lines:
 def _show_plan(task: SweepTask, out: Path, as_json: bool) -> None:
     from ..sweeps.sweep_folder import standing_points
 
-    standing = standing_points(out, task.about, task.columns)
+    standing = standing_points(out, task.about, task.columns, plan=task.plan)
     rows = [
         (c.name, c.kind, "words" if c.lower is None else f"{c.lower:.6g} to {c.upper:.6g} {c.unit}".rstrip())
         for c in task.plan.columns

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ValueRangeError, unknown_name
+from ..errors import ValueRangeError, brief, unknown_name
 from ..model import flatten
 from ..simulation.prior import LONGEST_ROW, declared_prior
 from .axis_values import Given, Subject
@@ -24,6 +23,8 @@ from .sweep_columns import SweepColumn
 
 _BLOCK: Final = 1024
 _MOST_SOBOL: Final = 2**30
+MOST_HELD: Final = 10_000_000
+"""Rows of a set of axes that stands in memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +65,33 @@ class AxisSet(ABC):
         """
 
 
-def _count(name: str, count: int, least: int = 1, most: float = math.inf) -> None:
-    if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= most:
-        raise ValueRangeError(f"{name}: count = {count}", f"must be a whole number from {least} on",
+def _count(name: str, count: int, least: int = 1, most: int = MOST_HELD) -> None:
+    if isinstance(count, bool) or not isinstance(count, int) or count < least:
+        raise ValueRangeError(f"{name}: count = {brief(count)}", f"must be a whole number from {least} on",
                               next_step="take for instance 64")  # fmt: skip
+    if count > most:
+        raise ValueRangeError(f"{name}: count = {count}", f"must be at most {most}",
+                              next_step="split the sweep: a folder for each stretch of an axis")  # fmt: skip
+
+
+def require_seed(name: str, seed: int) -> None:
+    """Refuse what is no seed.
+
+    Parameters
+    ----------
+    name
+        Of the set of axes.
+    seed
+        A whole number, 0 or larger.
+
+    Raises
+    ------
+    ValueRangeError
+        If it is not one.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ValueRangeError(f"{name}: seed = {brief(seed)}", "must be a whole number from 0 on",
+                              next_step="take for instance 1")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -105,6 +129,11 @@ class GridAxis(AxisSet):
         _count(f"grid over {self.name}", self.count, 2)
         column, ends = subject.column(self.name, (self.lower, self.upper), "grid")
         lower, upper = _ends(column, ends)
+        if subject.is_whole(self.name) and (self.spacing == "ratio" or (upper - lower) % (self.count - 1)):
+            raise ValueRangeError(
+                f"axis '{self.name}'", f"takes whole numbers only, not {self.count} steps like these",
+                next_step=f"take count = {upper - lower + 1:.0f}, or list them: Listed",
+            )  # fmt: skip
         if self.spacing not in ("even", "ratio"):
             raise unknown_name(f"grid over {self.name}: spacing", self.spacing, ("even", "ratio"))
         if self.spacing == "ratio" and lower <= 0.0:
@@ -177,6 +206,7 @@ class SobolSample(AxisSet):
     def bound(self, subject: Subject) -> BoundAxes:
         """Return the axes; see :meth:`AxisSet.bound`."""
         _count("Sobol sample", self.count, 1, _MOST_SOBOL)
+        require_seed("Sobol sample", self.seed)
         columns, lower, upper = _box(subject, self.ranges, "sobol")
 
         @functools.lru_cache(maxsize=2)
@@ -219,6 +249,7 @@ class LatinHypercube(AxisSet):
         from scipy.stats import qmc
 
         _count("Latin hypercube", self.count)
+        require_seed("Latin hypercube", self.seed)
         columns, lower, upper = _box(subject, self.ranges, "latin_hypercube")
         sampler = qmc.LatinHypercube(len(columns), seed=np.random.default_rng(self.seed))
         points = lower + (upper - lower) * sampler.random(self.count)
@@ -239,7 +270,7 @@ class RandomDraws(AxisSet):
     seed
         The same seed gives the same machines; the first of many draws are those of a short one.
     names
-        Only these numbers; all that have a spread by default.
+        Only these numbers; by default all that have a spread and that the question does not choose itself.
     """
 
     count: int
@@ -254,7 +285,12 @@ class RandomDraws(AxisSet):
         ValueRangeError
             If no number of the deck has a spread.
         """
-        _count("random draws", self.count)
+        _count("random draws", self.count, 1, _MOST_SOBOL)
+        require_seed("random draws", self.seed)
+        given: object = self.names
+        if isinstance(given, str):
+            raise ValueRangeError(f"random draws: names = '{given}'", "is one text, not a list",
+                                  next_step=f"write names = ['{given}']")  # fmt: skip
         prior = declared_prior(flatten(subject.base))
         groups = {key: list(inner) for key, inner in itertools.groupby(prior.names, key=_head)}
         places: dict[str, tuple[int, bool]] = {}
@@ -262,7 +298,8 @@ class RandomDraws(AxisSet):
             shape = len(inner) > LONGEST_ROW
             for name in [f"factor({head})"] if shape else inner:
                 places[name] = (prior.place(inner[0] if shape else name), shape)
-        chosen = {name: _chosen(name, places) for name in self.names} if self.names else places
+        kept = {name: place for name, place in places.items() if not subject.is_chosen(name)}
+        chosen = {name: _chosen(name, places) for name in self.names} if self.names else kept
         if not chosen:
             raise ValueRangeError("random draws", "no number of the deck has a spread",
                                   next_step="give numbers a spread")  # fmt: skip
@@ -323,10 +360,31 @@ def _box(
         if isinstance(given, str) or len(given) != 2:
             raise ValueRangeError(f"range of {name}", "has no two ends", next_step='write ["1 mm", "2 mm"]')
         column, values = subject.column(name, tuple(given), kind)
+        require_fractions(subject, name)
         ends.append(_ends(column, values))
         columns.append(column)
     low, high = np.array(ends).T
     return tuple(columns), low, high
+
+
+def require_fractions(subject: Subject, name: str) -> None:
+    """Refuse a sample over whole numbers: its points lie between them.
+
+    Parameters
+    ----------
+    subject
+        What the axis changes.
+    name
+        Of the axis.
+
+    Raises
+    ------
+    ValueRangeError
+        If the axis takes whole numbers only.
+    """
+    if subject.is_whole(name):
+        raise ValueRangeError(f"range of {name}", "takes whole numbers only, a sample has others",
+                              next_step="list them (Listed), or take a GridAxis in steps of one")  # fmt: skip
 
 
 def _distinct(name: str, rows: Sequence[Any]) -> None:

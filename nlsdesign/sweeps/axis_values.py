@@ -12,13 +12,14 @@ import numpy as np
 
 from ..components import materials
 from ..components.assembly.named_parts import Assembly
-from ..errors import UnitError, ValueRangeError, brief, unknown_name
+from ..errors import NlsError, UnitError, ValueRangeError, brief, unknown_name
 from ..quantity import BASE, Quantity, parse_unit, same_dimension
 from ..written_numbers import split_number
 from .changes import ASK, DECK, pieces_of_rubber, row_of_factor
 from .sweep_columns import SweepColumn
 
 Given = float | int | str | Quantity
+_UNIT: Final = "unit"
 _KNOWN_UNITS: Final = (
     *(
         "1",
@@ -110,8 +111,9 @@ class Subject:
         UnitError
             If a value is of another dimension.
         ValueRangeError
-            If a value is no finite number.
+            If a value is no finite number, or the question chooses the number itself.
         """
+        self._require_kept(name)
         words = self._words_for(name)
         if words is not None:
             given = tuple(str(each) for each in values)
@@ -121,9 +123,57 @@ class Subject:
             return SweepColumn(name, "", "words of the sweep", "axis", kind), given
         unit = self._unit_of(name, values)
         numbers = tuple(_number(name, each, unit) for each in values)
+        if self.is_whole(name) and any(each != round(each) for each in numbers):
+            raise ValueRangeError(f"axis '{name}'", "takes whole numbers only")
+        self._require_unit(name, numbers[:1], unit)
         text = "" if unit == "1" else unit
         described = "asked of the point" if name.startswith(f"{ASK}.") else "number of the deck"
         return SweepColumn(name, text, described, "axis", kind, min(numbers), max(numbers)), numbers
+
+    def is_whole(self, name: str) -> bool:
+        """Return whether an axis takes whole numbers only.
+
+        Parameters
+        ----------
+        name
+            Of the axis.
+        """
+        if name not in question_settings(self.question):
+            return False
+        *path, last = name.split(".")[1:]
+        holder = self.question
+        for each in path:
+            holder = _inner(holder)[each]
+        return _is_whole(holder, last)
+
+    def is_chosen(self, name: str) -> bool:
+        """Return whether the question chooses a number itself, whatever it was before.
+
+        Parameters
+        ----------
+        name
+            Of a number, an item of a row, or ``factor(NAME)``.
+        """
+        return (row_of_factor(name) or name.partition("[")[0]) in self.question.chosen(self.base)
+
+    def _require_kept(self, name: str) -> None:
+        """Refuse an axis without effect: its column would read as if the answers did not depend on it."""
+        if self.is_chosen(name):
+            raise ValueRangeError(
+                f"axis '{name}'", "is chosen by the question itself at each point, so it has no effect",
+                next_step="leave the axis out, or take it out of what is free",
+            )  # fmt: skip
+
+    def _require_unit(self, name: str, first: tuple[float, ...], unit: str) -> None:
+        """Refuse a unit that the question would refuse at every point; a value out of range fails its own."""
+        if name not in question_settings(self.question):
+            return
+        try:
+            with_settings(self.question, dict.fromkeys([name], *first), {name: unit})
+        except UnitError as error:
+            raise error.at(f"axis {name}") from None
+        except NlsError:
+            return
 
     def _words_for(self, name: str) -> list[str] | None:
         """Return the words that an axis may have; an empty list for any, ``None`` for an axis of numbers."""
@@ -136,7 +186,9 @@ class Subject:
     def _unit_of(self, name: str, values: Sequence[Given]) -> str:
         """Return the unit in SI; that of the question's own fields is the one that is written."""
         if name in question_settings(self.question):
-            present = question_settings(self.question)[name]
+            present, fixed = question_settings(self.question)[name], _units(self.question).get(name)
+            if fixed is not None:
+                return fixed
             units = [u for u in (_written_unit(name, v) for v in (*values, present)) if u]
             return si_unit(units[0]) if units else "1"
         row = row_of_factor(name)
@@ -218,12 +270,50 @@ def question_settings(question: Any, prefix: str = ASK) -> dict[str, Any]:
     return known
 
 
+def in_unit(default: float, unit: str) -> Any:
+    """Return a field of a question for a number in SI whose unit is checked where it is read.
+
+    Parameters
+    ----------
+    default
+        In SI.
+    unit
+        In SI.
+    """
+    return dataclasses.field(default=default, metadata={_UNIT: unit})
+
+
+def unit_of_field(field: dataclasses.Field[Any]) -> str | None:
+    """Return the unit in SI that a field of a question states, or ``None``.
+
+    Parameters
+    ----------
+    field
+        Of the question.
+    """
+    unit: str | None = field.metadata.get(_UNIT)
+    return unit
+
+
+def _units(question: Any) -> dict[str, str]:
+    """Return the units that the fields of a question state, by the name of their axis."""
+    stated = {each.name: unit_of_field(each) for each in dataclasses.fields(question)}
+    return {f"{ASK}.{name}": unit for name, unit in stated.items() if unit is not None}
+
+
 def _inner(holder: Any) -> dict[str, Any]:
     if isinstance(holder, tuple):
         return {type(each).__name__: each for each in holder if dataclasses.is_dataclass(each)}
     if not dataclasses.is_dataclass(holder):
         return {}
     return {field.name: getattr(holder, field.name) for field in dataclasses.fields(holder) if field.init}
+
+
+def _is_whole(holder: Any, field: str) -> bool:
+    """Return whether a field takes whole numbers only, whatever number stands in it."""
+    hint = typing.get_type_hints(type(holder)).get(field)
+    kinds = set(typing.get_args(hint)) or {hint}
+    return int in kinds and not kinds & {float, Quantity}
 
 
 def with_settings(question: Any, values: Mapping[str, Any], units: Mapping[str, str]) -> Any:
@@ -254,7 +344,7 @@ def _changed(holder: Any, path: list[str], value: Any, unit: str) -> Any:
         new = _changed(present, rest, value, unit)
     elif isinstance(present, str):
         new = str(value)
-    elif isinstance(present, int):
+    elif _is_whole(holder, first):
         new = round(value)
     else:
         # A field that takes a quantity checks the dimension of what it gets.

@@ -14,6 +14,7 @@ from .sweep_question import SweepQuestion, answer
 
 QUICK = DesignSettings(starts=4, draws=0, look_for_size_ranges=False, look_for_remedies=False)
 """Four starts, no draws, no remedies: what a sweep of designs asks of each by default."""
+_LEVER_ARM = ".lever_arm"
 _ANSWERS = (
     answer("met", "", "1 where the design meets its target"),
     answer("torque_error_rms", "N*m", "rms torque error of the finished assembly"),
@@ -65,6 +66,15 @@ class DesignQuestion(SweepQuestion):
         chosen = [n for n in self.free or () if n in known and not isinstance(known[n].value, tuple)]
         numbers = [answer(f"designed.{n}", si_unit(known[n].unit), "chosen by the design") for n in chosen]
         return (*_ANSWERS, *numbers)
+
+    def chosen(self, assembly: Assembly) -> frozenset[str]:
+        """Return what is free, and the numbers of a contour that is."""
+        rows = [name for name in assembly.quantities() if name.endswith(_LEVER_ARM)]
+        cams = [name.removesuffix(_LEVER_ARM) for name in rows if name.startswith(self.spring)]
+        if self.free is not None:
+            cams = [cam for cam in cams if {f"{cam}.contour", f"{cam}{_LEVER_ARM}"} & set(self.free)]
+        contours = {f"{cam}{end}" for cam in cams for end in (_LEVER_ARM, ".last_angle")}
+        return frozenset({*(self.free or ()), *contours})
 
     def ask(self, assembly: Assembly) -> Mapping[str, float]:
         """Return what the design is."""

@@ -18,12 +18,15 @@ from ..model import FlatModel, flatten
 from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from ..observer import CascadeGain, design_observer, observer_bench, observer_errors
+from .axis_values import in_unit
 from .same_bits import same_bits
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer, worst
 
 _HALF_POWER = math.sqrt(0.5)
 _FREQUENCIES = 200
+_SAME_ANGLE = 1e-4
+"""Relative: a design finds the end of its contour numerically."""
 
 
 def _plant(assembly: Assembly, spring: str, measured: str) -> tuple[FlatModel, str, str]:
@@ -31,6 +34,19 @@ def _plant(assembly: Assembly, spring: str, measured: str) -> tuple[FlatModel, s
     whole = flatten(assembly)
     torque, angle = series_spring(whole, spring or None).effort, measured_motion(whole, measured or None)
     return with_outputs(whole, list(dict.fromkeys([angle, torque]))), torque, angle
+
+
+def _require_contour(model: FlatModel, first: float, last: float) -> None:
+    """Refuse angles beyond the end of a cam, where a model goes on and no cam does."""
+    furthest = max(abs(first), abs(last))
+    for cam in (cam for spring in model.springs for cam in spring.cams if cam.last_angle):
+        end = model.values[cam.last_angle or ""]
+        if furthest > end * (1.0 + _SAME_ANGLE):
+            raise ValueRangeError(
+                f"angles to {math.degrees(furthest):.4g}°",
+                f"go beyond the contour of {cam.name}, which ends at {math.degrees(end):.4g}°",
+                next_step="take first and last within it",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -47,8 +63,8 @@ class AngleQuestion(SweepQuestion):
         Where the structure leaves them open; empty otherwise.
     """
 
-    first: float = 0.0
-    last: float = 0.8
+    first: float = in_unit(0.0, "rad")
+    last: float = in_unit(0.8, "rad")
     count: int = 11
     spring: str = ""
     measured: str = ""
@@ -72,6 +88,7 @@ class AngleQuestion(SweepQuestion):
 
     def _chart(self, assembly: Assembly) -> Chart:
         model, torque, angle = _plant(assembly, self.spring, self.measured)
+        _require_contour(model, self.first, self.last)
         views = [Observability(measured=(angle,)), Stability(torque=torque)]
         return over_angle(model, views, angles=np.linspace(self.first, self.last, self.count), angle=angle)
 
@@ -99,7 +116,7 @@ class SpreadQuestion(SweepQuestion):
 
     draws: int = 32
     seed: int = 0
-    sample_time: float = 1e-3
+    sample_time: float = in_unit(1e-3, "s")
     adaptive: bool = False
 
     def __post_init__(self) -> None:
@@ -169,13 +186,13 @@ class LoopQuestion(SweepQuestion):
         Of the controller; picked for the sample time where they are left out.
     """
 
-    sample_time: float = 1e-3
+    sample_time: float = in_unit(1e-3, "s")
     delay: int = 1
-    first: float = 0.1
-    last: float = 0.8
+    first: float = in_unit(0.1, "rad")
+    last: float = in_unit(0.8, "rad")
     count: int = 9
-    amplitude: float = 0.0
-    frequency: float = 2.0
+    amplitude: float = in_unit(0.0, "N*m")
+    frequency: float = in_unit(2.0, "1/s")
     gains: TorqueGains | None = None
 
     def answers(self, assembly: Assembly) -> tuple[SweepColumn, ...]:
@@ -220,6 +237,7 @@ class LoopQuestion(SweepQuestion):
 
     def _loop(self, assembly: Assembly) -> ClosedLoop:
         plant, _, _ = _plant(assembly, "", "")
+        _require_contour(plant, self.first, self.last)
         observer = design_observer(plant, sample_time=self.sample_time, gain=CascadeGain())
         controller = torque_controller(plant, sample_time=self.sample_time, gains=self.gains)
         substeps = max(1, round(10 * self.sample_time / 1e-3))

@@ -17,6 +17,7 @@ from ..work_sharing import Executor, PointOutcome, Processes, shared_map
 from .arrow_columns import libraries
 from .axes import AxisSet
 from .axis_values import Subject
+from .changes import DECK
 from .sweep_columns import DONE, FAILED, RESULTS_FILE, STATE_COLUMNS, SweepColumn
 from .sweep_folder import about_sweep, contents_of, only_run, opened, written_about
 from .sweep_parts import Parts
@@ -97,7 +98,7 @@ def sweep_task(
     Raises
     ------
     ArrangementError
-        If there is no deck.
+        If there is no deck, or several and no axis ``deck``.
     ValueRangeError
         If axes collide, or an answer has the name of an axis.
     NlsError
@@ -107,6 +108,11 @@ def sweep_task(
     if not assemblies:
         raise ArrangementError("sweep", "has no deck", next_step="give an assembly")
     plan = PointPlan(axes, Subject(assemblies, ask))
+    if len(assemblies) > 1 and all(column.name != DECK for column in plan.columns):
+        raise ArrangementError(
+            f"decks {', '.join(assemblies)}", f"no axis '{DECK}' says which decks the points are of",
+            next_step=f"add an axis '{DECK}' that lists them (Listed), or name one deck",
+        )  # fmt: skip
     base = next(iter(assemblies.values()))
     answers = ask.answers(base)
     taken = {c.name for c in (*plan.columns, *STATE_COLUMNS)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ValueRangeError, missing_library
-from .axes import AxisSet, BoundAxes
+from .axes import MOST_HELD, AxisSet, BoundAxes, require_fractions, require_seed
 from .axis_values import Given, Subject
 from .sweep_columns import SALTELLI
 
@@ -57,6 +57,13 @@ class SaltelliSample(AxisSet):
                 f"Saltelli sample: count = {self.count}", "must be a power of two, from 2 on",
                 next_step="take for instance 256; the number of points is that times the axes plus two",
             )  # fmt: skip
+        require_seed("Saltelli sample", self.seed)
+        rows_each = (2 if self.second_order else 1) * len(self.ranges) + 2
+        if self.count * rows_each > MOST_HELD:
+            raise ValueRangeError(
+                f"Saltelli sample: count = {self.count}", f"makes {self.count * rows_each} points, "
+                f"at most {MOST_HELD} stand in memory", next_step="take fewer blocks",
+            )  # fmt: skip
         try:
             from SALib.sample import sobol
         except ModuleNotFoundError:
@@ -68,6 +75,7 @@ class SaltelliSample(AxisSet):
                 raise ValueRangeError(
                     f"range of {name}", "must be two ascending numbers", next_step='write ["1 mm", "2 mm"]'
                 )
+            require_fractions(subject, name)
             columns.append(column)
             ends.append([float(value) for value in values])
         if not columns:

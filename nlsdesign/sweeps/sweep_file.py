@@ -13,11 +13,12 @@ from ..control import TorqueGains
 from ..deck import Deck, load_deck, read_deck
 from ..design import Target
 from ..design.jobs.job_file import built, job_in
-from ..errors import DeckError, NlsError, brief, unknown_name
-from ..quantity import parse_unit
+from ..errors import DeckError, NlsError, UnitError, brief, unknown_name
+from ..quantity import parse_unit, same_dimension
 from ..reading import text_of
 from ..written_numbers import split_number
 from .axes import AxisSet, GridAxis, LatinHypercube, Listed, RandomDraws, SobolSample
+from .axis_values import unit_of_field
 from .design_question import QUICK, DesignQuestion
 from .diagnosis_question import RECORDS, DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
@@ -195,6 +196,7 @@ def _in_si(kind: type, fields: Any, place: str) -> Any:
     if not isinstance(fields, Mapping):
         return fields
     defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+    units = {field.name: unit_of_field(field) for field in dataclasses.fields(kind)}
     values: dict[str, Any] = {}
     for name, value in fields.items():
         default, new = defaults.get(name), value
@@ -202,6 +204,9 @@ def _in_si(kind: type, fields: Any, place: str) -> Any:
             try:
                 number, unit = split_number(value)
                 new = number * parse_unit(unit or "1").factor
+                if unit and not same_dimension(unit, units[name] or "1"):
+                    raise UnitError(value, f"'{unit}' is no unit of it",
+                                    next_step=f"give it in a unit like '{units[name] or '1'}'")  # fmt: skip
             except NlsError as error:
                 raise error.at(f"{place}: {name}") from None
         elif isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):

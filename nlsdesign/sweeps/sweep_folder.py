@@ -171,6 +171,8 @@ def opened(
     parts = Parts(folder, columns)
     if old[0].get("plan") != about["plan"]:
         (folder / RESULTS_FILE).unlink(missing_ok=True)
+        # Until the new points are all numbered, a run of either plan has to number them by their values.
+        write_text(folder / ABOUT_FILE, about_text({**old[0], "plan": ""}, old[1]))
         parts.replace_all(_adopted(folder, [c.name for c in columns if c.role == "axis"], plan))
     return parts
 
@@ -293,7 +295,9 @@ def _place(values: tuple[Any, ...], plan: PointPlan, ranked: Any, order: Any) ->
     return -1
 
 
-def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...]) -> int:
+def standing_points(
+    folder: Path, about: Mapping[str, Any], columns: tuple[SweepColumn, ...], *, plan: PointPlan
+) -> int:
     """Return how many points of a sweep stand in a folder; nothing is written.
 
     Parameters
@@ -302,6 +306,8 @@ def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Sweep
         That may not exist.
     about, columns
         Of the sweep.
+    plan
+        Its points; those of other axes count that it has too.
 
     Raises
     ------
@@ -315,5 +321,7 @@ def standing_points(folder: Path, about: Mapping[str, Any], columns: tuple[Sweep
     if _names(old[1]) != _names(columns):
         raise _another(folder, f"its axes or answers are others: {', '.join(_names(old[1]))}")
     if old[0].get("plan") != about["plan"]:
-        return 0
+        names = [c.name for c in columns if c.role == "axis"]
+        taken = (table.column("point").to_pylist() for table in _adopted(folder, names, plan))
+        return len({number for numbers in taken for number in numbers} - {-1})
     return len(rows_in_order(folder, columns)["point"])

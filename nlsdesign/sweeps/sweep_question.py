@@ -50,6 +50,17 @@ class SweepQuestion(ABC):
             If there is no answer; its message is kept as the reason.
         """
 
+    def chosen(self, assembly: Assembly) -> frozenset[str]:
+        """Return the numbers that the question chooses itself, so that no axis can change them.
+
+        Parameters
+        ----------
+        assembly
+            That is swept, unchanged.
+        """
+        del assembly
+        return frozenset()
+
     def describe(self) -> str:
         """Return what is asked as a text that changes when the question does."""
         return f"{type(self).__qualname__}({_described(self)})"

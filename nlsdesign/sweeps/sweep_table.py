@@ -29,7 +29,7 @@ DECK_FILE: Final = "deck.toml"
 DECKS_FOLDER: Final = "decks"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SweepTable:
     """Points and answers of a sweep.
 
@@ -53,6 +53,14 @@ class SweepTable:
 
     def __len__(self) -> int:
         return len(self.values["point"])
+
+    def __repr__(self) -> str:
+        failed = len(self) - int(self.done.sum())
+        asked = self.about.get("points", len(self))
+        here = f"{len(self)} points" if asked == len(self) else f"{len(self)} of {asked} points"
+        named = [f"{c.name} in {c.unit}" if c.unit else c.name for c in (*self.axes, *self.answers)]
+        what = f"{self.about.get('question', 'sweep')} of {self.about.get('deck', 'a deck')}"
+        return f"{what}: {here}, {failed} failed; columns: {', '.join(named)}"
 
     @property
     def axes(self) -> tuple[SweepColumn, ...]:
