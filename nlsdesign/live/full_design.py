@@ -103,10 +103,11 @@ def full_answer(
     sentences = [*([] if full.design.miss is None else [str(full.design.miss)])]
     if solved is not None and quick.design is not None:
         sentences += _differences(full.design, solved, quick.design)
-        # The whole search knows nothing of limits that nothing can change; they are shown all the same.
-        view = replace(view, margins=(*view.margins, *unkept(question, quick.design.margins)))
     elif quick.state != "solved":
         sentences.append("the quick answer had no design for this question")
+    if quick.state == "solved" and quick.design is not None:
+        # The whole search knows nothing of limits that nothing can change; they are shown all the same.
+        view = replace(view, margins=(*view.margins, *unkept(question, quick.design.margins)))
     sentences += not_kept(question, view.margins)
     sentences += full.design.remarks
     return replace(

@@ -182,7 +182,6 @@ def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str
         if each.margin < -1e-3 * abs(each.bound):
             value, bound = (1e3 * number for number in (each.value, each.bound))
             side = "at most" if each.upper else "at least"
-            words.append(
-                f"{each.limit} is BROKEN by the cam as it is fitted: {each.of} {value:.4g} mm, {side} {bound:.4g} mm is asked for"
-            )
+            broken = f"{each.of} {value:.4g} mm, {side} {bound:.4g} mm is asked for"
+            words.append(f"{each.limit} is BROKEN by the cam as it is fitted: {broken}")
     return words
