@@ -235,6 +235,23 @@ def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab:
     assert tab.messages == []
 
 
+def test_an_address_that_is_pasted_into_the_open_page_is_taken(tab: Tab, server: Server) -> None:
+    session = session_of(tab)
+    tab.happened.clear()
+    tab.evaluate(f"location.hash = '#token={server.token}'")
+    tab.until("location.hash === '' && document.readyState === 'complete'")
+    tab.until(f"{ANSWERED} && document.querySelectorAll('.point').length > 3")
+    assert "Page.loadEventFired" in tab.happened
+    assert session_of(tab) == session
+
+
+def test_a_page_without_a_token_says_that_it_is_not_connected(tab: Tab, server: Server) -> None:
+    stranger = tab.beside(another_person=True)
+    stranger.visit(server.origin + "/")
+    stranger.until("document.getElementById('connection').textContent.includes('token')")
+    assert stranger.evaluate(STATE) == "not connected"
+
+
 # --- others ---------------------------------------------------------------------------------------
 
 

@@ -453,4 +453,6 @@ def _brief(value: Quantity) -> str:
 
 def _read(torque: float) -> str:
     """Return a deviation of torque in the unit in which it has no power of ten."""
-    return f"{torque:+.4g} N·m" if abs(torque) >= 0.9995 else f"{1e3 * torque:+.3g} mN·m"
+    if abs(torque) < 0.9995:
+        return f"{1e3 * torque:+.3g} mN·m"
+    return f"{torque:+.4g} N·m" if abs(torque) < 1e4 else f"{torque:+.0f} N·m"
