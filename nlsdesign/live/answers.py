@@ -350,7 +350,7 @@ class AngleAnswer:
     revision
         Of the design.
     mechanism
-        Cam, cable and rubber to scale.
+        Cam, cable and rubber to scale; ``None`` where the contour has no outline.
     readings
         The columns of the design at this angle, by interpolation; each with one value.
     observability, poles, loop
@@ -360,7 +360,7 @@ class AngleAnswer:
 
     angle: float
     revision: int
-    mechanism: Mechanism
+    mechanism: Mechanism | None
     readings: tuple[LiveColumn, ...]
     observability: Lazy
     poles: Lazy

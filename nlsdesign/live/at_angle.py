@@ -147,12 +147,19 @@ class AngleView:
         return AngleAnswer(
             angle=angle,
             revision=self.view.revision,
-            mechanism=self.mechanism(angle),
+            mechanism=self._picture(angle),
             readings=self.readings(angle),
             observability=self._lazily(lambda: seen_states(rest())),
             poles=self._lazily(lambda: pole_groups(rest())),
             loop=loop,
         )
+
+    def _picture(self, angle: float) -> Mechanism | None:
+        """Return the mechanism; a contour without an outline has poles and torque all the same."""
+        try:
+            return self.mechanism(angle)
+        except NlsError:
+            return None
 
     def _lazily(self, make: Callable[[], object]) -> Lazy:
         try:

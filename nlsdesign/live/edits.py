@@ -124,11 +124,18 @@ class ChangeLimit(LiveEdit):
         ------
         UnknownNameError
             If there is no such limit.
+        ValueRangeError
+            If the number is out of its range.
         """
         if self.limit not in LIMIT_KINDS:
             raise unknown_name("limit", self.limit, LIMIT_KINDS)
-        value = finite_in(self.limit, self.value, 0.0, 1e12)
-        LIMIT_KINDS[self.limit].limit(value)
+        kind = LIMIT_KINDS[self.limit]
+        value = finite_in(self.limit, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
+        try:
+            kind.limit(value)
+        except ValueRangeError as error:
+            # Its advice is for somebody who writes Python, and may have meant another unit.
+            raise ValueRangeError(error.thing, error.rule, next_step="give a number in that range") from error
         return replace(question, limits={**question.limits, self.limit: value})
 
 
@@ -185,7 +192,9 @@ class SetNumber(LiveEdit):
         """Return the question with that number held."""
         question.number(self.name)
         variable = question.machine.model.variable(self.name)
-        value = finite_in(self.name, self.value, variable.minimum, variable.maximum)
+        value = finite_in(
+            self.name, self.value, lowest=variable.minimum, highest=variable.maximum, unit=variable.unit
+        )
         held = without_free(question, self.name)
         return replace(held, given={**question.given, self.name: value})
 
@@ -229,8 +238,9 @@ class FreeNumber(LiveEdit):
         if self.minimum is None and self.maximum is None:
             ranges = {name: each for name, each in question.ranges.items() if name != self.name}
             return replace(question, free=free, ranges=ranges)
-        finite_in(f"least {self.name}", low, variable.minimum, variable.maximum)
-        finite_in(f"largest {self.name}", high, low, variable.maximum)
+        most, unit = variable.maximum, variable.unit
+        finite_in(f"least {self.name}", low, lowest=variable.minimum, highest=most, unit=unit)
+        finite_in(f"largest {self.name}", high, lowest=low, highest=most, unit=unit)
         return replace(question, free=free, ranges={**question.ranges, self.name: (low, high)})
 
 
@@ -414,7 +424,7 @@ def _require_kind(what: str, value: object, hint: Any) -> None:
     if int in allowed and isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1_000_000:
         return
     if float in allowed:
-        finite_in(what, value, -1e300, 1e300)
+        finite_in(what, value, lowest=-1e300, highest=1e300)
         return
     raise ValueRangeError(
         f"{what} = {brief(value)}", "is of the wrong kind", next_step="see the edit's fields"
@@ -424,7 +434,7 @@ def _require_kind(what: str, value: object, hint: Any) -> None:
 def _index(index: int, count: int) -> int:
     if not 1 <= index < count:
         raise ValueRangeError(
-            f"point {index} of the target", f"cannot be changed; those that can are 1 to {count - 1}",
-            next_step="point 0 stays at angle zero",
+            f"point {index + 1} of the target", f"cannot be changed; those that can are 2 to {count}",
+            next_step="point 1 stays at angle zero",
         )  # fmt: skip
     return index

@@ -12,7 +12,7 @@ from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
 from .question import LiveQuestion
 from .quick_design import QuickDesign
-from .views import view_of
+from .views import not_kept, unkept, view_of
 
 STARTS = 8
 _DEARER = 1e-3
@@ -106,6 +106,10 @@ def full_answer(
         sentences += _differences(full.design, solved, quick.design)
     elif quick.state != "solved":
         sentences.append("the quick answer had no design for this question")
+    if quick.state == "solved" and quick.design is not None:
+        # The whole search knows nothing of limits that nothing can change; they are shown all the same.
+        view = replace(view, margins=(*view.margins, *unkept(question, quick.design.margins)))
+    sentences += not_kept(question, view.margins)
     sentences += full.design.remarks
     return replace(
         quick, state="solved", source="full", message="; ".join(sentences), design=view, conflicts=()
@@ -117,7 +121,9 @@ def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> l
     cost, largest, sentences = design.starts[design.taken].cost, design.target.largest, []
     was, there = f"{1e3 * quick.rms_error:.3g} mN·m rms", f"{1e3 * design.predicted_rms:.3g} mN·m rms"
     if solved.cost > cost * (1.0 + _DEARER) + _DEARER:
-        sentences.append(f"the quick answer was a worse local optimum: {was} against {there} now")
+        sentences.append(
+            f"the quick answer was a worse local optimum: {was} against {there} now, both before the finish"
+        )
     elif cost > solved.cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
             f"the quick answer was a better local optimum that none of {STARTS} starts reaches: {was} "

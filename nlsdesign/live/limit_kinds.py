@@ -50,6 +50,11 @@ class LimitKind:
         """Name of the class."""
         return self.kind.__name__
 
+    @property
+    def read_unit(self) -> str:
+        """SI unit, or "%" for a ratio that is read in per cent."""
+        return self.shown_unit if self.shown_unit == "%" else self.unit
+
     def limit(self, value: float) -> Limit:
         """Return the limit.
 

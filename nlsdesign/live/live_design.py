@@ -52,7 +52,7 @@ class LiveDesign:
         """The last good design as it is looked at angle by angle; ``None`` before the first."""
         return self._history.now.shown
 
-    def apply(self, edit: LiveEdit, *, drag: str | None = None) -> LiveAnswer:
+    def apply(self, edit: LiveEdit, *, drag: str | None = None, last: bool = False) -> LiveAnswer:
         """Do an edit and return the answer.
 
         Parameters
@@ -61,13 +61,15 @@ class LiveDesign:
             What the designer does.
         drag
             Name of what is being dragged: edits with the same name, one after the other, are undone together.
+        last
+            Whether the hand lets go with this edit: the next one of that name is undone by itself.
 
         Raises
         ------
         NlsError
             If the edit cannot be done; nothing has changed then.
         """
-        self._history.ask(edit.applied(self.question, self.shown), drag)
+        self._history.ask(edit.applied(self.question, self.shown), drag, last=last)
         return self.answer
 
     def undo(self) -> LiveAnswer:
@@ -93,7 +95,7 @@ class LiveDesign:
         ValueRangeError
             If the angle is out of range, or there is no design yet.
         """
-        finite_in("angle", angle, -_LARGEST_ANGLE, _LARGEST_ANGLE)
+        finite_in("angle", angle, lowest=-_LARGEST_ANGLE, highest=_LARGEST_ANGLE, unit="rad")
         if self.shown is None:
             raise ValueRangeError("angle", "there is no design yet", next_step="widen a limit first")
         return self.shown.answer(angle, self.work.loop_at(angle, self.shown))

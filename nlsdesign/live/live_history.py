@@ -29,7 +29,7 @@ class LiveHistory:
         self.future: list[LiveMoment] = []
         self.now = first_moment(self._solver, question, values)
 
-    def ask(self, question: LiveQuestion, drag: str | None) -> None:
+    def ask(self, question: LiveQuestion, drag: str | None, *, last: bool = False) -> None:
         """Make a changed question with its answer the present moment.
 
         Parameters
@@ -38,11 +38,13 @@ class LiveHistory:
             Changed.
         drag
             Name of what is being dragged: steps with the same name, one after the other, are one step.
+        last
+            Whether the hand lets go with it: the next one of that name is a step of its own.
         """
         moment = next_moment(self._solver, question, self.now)
         if drag is None or drag != self._grip:
             self.past = [*self.past, self.now][-MOST_UNDO:]
-        self._grip, self.future = drag, []
+        self._grip, self.future = None if last else drag, []
         self._go_to(moment)
 
     def undo(self) -> None:

@@ -10,7 +10,7 @@ from .at_angle import AngleView
 from .full_design import FullDesign, angle_view_of, full_answer
 from .question import LiveQuestion
 from .quick_design import DesignedNumbers, QuickDesign, QuickSolver
-from .views import controls_of
+from .views import controls_of, not_kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,9 @@ def _answered(
     message = outcome.words
     if solved is not None:
         shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.numbers.machine)
-        message = "; ".join([*([] if shown.view.met else [missed(shown)]), *not_kept(question)])
+        message = "; ".join(
+            [*([] if shown.view.met else [missed(shown)]), *not_kept(question, shown.view.margins)]
+        )
     controls = controls_of(question, can_undo=before is not None, can_redo=False)
     answer = LiveAnswer(
         revision=revision, state=outcome.state, message=message, source="quick",
@@ -159,15 +161,3 @@ def missed(shown: AngleView) -> str:
     held = f"held by {', '.join(view.active)}" if view.active else "no limit holds it"
     share = f"{100.0 * view.relative_error:.3g} %"
     return f"misses its target: {share} rms of the largest torque, 1 % allowed; {held}"
-
-
-def not_kept(question: LiveQuestion) -> list[str]:
-    """Return in words which limits are shown and not kept.
-
-    Parameters
-    ----------
-    question
-        As it stands.
-    """
-    names = [name for name, each in question.limit_values.items() if not question.keeps(each.kind)]
-    return [f"the contour is held, so {', '.join(names)} is shown and not kept"] if names else []

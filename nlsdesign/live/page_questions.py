@@ -58,7 +58,8 @@ class PageQuestions:
         fields, drag, angle = asked.get("edit"), asked.get("drag"), _angle(asked)
         if not isinstance(fields, dict):
             raise ValueRangeError("edit", "is no table", next_step="send its name and its fields")
-        answer = self._news.live.apply(edit_from(fields), drag=drag if isinstance(drag, str) else None)
+        drag, last = drag if isinstance(drag, str) else None, asked.get("last") is True
+        answer = self._news.live.apply(edit_from(fields), drag=drag, last=last)
         self._news.answer(answer, _number(asked), angle)
         self._news.settle_soon()
 

@@ -26,6 +26,16 @@ LEAST_STEP = 1e-3
 LARGEST_ANGLE = 6.28
 LARGEST_TORQUE = 1e5
 _GIVEN = "given by the designer"
+_READ_IN = {
+    "rad": ("°", 180.0 / math.pi),
+    "m": ("mm", 1e3),
+    "m^2": ("mm²", 1e6),
+    "Pa": ("MPa", 1e-6),
+    "N*m": ("N·m", 1.0),
+    "N*m/rad": ("N·m/rad", 1.0),
+    "%": ("%", 100.0),
+}
+"""Units of the page and their factors, by unit in SI; "%" stands for a ratio that is read so."""
 
 
 class TargetPoint(NamedTuple):
@@ -236,20 +246,22 @@ class LiveQuestion:
                 f"target with {len(points)} points", f"has {FEWEST_POINTS} to {MOST_POINTS} of them",
                 next_step="remove a point" if len(points) > MOST_POINTS else "keep the last two points",
             )  # fmt: skip
-        for number, point in enumerate(points):
-            finite_in(f"angle of point {number}", point.angle, 0.0, LARGEST_ANGLE)
-            finite_in(f"torque of point {number}", point.torque, 0.0, LARGEST_TORQUE)
+        for number, point in enumerate(points, start=1):
+            finite_in(f"angle of point {number}", point.angle, lowest=0.0, highest=LARGEST_ANGLE, unit="rad")
+            finite_in(
+                f"torque of point {number}", point.torque, lowest=0.0, highest=LARGEST_TORQUE, unit="N*m"
+            )
         angles = np.array([point.angle for point in points])
         if points[0] != (0.0, 0.0):
             raise ValueRangeError(
-                "point 0 of the target", "stays at angle zero without torque: the spring is odd or one-sided",
+                "point 1 of the target", "stays at angle zero without torque: the spring is odd or one-sided",
                 next_step="move another point",
             )  # fmt: skip
         close = np.flatnonzero(np.diff(angles) < LEAST_STEP * (1.0 - 1e-9))
         if len(close):
             raise ValueRangeError(
-                f"points {close[0]} and {close[0] + 1} of the target",
-                f"are out of order or nearer than {1e3 * LEAST_STEP:g} mrad",
+                f"points {close[0] + 1} and {close[0] + 2} of the target",
+                f"are out of order or nearer than {math.degrees(LEAST_STEP):.2g}°",
                 next_step="move the point between its neighbours",
             )
         if max(point.torque for point in points) < 1e-6:
@@ -257,7 +269,7 @@ class LiveQuestion:
         return replace(self, points=points)
 
 
-def finite_in(what: str, value: object, lowest: float, highest: float) -> float:
+def finite_in(what: str, value: object, *, lowest: float, highest: float, unit: str = "1") -> float:
     """Return a number that a designer gave, checked.
 
     Parameters
@@ -268,6 +280,8 @@ def finite_in(what: str, value: object, lowest: float, highest: float) -> float:
         Anything.
     lowest, highest
         Inclusive range.
+    unit
+        Unit in SI of value and range; people read them in the unit of the page.
 
     Raises
     ------
@@ -280,11 +294,13 @@ def finite_in(what: str, value: object, lowest: float, highest: float) -> float:
         sound = False
     if not sound or not isinstance(value, int | float):
         raise ValueRangeError(
-            f"{what} = {brief(value)}", "is no finite number", next_step="give a number in SI"
+            f"{what} = {brief(value)}", "is no finite number", next_step="give a number like 12.5"
         )
     if not lowest <= value <= highest:
+        shown, factor = _READ_IN.get(unit, ("" if unit == "1" else unit, 1.0))
         raise ValueRangeError(
-            f"{what} = {value:g}", f"must lie in [{lowest:g}, {highest:g}] (SI)",
+            f"{what} = {factor * value:.4g} {shown}".rstrip(),
+            f"must lie in [{factor * lowest:.4g}, {factor * highest:.4g}] {shown}".rstrip(),
             next_step="give a number in that range",
-        )  # fmt: skip
+        )
     return float(value)

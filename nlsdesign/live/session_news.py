@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..components.materials.library import materials
+from ..components.materials.material_law import missing_law
 from ..errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards
@@ -189,6 +190,6 @@ def choices() -> dict[str, Any]:
     ]
     return {
         "cards": [to_json(each) for each in gallery_cards()],
-        "materials": list(materials()),
+        "materials": [{"name": n, "reason": missing_law(each)} for n, each in materials().items()],
         "limits": kinds,
     }

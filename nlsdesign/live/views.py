@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
+from .limit_kinds import LIMIT_KINDS
 from .question import LiveQuestion
 
 Floats = NDArray[np.float64]
@@ -150,3 +151,37 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
         contour=design.contour.points,
         rubber_volume=design.rubber_volume,
     )
+
+
+def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[LimitMargin, ...]:
+    """Return how a design stands to limits that are shown and not kept: nothing that is free changes them.
+
+    Parameters
+    ----------
+    question
+        That it answers.
+    margins
+        To all of its limits.
+    """
+    return tuple(each for each in margins if not question.keeps(LIMIT_KINDS[each.limit]))
+
+
+def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
+    """Return in words which limits are shown and not kept, and which of them the design breaks.
+
+    Parameters
+    ----------
+    question
+        As it stands.
+    margins
+        Of the design, to all limits.
+    """
+    names = [name for name, each in question.limit_values.items() if not question.keeps(each.kind)]
+    words = [f"the contour is held, so {', '.join(names)} is shown and not kept"] if names else []
+    for each in unkept(question, margins):
+        if each.margin < -1e-3 * abs(each.bound):
+            value, bound = (1e3 * number for number in (each.value, each.bound))
+            side = "at most" if each.upper else "at least"
+            broken = f"{each.of} {value:.4g} mm, {side} {bound:.4g} mm is asked for"
+            words.append(f"{each.limit} is BROKEN by the cam as it is fitted: {broken}")
+    return words

@@ -219,7 +219,34 @@ def test_another_rubber_and_a_held_contour(template: LiveDesign) -> None:
     assert contour is not None
     assert held.design.rms_error < 1e-3 * template.question.target.largest
     np.testing.assert_allclose(held.design.contour[-1], contour[-1], atol=1e-4)
+    tight = template.apply(ChangeLimit("MinimumRadiusOfCurvature", 6e-3))
+    question = template.question
+    full = whole_design(lambda _: None, question.actuator, question.target, question.free, question.keep)
+    checked = full_answer(full, question, tight, None)
+    for answer in (tight, checked):
+        assert answer.design is not None
+        margin = {each.limit: each for each in answer.design.margins}["MinimumRadiusOfCurvature"]
+        assert margin.value < margin.bound == 6e-3
+        assert "MinimumRadiusOfCurvature is BROKEN" in answer.message
+        assert "at least 6 mm is asked for" in answer.message
+    here = template.at(0.3)
+    assert here.mechanism is None, "a hollow contour has no outline for this picture"
+    assert (here.poles.state, here.observability.state) == ("done", "done")
+    assert here.poles.revision == tight.revision
     template.undo()
+    template.undo()
+
+
+def test_each_drag_is_one_step_back_also_two_of_the_same_point(template: LiveDesign) -> None:
+    point = template.question.points[3]
+    torques = [point.torque * factor for factor in (1.0, 1.01, 1.02, 1.03)]
+    template.apply(MovePoint(3, point.angle, torques[1]), drag="point 3")
+    template.apply(MovePoint(3, point.angle, torques[2]), drag="point 3", last=True)
+    template.apply(MovePoint(3, point.angle, torques[3]), drag="point 3", last=True)
+    template.undo()
+    assert template.question.points[3].torque == torques[2]
+    template.undo()
+    assert template.question.points[3].torque == torques[0]
 
 
 @pytest.mark.slow

@@ -32,6 +32,7 @@ from nlsdesign.design import (
 )
 from nlsdesign.design.optimisation.limits import Bound
 from nlsdesign.design.optimisation.loosening import Give
+from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.errors import InfeasibleError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.model import flatten
 from nlsdesign.quantity import degrees, quantity
@@ -275,3 +276,14 @@ def test_a_cam_that_sets_in_too_slowly_is_the_one_to_blame() -> None:
     assert missed.miss is not None
     assert missed.predicted_rms < 1e-3 * target.largest
     assert "make spring.cam.onset smaller" in missed.miss.advice[0]
+
+
+def test_a_large_deviation_is_written_without_a_power_of_ten() -> None:
+    def words(torque: float) -> str:
+        return str(Miss(0.3, 0.01, 0.9, torque, (), None, ()))
+
+    assert "-2.471 N·m" in words(-2.471)
+    assert "-323 mN·m" in words(-0.3231)
+    assert "+1 N·m" in words(0.99996)
+    assert "+999 mN·m" in words(0.999)
+    assert "e+" not in words(-1e5)

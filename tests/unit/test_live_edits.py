@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from nlsdesign.live import (
     DropLimit,
     FreeNumber,
     HoldNumber,
+    LiveEdit,
     LiveQuestion,
     MovePoint,
     RemovePoint,
@@ -31,8 +33,11 @@ from nlsdesign.live import (
     reopened,
     to_json,
 )
+from nlsdesign.live.answers import LimitMargin
 from nlsdesign.live.question import MOST_POINTS
 from nlsdesign.live.saved import saved
+from nlsdesign.live.session_news import choices
+from nlsdesign.live.views import not_kept, unkept
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +77,60 @@ def test_points_move_between_their_neighbours_only(question: LiveQuestion) -> No
     ):
         with pytest.raises(ValueRangeError):
             edit.applied(question)
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (MovePoint(2, 0.4, -5.0), ["torque of point 3 = -5 N·m", "[0, 1e+05] N·m"]),
+        (MovePoint(2, -math.radians(5.0), 0.2), ["angle of point 3 = -5 °", "[0, 359.8] °"]),
+        (MovePoint(2, 0.7, 0.2), ["points 3 and 4 of the target", "0.057°"]),
+        (MovePoint(0, 0.0, 0.1), ["point 1 of the target", "2 to 6"]),
+        (ChangeLimit("MaximumStrain", -0.05), ["MaximumStrain = -5 %"]),
+        (ChangeLimit("MaximumStress", -2e6), ["MaximumStress = -2 MPa"]),
+        (ChangeLimit("MinimumRadiusOfCurvature", -3e-3), ["MinimumRadiusOfCurvature = -3 mm"]),
+        (SetNumber("spring.rubber.area", -5e-6), ["spring.rubber.area = -5 mm²", "[0.01, 1e+04] mm²"]),
+    ],
+)
+def test_a_refusal_counts_points_and_names_units_as_the_page_does(
+    question: LiveQuestion, edit: LiveEdit, words: list[str]
+) -> None:
+    with pytest.raises(ValueRangeError) as refused:
+        edit.applied(question)
+    assert all(each in str(refused.value) for each in words), str(refused.value)
+    assert "SI" not in str(refused.value)
+
+
+def test_a_refused_limit_gives_no_advice_for_python(question: LiveQuestion) -> None:
+    with pytest.raises(ValueRangeError, match=r"must lie in \[0, 0\.5\] m -> give a number in that range"):
+        ChangeLimit("MinimumRadiusOfCurvature", 1.0).applied(question)
+
+
+def test_a_limit_that_a_held_contour_breaks_is_named_with_both_numbers(question: LiveQuestion) -> None:
+    held = ChangeLimit("MinimumRadiusOfCurvature", 6e-3).applied(
+        HoldNumber(question.contour).applied(question)
+    )
+    shape = LimitMargin(
+        "MinimumRadiusOfCurvature", "radius of curvature", -1.9e-3, 6e-3, -7.9e-3, "m", "mm", False, False
+    )
+    force = LimitMargin("MaximumCableTension", "cable tension", 200.0, 180.0, -20.0, "N", "N", True, False)
+    assert unkept(held, (force, shape)) == (shape,)
+    words = "; ".join(not_kept(held, (force, shape)))
+    assert "is shown and not kept" in words
+    assert "BROKEN by the cam as it is fitted: radius of curvature -1.9 mm, at least 6 mm" in words
+    kept = replace(shape, value=7e-3, margin=1e-3)
+    assert "BROKEN" not in "; ".join(not_kept(held, (kept,)))
+    assert not_kept(question, (shape,)) == []
+
+
+def test_rubbers_without_an_elastic_law_are_offered_with_the_reason(question: LiveQuestion) -> None:
+    offered = {each["name"]: each["reason"] for each in choices()["materials"]}
+    assert offered["PMC-770"] == offered["Dragon_Skin_30"] == ""
+    assert offered["EPDM"] == "has no elastic law: only loss tangent known"
+    for name, reason in offered.items():
+        if reason:
+            with pytest.raises(NlsError, match=reason):
+                ChooseMaterial(name).applied(question)
 
 
 def test_two_points_are_a_straight_line_and_fifty_are_the_most(question: LiveQuestion) -> None:

@@ -183,6 +183,44 @@ def test_everything_is_reached_and_moved_by_keys_alone(tab: Tab) -> None:
     settled(tab, "document.getElementById('linear-angle').textContent", at)
 
 
+def typed(tab: Tab, field: str, words: str) -> None:
+    """Give a field words as a hand does that leaves it afterwards."""
+    change = f"{field}.value = {words!r}; {field}.dispatchEvent(new Event('change'))"
+    tab.evaluate(f"{field}.focus(); {change}; {field}.blur()")
+
+
+def test_what_is_typed_is_one_step_each_and_what_is_no_number_is_answered_there(tab: Tab) -> None:
+    field = POINT.format(2).removesuffix(".value")
+    before = float(tab.evaluate(f"{field}.value"))
+    wrong = "document.getElementById('points-wrong').textContent"
+    for words in ("3 mm", "1e400", ""):
+        typed(tab, field, words)
+        assert tab.evaluate(wrong).startswith("Point 3: the torque is no number"), words
+    numbers = [f"{before * factor:.5g}" for factor in (1.005, 1.01)]
+    for number in numbers:
+        typed(tab, field, number)
+        resting(tab)
+        tab.until(f"{field}.value === {number!r} && {ANSWERED}")
+        assert tab.evaluate(wrong) == ""
+    typed(tab, field, "-5")
+    tab.until("document.getElementById('notice').textContent.startsWith('torque of point 3 = -5 N·m')")
+    for number in (numbers[0], f"{before:.5g}"):
+        tab.press("z", control=True)
+        tab.until(f"Number({field}.value) === {float(number)}")
+    resting(tab)
+
+
+def test_what_belongs_to_another_angle_is_greyed_and_poles_are_read_as_numbers(tab: Tab) -> None:
+    words = "document.querySelectorAll('#linear-row .job')[1].textContent"
+    stale = "document.getElementById('linear').classList.contains('stale')"
+    tab.until(f"!({stale}) && {words}.includes('i in 1/s')")
+    before = tab.evaluate(words)
+    slide = """((e) => { e.value = e.max / 4; e.dispatchEvent(new Event("input")); })"""
+    assert tab.evaluate(f"({slide}(document.getElementById('angle')), {stale})"), "poles of another angle"
+    tab.until(f"!({stale})")
+    assert tab.evaluate(words) != before
+
+
 @pytest.mark.parametrize("width", [375, 320])
 def test_nothing_is_wider_than_a_small_screen_and_points_are_large_enough_to_touch(
     tab: Tab, width: int
@@ -223,6 +261,23 @@ def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab:
     tab.press("z", control=True)
     tab.until(f"{point} === {before!r}")
     assert tab.messages == []
+
+
+def test_an_address_that_is_pasted_into_the_open_page_is_taken(tab: Tab, server: Server) -> None:
+    session = session_of(tab)
+    tab.happened.clear()
+    tab.evaluate(f"location.hash = '#token={server.token}'")
+    tab.until("location.hash === '' && document.readyState === 'complete'")
+    tab.until(f"{ANSWERED} && document.querySelectorAll('.point').length > 3")
+    assert "Page.loadEventFired" in tab.happened
+    assert session_of(tab) == session
+
+
+def test_a_page_without_a_token_says_that_it_is_not_connected(tab: Tab, server: Server) -> None:
+    stranger = tab.beside(another_person=True)
+    stranger.visit(server.origin + "/")
+    stranger.until("document.getElementById('connection').textContent.includes('token')")
+    assert stranger.evaluate(STATE) == "not connected"
 
 
 # --- others ---------------------------------------------------------------------------------------

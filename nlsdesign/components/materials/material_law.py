@@ -81,6 +81,26 @@ class MaterialLaw:
         return f"{text}, off the curve by {rms:.2g} % rms, {worst:.2g} % at worst"
 
 
+def missing_law(material: Material) -> str:
+    """Return why a rubber gives no elastic law; empty where it gives one.
+
+    Parameters
+    ----------
+    material
+        Of the library.
+
+    Examples
+    --------
+    >>> from nlsdesign.components import material
+    >>> missing_law(material("EPDM"))
+    'has no elastic law: only loss tangent known'
+    """
+    if any(_gives_law(material, each) for each in material.properties):
+        return ""
+    known = ", ".join(each.name.replace("_", " ") for each in material.properties)
+    return f"has no elastic law: only {known} known"
+
+
 def law_of(material: Material, *, using: str | None = None) -> MaterialLaw:
     """Return the laws of a rubber: fitted to its measured curve, or made from its constants.
 
@@ -108,18 +128,13 @@ def law_of(material: Material, *, using: str | None = None) -> MaterialLaw:
     >>> print(law_of(material("PMC-770"), using="engaging_moduli_2015"))
     PMC-770: StrainStiffening from engaging_moduli_2015, relaxing, strain 0 to 0.28
     """
-    known = [p.name for p in material.properties if _gives_law(material, p)]
-    if not known:
-        having = [
-            name for name, other in materials().items() if any(_gives_law(other, p) for p in other.properties)
-        ]
+    if reason := missing_law(material):
+        having = [name for name, other in materials().items() if not missing_law(other)]
         raise ArrangementError(
-            f"material '{material.name}'",
-            "has no elastic law: only "
-            + ", ".join(p.name.replace("_", " ") for p in material.properties)
-            + " known",
+            f"material '{material.name}'", reason,
             next_step=f"take one with a measured curve or constants: {', '.join(having)}; or add its curve",
-        )
+        )  # fmt: skip
+    known = [p.name for p in material.properties if _gives_law(material, p)]
     if using is not None and using not in known:
         raise unknown_name(f"{material.name}: property that gives an elastic law", using, known)
     chosen = material[using or known[0]]

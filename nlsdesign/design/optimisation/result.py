@@ -203,7 +203,7 @@ class Miss:
         return (
             f"{100 * self.error:.3g} % rms of the largest torque, "
             f"{100 * self.allowed:g} % allowed; worst at {np.degrees(self.worst_angle):.3g}°: "
-            f"{1e3 * self.worst_error:+.3g} mN·m; {held}"
+            f"{_read(self.worst_error)}; {held}"
         )
 
     def __str__(self) -> str:
@@ -454,3 +454,10 @@ def _cost(outcome: StartOutcome) -> float:
 
 def _brief(value: Quantity) -> str:
     return str(value) if len(value.values) <= 4 else f"<{len(value.values)} control values>"
+
+
+def _read(torque: float) -> str:
+    """Return a deviation of torque in the unit in which it has no power of ten."""
+    if abs(torque) < 0.9995:
+        return f"{1e3 * torque:+.3g} mN·m"
+    return f"{torque:+.4g} N·m" if abs(torque) < 1e4 else f"{torque:+.0f} N·m"

@@ -16,6 +16,9 @@ if (given) {
   history.replaceState(null, "", "/");
 }
 
+// A new address that is pasted into this tab changes nothing but what stands behind the #.
+window.addEventListener("hashchange", () => { if (/^#token=[\w-]+$/.test(location.hash)) location.reload(); });
+
 export class Connection {
   // receive(message) takes what the server says; state(words, lost) how the connection stands.
   constructor(receive, state) {
@@ -60,7 +63,7 @@ export class Connection {
   closed() {
     if (this.over) return;
     this.state(this.opened
-      ? "The connection is lost; trying again. What is shown is what was last computed."
+      ? "The connection is lost; trying again. If “nlsdesign serve” was started anew, open the address that it has printed."
       : "Nothing answers, or the token is of an earlier run: open the address that “nlsdesign serve” has printed.", true);
     setTimeout(() => this.open(), this.pause);
     this.pause = Math.min(5000, 2 * this.pause);

@@ -55,6 +55,8 @@ class NumberRow {
     if (document.activeElement !== this.field || this.settled) {
       this.field.value = given.value === null ? "" : editable(given.value * factorOf(given.unit));
       this.settled = false;
+      this.field.removeAttribute("aria-invalid");
+      text(this.wrong, "");
     }
     if (document.activeElement !== this.slider || !this.sliding) this.rest();
     this.slider.setAttribute("aria-valuetext", given.value === null ? "no number" : withUnit(given.value, given.unit));
@@ -89,7 +91,7 @@ class NumberRow {
   entered() {
     const value = typed(this.field.value);
     if (Number.isNaN(value)) {
-      text(this.wrong, "This is no number: write it like 12.5.");
+      text(this.wrong, "This is no number: write it like 12.5, without a unit.");
       this.field.setAttribute("aria-invalid", "true");
       return;
     }
@@ -152,26 +154,28 @@ export class PointTable {
     this.rows = [];
     host.append(make("div", { class: "point names", "aria-hidden": "true" }, make("span"), make("span", {}, "angle in °"), make("span", {}, "torque in N·m"), make("span")));
     this.add = make("button", { type: "button", onclick: () => this.extend() }, "Add a point");
+    this.wrong = make("p", { class: "wrong", id: "points-wrong", role: "alert" });
   }
 
   show(points) {
     while (this.rows.length < points.length) this.rows.push(this.row(this.rows.length));
     while (this.rows.length > points.length) this.rows.pop().row.remove();
-    this.host.append(this.add);
+    this.host.append(this.wrong, this.add);
     points.forEach(([angle, torque], k) => {
       const { angleField, torqueField, remove } = this.rows[k];
       for (const [field, value] of [[angleField, angle * 180 / Math.PI], [torqueField, torque]]) {
-        if (document.activeElement !== field || field.dataset.done) { field.value = editable(value); delete field.dataset.done; }
+        if (document.activeElement !== field || field.dataset.done) { field.value = editable(value); delete field.dataset.done; field.removeAttribute("aria-invalid"); }
         field.disabled = k === 0;
       }
       remove.disabled = k === 0 || points.length <= 2;
     });
+    if (!this.host.querySelector("[aria-invalid=true]")) text(this.wrong, "");
     this.points = points;
   }
 
   row(k) {
     const field = (what) => {
-      const made = make("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `Point ${k + 1}: ${what}` });
+      const made = make("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `Point ${k + 1}: ${what}`, "aria-describedby": "points-wrong" });
       made.addEventListener("change", () => { made.dataset.done = "1"; this.entered(k); });
       return made;
     };
@@ -186,7 +190,9 @@ export class PointTable {
     const { angleField, torqueField } = this.rows[k];
     const angle = typed(angleField.value) * Math.PI / 180, torque = typed(torqueField.value);
     for (const [field, value] of [[angleField, angle], [torqueField, torque]]) field.setAttribute("aria-invalid", String(Number.isNaN(value)));
-    if (!Number.isNaN(angle) && !Number.isNaN(torque)) this.act.move(k, angle, torque, true, performance.now());
+    const what = [Number.isNaN(angle) ? "angle" : "", Number.isNaN(torque) ? "torque" : ""].filter(Boolean).join(" and ");
+    text(this.wrong, what ? `Point ${k + 1}: the ${what} is no number. Write it like 12.5, without a unit.` : "");
+    if (!what) this.act.move(k, angle, torque, true, performance.now());
   }
 
   extend() {

@@ -66,6 +66,7 @@ const live = new Connection(receive, (words, lost) => {
   byId("connection").hidden = !words;
   text(byId("connection"), words);
   document.body.classList.toggle("lost", lost);
+  showState();
   fade();
   if (!lost) questions.again();
 });
@@ -237,6 +238,10 @@ function showNumbers(design) {
 
 // One of: computing, quick answer, checked answer, infeasible, failed; always in words too.
 function showState() {
+  if (document.body.classList.contains("lost")) {
+    showWords("not connected", "failed", answer ? "What is shown is the last answer that came. What is changed now is not computed." : "No design has come yet.");
+    return;
+  }
   if (!answer) return;
   const { design, conflicts } = answer;
   const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.");
@@ -267,13 +272,15 @@ function later() {
   if (waiting) return;
   waiting = setTimeout(() => {
     waiting = 0;
-    if (questions.busy) { showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
+    if (questions.busy && !document.body.classList.contains("lost")) { showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
   }, 250);
 }
 
 function fade(old = false) {
   const stale = old || document.body.classList.contains("lost") || answer === null || answer.stale || answer.state !== "solved";
-  for (const name of ["torque", "mechanism", "panels", "linear", "numbers"]) byId(name).classList.toggle("stale", stale);
+  for (const name of ["torque", "mechanism", "panels", "linear", "numbers", "limits", "sizes", "laws", "angle-bar"]) byId(name).classList.toggle("stale", stale);
+  // Observability and poles come when the hand rests.
+  if (answer?.design && !atAngle.holds(answer.design.revision, angle)) byId("linear").classList.add("stale");
 }
 
 // --- the angle ------------------------------------------------------------------------------------
@@ -295,6 +302,7 @@ function slider(angles) {
 function turn(next) {
   angle = next;
   cursor();
+  fade();
   ask({ what: "angle", angle, drag: "angle" });
 }
 
@@ -316,7 +324,7 @@ function cursor() {
 function showAngle(at) {
   if (at.mechanism) picture.show(at.mechanism);
   if (at.mechanism !== undefined) picture.explain(at.reason);
-  if (at.poles) atAngle.show(at);
+  if (at.poles) { atAngle.show(at); fade(); }
 }
 
 // --- gallery, files, keys -------------------------------------------------------------------------
@@ -330,7 +338,8 @@ function showGallery(message) {
   select.replaceChildren(make("option", { value: "", disabled: true }, "own deck"), group("deck", "decks"), group("template", "templates"));
   select.disabled = false;
   if (answer) select.value = cards.some((each) => each.name === answer.controls.title) ? answer.controls.title : "";
-  material.replaceChildren(make("option", { value: "" }, "that of the deck"), ...materials.map((name) => make("option", { value: name }, name)));
+  material.replaceChildren(make("option", { value: "" }, "that of the deck"), ...materials.map(({ name, reason }) =>
+    make("option", { value: name, disabled: reason !== "" }, reason ? `${name} (${reason})` : name)));
   if (answer) material.value = answer.controls.material;
   diagnosis.ready();
 }
@@ -355,6 +364,7 @@ for (const button of document.querySelectorAll("[data-file]")) {
     const wrong = await download(button.dataset.file);
     button.disabled = false;
     if (wrong) refuse({ reason: wrong });
+    else if (answer?.stale && button.dataset.file !== "design") refuse({ reason: `${button.textContent}: what was saved is the last good design, of an earlier question. The question of now has no design.` });
     else announce(`${button.textContent} is saved`);
   });
 }

@@ -59,13 +59,15 @@ export class Panels {
     margins.forEach((each, k) => {
       const row = this.bars.children[k];
       const used = each.upper ? each.value / each.bound : each.bound / each.value;
-      const share = Number.isFinite(used) ? Math.min(1.15, Math.max(0, used)) / 1.15 : 0;
+      // A radius below zero is a hollow: far beyond a least one, though the ratio is negative.
+      const broken = each.margin < -5e-4 * Math.abs(each.bound);
+      const share = broken ? 1 : Number.isFinite(used) ? Math.min(1.15, Math.max(0, used)) / 1.15 : 0;
       row.classList.toggle("active", each.active);
       nameText(row.children[0], each.of);
       row.children[0].title = each.limit;
-      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, unit(each), 3)}${each.active ? " · active" : ""}`);
+      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, unit(each), 3)}${broken ? " · BROKEN" : each.active ? " · active" : ""}`);
       row.children[2].firstChild.setAttribute("width", (300 * share).toFixed(1));
-      row.children[2].firstChild.setAttribute("class", used > 1.0005 ? "broken" : each.active ? "sits" : "free");
+      row.children[2].firstChild.setAttribute("class", broken ? "broken" : each.active ? "sits" : "free");
     });
   }
 
@@ -100,7 +102,7 @@ export class AtAngle {
     this.seen = card("Observability", "observability");
     this.seen.list = this.seen.place.appendChild(make("dl", { class: "numbers" }));
     this.poles = card("Poles of the plant", "poles");
-    this.poles.chart = new Chart(inner(this.poles.place), { title: "", x: { name: "real part", unit: "1/s" }, y: { name: "imaginary part", unit: "rad/s" }, height: 200, symlog: true });
+    this.poles.chart = new Chart(inner(this.poles.place), { title: "", x: { name: "real part, logarithmic,", unit: "1/s" }, y: { name: "imaginary part, log.,", unit: "rad/s" }, height: 200, symlog: true });
     this.loop = card("Torque loop", "loop");
     this.run = make("button", { type: "button", onclick: () => ask({ what: "work", name: "TorqueLoop" }) }, "Compute");
     this.loop.place.firstChild.append(this.run);
@@ -108,14 +110,20 @@ export class AtAngle {
     this.loop.phase = new Chart(inner(this.loop.place), { title: "Phase", x: { name: "frequency", unit: "Hz" }, y: { name: "phase in °", unit: "" }, height: 130, log: true });
   }
 
+  // Whether what is shown is that of a design at an angle.
+  holds(revision, angle) {
+    return this.at?.poles.revision === revision && Math.abs(this.at.angle - angle) < 1e-5;
+  }
+
   show(at) {
+    this.at = at;
     this.state(this.seen, at.observability, ({ verdict }) => verdict);
     const seen = at.observability.value;
     if (seen) {
       const rows = [["measured", seen.measured], ["rank", `${seen.rank} of ${seen.states}`], ["condition", plain(seen.condition, 3)]];
       this.seen.list.replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
     }
-    this.state(this.poles, at.poles, (groups) => groups.map((each) => each.words).join("; "));
+    this.state(this.poles, at.poles, (groups) => groups.map((each) => `${each.words}: ${poleWords(each)}`).join("; "));
     if (at.poles.value) this.poles.chart.show(at.poles.value.map((each, k) => ({ name: each.mode, x: each.real, y: each.imaginary, points: true, tone: TONES[k % 4] })));
     this.state(this.loop, at.loop, (loop) => `${loop.stable ? "Stable" : "UNSTABLE"} ${at.loop.message}: ${loop.words}.`);
     const loop = at.loop.value;
@@ -144,6 +152,12 @@ export class AtAngle {
     const said = { computing: `computing ${lazy.message}`, failed: `failed: ${lazy.message}`, cancelled: "stopped", "asked for later": "not computed yet" };
     text(card.state, done ? words(lazy.value) : said[lazy.state] ?? lazy.state);
   }
+}
+
+// Pairs once, as a person writes them.
+function poleWords({ real, imaginary }) {
+  const shown = real.map((re, k) => [re, imaginary[k]]).filter(([, im]) => im >= 0);
+  return `${shown.map(([re, im]) => (im > 0 ? `${plain(re, 3)} ± ${plain(im, 3)}i` : plain(re, 3))).join(", ")} in 1/s`;
 }
 
 function inner(place) {

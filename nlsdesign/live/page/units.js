@@ -60,7 +60,8 @@ export function editable(value) {
 // "1,5" is how many people type one and a half.
 export function typed(text) {
   const clean = text.trim().replace("−", "-").replace(",", ".");
-  return clean === "" || !/^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(clean) ? NaN : Number(clean);
+  const number = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(clean) ? Number(clean) : NaN;
+  return Number.isFinite(number) ? number : NaN;
 }
 
 function minus(text) {
