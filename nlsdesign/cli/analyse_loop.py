@@ -90,22 +90,24 @@ class _Evaluation:
 @deck_option
 @click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
               help="A PID, or speed by tangent stiffness.")  # fmt: skip
-@click.option("--bandwidth", type=Number("Hz"), default=None,
+@click.option("--bandwidth", type=Number("Hz", above=0.0), default=None,
               help="Of the scheduled law; by default 12 Hz at 1 kHz.")  # fmt: skip
-@click.option("--proportional", type=Number("rad/s/N/m"), default=None, help="Gain Kp of the torque loop.")
+@click.option("--proportional", type=Number("rad/s/N/m", above=0.0), default=None,
+              help="Gain Kp of the torque loop.")  # fmt: skip
 @click.option("--integral", type=Number("rad/s^2/N/m"), default=None, help="Gain Ki of the torque loop.")
 @click.option("--derivative", type=Number("rad/N/m"), default=None, help="Gain Kd of the torque loop.")
-@click.option("--amplitude", "amplitudes", type=Number("N*m"), multiple=True,
+@click.option("--amplitude", "amplitudes", type=Number("N*m", above=0.0), multiple=True,
               help="Of the desired torque; several times for several. By default a fifth and three fifths of "
               "the largest torque, half of that for a spring of one sign.")  # fmt: skip
 @click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
-@click.option("--load-inertia", "inertias", type=Number("kg*m^2"), multiple=True,
+@click.option("--load-inertia", "inertias", type=Number("kg*m^2", above=0.0), multiple=True,
               help="Of a free load; several times for several. By default from a tenth of the motor's to a "
               "thousand times.")  # fmt: skip
 @click.option("--load-amplitude", type=Number("deg"), default="10 deg", show_default=True,
               help="Of the load's angle where no torque is wanted.")  # fmt: skip
 @click.option("--delay", type=click.IntRange(0), default=1, show_default=True, help="In samples.")
-@click.option("--sample-time", type=Number("s"), default="1 ms", show_default=True, help="Of the controller.")
+@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+              help="Of the controller.")  # fmt: skip
 @out_option("out/loop", writes=_FILES)
 @json_option
 @click.pass_context

@@ -56,15 +56,17 @@ WIRE_HELP = (
 @click.option("--order", multiple=True, metavar="INSTANCE",
               help="Order in which sampled FMUs compute; without it all read before any computes. "
                    "Repeatable.")  # fmt: skip
-@click.option("--stop", type=Number("s"), required=True, help="End, for instance '5 s'.")
+@click.option("--stop", type=Number("s", above=0.0), required=True, help="End, for instance '5 s'.")
 @click.option(
-    "--step", type=Number("ms"), default=None, help="Longest communication step, for instance '1 ms'."
+    "--step", type=Number("ms", above=0.0), default=None,
+    help="Longest communication step, for instance '1 ms'.",
 )
 @click.option("--coupling", type=click.Choice(["extrapolated", "iterated", "held"]), default="extrapolated",
               show_default=True, help="Of continuous FMUs: second order, second order with roll-back, "
                                       "first order.")  # fmt: skip
 @click.option(
-    "--patience", type=Number("s"), default=30.0, help="Longest call into an FMU; '30 s' by default."
+    "--patience", type=Number("s", above=0.0), default=30.0,
+    help="Longest call into an FMU; '30 s' by default.",
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,
               help="Also halve the step so often and print how the signals converge.")  # fmt: skip
