@@ -11,7 +11,7 @@ import click
 
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
-from .range_remarks import range_remarks, warn
+from .range_remarks import range_remarks, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -99,7 +99,8 @@ class _Evaluation:
 @click.option("--amplitude", "amplitudes", type=Number("N*m", above=0.0), multiple=True,
               help="Of the desired torque; several times for several. By default a fifth and three fifths of "
               "the largest torque, half of that for a spring of one sign.")  # fmt: skip
-@click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
+@click.option("--to", "last", type=Number("deg", above=0.0), default=None,
+              help="Last angle; by default that of the contour, 50 deg at most.")  # fmt: skip
 @click.option("--load-inertia", "inertias", type=Number("kg*m^2", above=0.0), multiple=True,
               help="Of a free load; several times for several. By default from a tenth of the motor's to a "
               "thousand times.")  # fmt: skip
@@ -131,6 +132,8 @@ def loop(
 
     fixed, moved = _loops(deck_name, _law(options), options["delay"], options["sample_time"])
     names = ("amplitudes", "last", "inertias", "load_amplitude")
+    if options["last"] is None:
+        options["last"] = usual_last(fixed.plant)
     asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
     with Steps().step("evaluation of the loop"):
         result = _evaluated(fixed, moved, asked)

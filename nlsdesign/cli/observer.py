@@ -85,6 +85,9 @@ def observer(
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
+    drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
+    if drawn and not options["with_errors"]:
+        raise click.UsageError("--draws belongs to --errors; add it, or leave --draws out", ctx=context)
     kind, wanted = _what_is_asked(context, options)
     deck = load_deck(deck_name)
     declared = declare(deck)

@@ -62,6 +62,19 @@ def range_remarks(
     return remarks
 
 
+def usual_last(model: FlatModel) -> float:
+    """Return the angle to which a command goes that is not told: the end of the contour, 50° at most.
+
+    Parameters
+    ----------
+    model
+        Its cams say where a contour ends.
+    """
+    from ..observer.scheduling.scheduled import whole_contour
+
+    return min(math.radians(50.0), whole_contour(model).upper)
+
+
 def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:
     """Return which cams end before an angle.
 

@@ -42,3 +42,37 @@ def test_a_number_without_sense_is_refused_by_its_name(
     assert (status, out) == (2, "")
     assert said in err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("observer", "--deck", CAM, "--draws", "8"), "--draws belongs to --errors"),
+        (("observer", "calibrate", "--deck", CAM, "--plan", "--records", "."), "stands beside --plan"),
+        (("export", "modelica", "--deck", "dfki_pendulum", "--out", "x.txt"), "must end in .mo -> name it x.mo"),
+        (("export", "ssp", "--fmu", "a=b.fmu", "--out", "x.zip"), "must end in .ssp -> name it x.ssp"),
+        (("analyse", "loop", "--deck", CAM, "--proportional", "1 A/(N*m)"), "'A/N/m' for 'A/(N*m)'"),
+    ],
+)
+def test_what_would_be_ignored_or_misread_is_refused(
+    run: Run, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    status, out, err = run(*words)
+    assert (status, out) == (2, "")
+    assert said in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_path_with_quotes_is_a_path(run: Run, tmp_path: Path) -> None:
+    curve = "angle [deg],torque [N*m]\n0,0\n10,1\n20,3\n"
+    (tmp_path / "o'brien \"x\".csv").write_text(curve, encoding="utf8")
+    status, _, err = run("design", "--deck", CAM, "--target-file", "o'brien \"x\".csv", "--dry-run")
+    assert (status, err) == (0, "")
+
+
+def test_a_mapping_that_is_not_there_or_none_is_said_so(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t_s,current_A\n0,0\n", encoding="utf8")
+    (tmp_path / "deck.toml").write_text("[deck]\nname = 'a'\n", encoding="utf8")
+    words = ("simulate", "--deck", SOFT, "--record", "a.csv", "--mapping")
+    assert "-> name a records.toml" in run(*words, "no.toml")[2]
+    assert "no such field of a mapping of records -> use one of: columns" in run(*words, "deck.toml")[2]
