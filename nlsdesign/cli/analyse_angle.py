@@ -55,7 +55,13 @@ _HEADINGS = {
 @out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg", "report.html"))
 @json_option
 def analyse_angle(
-    deck_name: str, first: float, last: float | None, count: int, out: Path, as_json: bool, **roles: str | None
+    deck_name: str,
+    first: float,
+    last: float | None,
+    count: int,
+    out: Path,
+    as_json: bool,
+    **roles: str | None,
 ) -> None:
     """Poles sliding and stuck, exact angles that hide a state, and which sensor would help most."""
     import numpy as np

@@ -26,7 +26,9 @@ _LAW = click.option(
     help="Of the controller: speed by tangent stiffness, or a PID.",
 )
 _BANDWIDTH = click.option(
-    "--bandwidth", type=Number("Hz", above=0.0), default=None,
+    "--bandwidth",
+    type=Number("Hz", above=0.0),
+    default=None,
     help="Of the scheduled law; by default 12 Hz at 1 kHz.",
 )
 _VELOCITY_BANDWIDTH = click.option(

@@ -58,14 +58,18 @@ WIRE_HELP = (
                    "Repeatable.")  # fmt: skip
 @click.option("--stop", type=Number("s", above=0.0), required=True, help="End, for instance '5 s'.")
 @click.option(
-    "--step", type=Number("ms", above=0.0), default=None,
+    "--step",
+    type=Number("ms", above=0.0),
+    default=None,
     help="Longest communication step, for instance '1 ms'.",
 )
 @click.option("--coupling", type=click.Choice(["extrapolated", "iterated", "held"]), default="extrapolated",
               show_default=True, help="Of continuous FMUs: second order, second order with roll-back, "
                                       "first order.")  # fmt: skip
 @click.option(
-    "--patience", type=Number("s", above=0.0), default=30.0,
+    "--patience",
+    type=Number("s", above=0.0),
+    default=30.0,
     help="Longest call into an FMU; '30 s' by default.",
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,

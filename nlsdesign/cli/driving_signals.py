@@ -179,8 +179,8 @@ def read_inputs(model: FlatModel, given: Sequence[str]) -> dict[str, Sine | Step
 def check_rows(inputs: Mapping[str, Any], stop: float, step: float) -> None:
     """Refuse sines that the rows of a run cannot show, and steps that come after its end.
 
-    The machine is driven by the sine itself, but table, picture and sizes know the rows alone: with fewer than
-    four to a period they show another signal.
+    The machine is driven by the sine itself, but table, picture and sizes know the rows alone: with fewer
+    than four to a period they show another signal.
 
     Parameters
     ----------
@@ -208,7 +208,8 @@ def check_rows(inputs: Mapping[str, Any], stop: float, step: float) -> None:
             )
         if isinstance(signal, StepAt) and signal.begin >= stop:
             raise ValueRangeError(
-                f"--input {name}: step at {signal.begin:g} s", f"comes after the run, which ends at {stop:g} s",
+                f"--input {name}: step at {signal.begin:g} s",
+                f"comes after the run, which ends at {stop:g} s",
                 next_step="give a longer --stop, or an earlier step",
             )  # fmt: skip
 

@@ -35,9 +35,9 @@ def range_options(command: Any) -> Any:
         Gets ``angles``, ``speed`` and ``angle_error``; ``None`` where they are not given.
     """
     for option in (
-        click.option("--angle-error", type=Number("rad", above=0.0), help="Largest error of the measured angle; half a "
+        click.option("--angle-error", type=Number("rad"), help="Largest error of the measured angle; half a "
                      "count of the deck's encoder by default."),
-        click.option("--speed", type=Number("rad/s", above=0.0), help="Largest speed; 20 rad/s by default."),
+        click.option("--speed", type=Number("rad/s"), help="Largest speed; 20 rad/s by default."),
         click.option("--angles", type=Number("rad"), nargs=2, metavar="LOW HIGH", help="Range of the angle, "
                      "such as --angles '-46 deg' '46 deg'; the whole table by default."),
     ):  # fmt: skip

@@ -23,8 +23,14 @@ SIMULATE = ("simulate", "--deck", SOFT, "--stop", "1 s", "--input")
         (("simulate", "--deck", SOFT, "--stop", "nan s"), "--stop: nan s: a quantity must be finite"),
         ((*SIMULATE, "motor.current=2 A sine 5 kHz"), "0.2 rows to a period"),
         ((*SIMULATE, "motor.current=2 A step 5 s"), "comes after the run"),
-        (("simulate", "--deck", SOFT, "--stop", "1 s", "--step", "2 s"), "--step 2 s: is longer than the run"),
-        (("analyse", "loop", "--deck", CAM, "--law", "scheduled", "--bandwidth", "0 Hz"), "--bandwidth '0 Hz'"),
+        (
+            ("simulate", "--deck", SOFT, "--stop", "1 s", "--step", "2 s"),
+            "--step 2 s: is longer than the run",
+        ),
+        (
+            ("analyse", "loop", "--deck", CAM, "--law", "scheduled", "--bandwidth", "0 Hz"),
+            "--bandwidth '0 Hz'",
+        ),
         (("fit", "--deck", SOFT, "--records", ".", "--window", "-1 s"), "--window '-1 s'"),
         (("diagnose", "--deck", SOFT, "--records", ".", "--sample-time", "0 s"), "--sample-time '0 s'"),
         (("cosimulate", "--fmu", "a=b", "--stop", "0 s", "--out", "x.csv"), "--stop '0 s'"),
@@ -49,7 +55,10 @@ def test_a_number_without_sense_is_refused_by_its_name(
     [
         (("observer", "--deck", CAM, "--draws", "8"), "--draws belongs to --errors"),
         (("observer", "calibrate", "--deck", CAM, "--plan", "--records", "."), "stands beside --plan"),
-        (("export", "modelica", "--deck", "dfki_pendulum", "--out", "x.txt"), "must end in .mo -> name it x.mo"),
+        (
+            ("export", "modelica", "--deck", "dfki_pendulum", "--out", "x.txt"),
+            "must end in .mo -> name it x.mo",
+        ),
         (("export", "ssp", "--fmu", "a=b.fmu", "--out", "x.zip"), "must end in .ssp -> name it x.ssp"),
         (("analyse", "loop", "--deck", CAM, "--proportional", "1 A/(N*m)"), "'A/N/m' for 'A/(N*m)'"),
     ],
@@ -65,8 +74,8 @@ def test_what_would_be_ignored_or_misread_is_refused(
 
 def test_a_path_with_quotes_is_a_path(run: Run, tmp_path: Path) -> None:
     curve = "angle [deg],torque [N*m]\n0,0\n10,1\n20,3\n"
-    (tmp_path / "o'brien \"x\".csv").write_text(curve, encoding="utf8")
-    status, _, err = run("design", "--deck", CAM, "--target-file", "o'brien \"x\".csv", "--dry-run")
+    (tmp_path / 'o\'brien "x".csv').write_text(curve, encoding="utf8")
+    status, _, err = run("design", "--deck", CAM, "--target-file", 'o\'brien "x".csv', "--dry-run")
     assert (status, err) == (0, "")
 
 
@@ -75,4 +84,4 @@ def test_a_mapping_that_is_not_there_or_none_is_said_so(run: Run, tmp_path: Path
     (tmp_path / "deck.toml").write_text("[deck]\nname = 'a'\n", encoding="utf8")
     words = ("simulate", "--deck", SOFT, "--record", "a.csv", "--mapping")
     assert "-> name a records.toml" in run(*words, "no.toml")[2]
-    assert "no such field of a mapping of records -> use one of: columns" in run(*words, "deck.toml")[2]
+    assert "no such field -> use one of: time, columns" in run(*words, "deck.toml")[2]

@@ -115,7 +115,9 @@ def test_another_gear_ratio_carries_the_count_of_an_encoder_on_the_rotor_with_it
     for more in ((), at_rotor):
         assert run(*words, *more, "--force")[0] == 0
         count = declare(load_deck(tmp_path / "a.toml")).quantities()["motor_encoder.quantum"]
-        assert count.number == pytest.approx(2.0 * math.pi / 4096 / 50, rel=5e-3), "4096 counts, over the gear"
+        assert count.number == pytest.approx(2.0 * math.pi / 4096 / 50, rel=5e-3), (
+            "4096 counts, over the gear"
+        )
         assert count.source.endswith("times 10/50, for another gear ratio")
     assert run(*words, "--set", "motor_encoder.quantum=1 mrad", "--force")[0] == 0
     assert declare(load_deck(tmp_path / "a.toml")).quantities()["motor_encoder.quantum"].number == 1e-3
@@ -146,7 +148,11 @@ def test_another_gear_ratio_carries_the_inertia_at_the_output_with_it(run: Run, 
         (("--template", "cam-actuator", "--set", "motor.gear_ratio=3 kg"), 2, "write '3'"),
         (("--template", "cam-actuator", "--set", "motor.gear_ratio"), 2, "NAME=VALUE"),
         (("--template", "cam-actuator", "--set", "motor.gear_ratio="), 2, "--set motor.gear_ratio: ''"),
-        (("--template", "cam-actuator", "--set", "motor.gear_ratio=0"), 2, "motor.gear_ratio: gear_ratio = 0"),
+        (
+            ("--template", "cam-actuator", "--set", "motor.gear_ratio=0"),
+            2,
+            "motor.gear_ratio: gear_ratio = 0",
+        ),
         (
             ("--template", "cam-actuator", "--set", "motor.gear_ratio=5", "--set", "motor.gear_ratio=6"),
             2,

@@ -205,7 +205,8 @@ def _target(deck: Deck) -> Target | TaskTarget:
         rule = f"has {len(table)} entries, a design has one target" if table else "none is given"
         raise DeckError(
             deck.place("target"), rule,
-            next_step=f'{"keep" if table else "write"} one of: file = "...", TaskTarget, {", ".join(kinds(Target))}',
+            next_step=f'{"keep" if table else "write"} one of: file = "...", '
+                      f'TaskTarget, {", ".join(kinds(Target))}',
         )  # fmt: skip
     ((name, given),) = table.items()
     if name == "file":

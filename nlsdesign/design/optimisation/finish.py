@@ -296,9 +296,10 @@ def _blocks(solved: SolvedSearch) -> Iterator[str]:
         stiffer = 2.0 * (width * thickness / (2.0 * (width + thickness) * length)) ** 2
         if stiffer > _STIFFER:
             yield (
-                f"{piece.name}: {1e3 * length:.3g} mm long with a section of {1e6 * width * thickness:.4g} mm² is "
-                f"a block, no strip: clamped ends make it about {1.0 + stiffer:.2g} times as stiff as its law "
-                f"says -> ask for a longer one (RestLengthRange), more elements or thinner strips, or measure it"
+                f"{piece.name}: {1e3 * length:.3g} mm long with {1e6 * width * thickness:.4g} mm² of section "
+                f"is a block, no strip: clamped ends make it about {1.0 + stiffer:.2g} times as stiff as its "
+                f"law says -> ask for a longer one (RestLengthRange), more elements or thinner strips, or "
+                f"measure it"
             )
 
 

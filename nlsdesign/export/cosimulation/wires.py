@@ -221,7 +221,10 @@ def gain_to(descriptions: Mapping[str, FmuDescription], target: str, wire: Wire)
     if not isinstance(wire.gain, Quantity):
         if (to.factor, to.mechanical) != (of.factor, of.mechanical):
             unit = f"{names[0] or 1}/{(names[1] or '1').replace('*', '/').replace('.', '/')}"
-            hint = f"give the gain a unit: {wire.source}*'1 {unit}' in a shell, nls.quantity(1, '{unit}') in Python"
+            hint = (
+                f"give the gain a unit: '{target}={wire.source}*1 {unit}' behind --wire, "
+                f"nls.quantity(1, '{unit}') in Python"
+            )
             raise _apart(target, wire.source, names, hint)
         return number
     by = parse_unit(wire.gain.unit)

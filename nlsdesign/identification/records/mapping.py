@@ -210,7 +210,7 @@ def _check_fields(where: str, given: Mapping[str, Any], known: Sequence[str], be
     for key in given:
         if key not in known:
             raise MeasurementError(
-                f"{where}{between}{key}", "no such field of a mapping of records",
+                f"{where}{between}{key}", "no such field",
                 did_you_mean=nearest(key, known), next_step=f"use one of: {', '.join(known)}",
             )  # fmt: skip
 
