@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ValueRangeError
 from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
@@ -20,7 +19,7 @@ from .output import (
     spring_option,
 )
 from .overwriting import out_option
-from .range_remarks import range_remarks, swept_angle, usual_last, warn
+from .range_remarks import check_angles, range_remarks, swept_angle, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ _HEADINGS = {
 @click.option("--to", "last", type=Number("deg"), default=None,
               help="Last angle; by default that of the contour, 50 deg at most.")  # fmt: skip
 @click.option(
-    "--count", type=click.IntRange(min=2), default=26, show_default=True, help="Number of angles, at least 2."
+    "--count", type=click.IntRange(2, 100_000), default=26, show_default=True, help="Number of angles, at least 2."
 )
 @measured_option
 @spring_option
@@ -79,8 +78,7 @@ def analyse_angle(
     model = flatten(declared)
     torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
     last = usual_last(model) if last is None else last
-    if not last > first:
-        raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
+    check_angles(first, last)
     angles = np.linspace(first, last, count)
     ranking, unranked = _ranking(model, angles, measured, torque)
     views: list[View] = [Observability(measured=(measured,)), Stability(torque=torque)]

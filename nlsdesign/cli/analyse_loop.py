@@ -11,7 +11,7 @@ import click
 
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
-from .range_remarks import range_remarks, usual_last, warn
+from .range_remarks import check_angles, range_remarks, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class _Evaluation:
               "thousand times.")  # fmt: skip
 @click.option("--load-amplitude", type=Number("deg"), default="10 deg", show_default=True,
               help="Of the load's angle where no torque is wanted.")  # fmt: skip
-@click.option("--delay", type=click.IntRange(0), default=1, show_default=True, help="In samples.")
+@click.option("--delay", type=click.IntRange(0, 100), default=1, show_default=True, help="In samples.")
 @click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
               help="Of the controller.")  # fmt: skip
 @out_option("out/loop", writes=_FILES)
@@ -134,6 +134,7 @@ def loop(
     names = ("amplitudes", "last", "inertias", "load_amplitude")
     if options["last"] is None:
         options["last"] = usual_last(fixed.plant)
+    check_angles(0.0, options["last"])
     asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
     with Steps().step("evaluation of the loop"):
         result = _evaluated(fixed, moved, asked)
