@@ -254,6 +254,11 @@ def load_deck(name: str | Path) -> Deck:
             inside = path / "model.toml"
             if is_there(inside):
                 raise DeckError(f"deck '{name}'", "is a folder", next_step=f"name the deck in it: {inside}")
+            if is_there(path) and path.is_file():
+                raise DeckError(
+                    f"deck '{name}'", "is a file whose name does not end in .toml",
+                    next_step="give a deck, which is a .toml file, or the name of one of the project",
+                )  # fmt: skip
             raise unknown_name("deck", str(name), deck_names())
         path = folder("models") / "decks" / f"{name}.toml"
     if not is_there(path):

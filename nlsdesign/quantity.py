@@ -112,9 +112,12 @@ def parse_unit(text: str) -> Unit:
     Raises
     ------
     UnitError
-        If a symbol is not known.
+        If a symbol is not known, or there are brackets.
     """
     factor, exponents = 1.0, [0] * len(BASE)
+    if "(" in text or ")" in text:
+        step = "write a product below the line as two quotients: 'A/N/m' for 'A/(N*m)'"
+        raise UnitError(f"unit '{text}'", "has brackets, which units do without", next_step=step)
     pieces = re.split(r"([*·/])", text.strip().translate(_TO_ASCII).replace(" ", ""))
     sign = 1
     for piece in pieces:

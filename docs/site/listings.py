@@ -14,7 +14,7 @@ _PAGE = """<!DOCTYPE html>
 """
 _STYLE = """
 :root {{ color-scheme: light dark; }}
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1rem; }}
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 1rem; overflow-wrap: anywhere; }}
 main {{ overflow-x: auto; }}
 pre {{ font: 13px/1.45 ui-monospace, monospace; margin: 0; }}
 .linenos {{ opacity: .7; padding-right: 1em; }}

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import ValueRangeError
 from ..quantity import typeset_unit
 from ..writing import make_folder
 from .output import (
@@ -20,7 +19,7 @@ from .output import (
     spring_option,
 )
 from .overwriting import out_option
-from .range_remarks import range_remarks, swept_angle, warn
+from .range_remarks import check_angles, range_remarks, swept_angle, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -45,16 +44,27 @@ _HEADINGS = {
 )
 @deck_option
 @click.option("--from", "first", type=Number("deg"), default="0 deg", show_default=True, help="First angle.")
-@click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
+@click.option("--to", "last", type=Number("deg"), default=None,
+              help="Last angle; by default that of the contour, 50 deg at most.")  # fmt: skip
 @click.option(
-    "--count", type=click.IntRange(min=2), default=26, show_default=True, help="Number of angles, at least 2."
+    "--count",
+    type=click.IntRange(2, 100_000),
+    default=26,
+    show_default=True,
+    help="Number of angles, at least 2.",
 )
 @measured_option
 @spring_option
 @out_option("out/analysis", writes=("over_angle.csv", "poles.svg", "observability.svg", "report.html"))
 @json_option
 def analyse_angle(
-    deck_name: str, first: float, last: float, count: int, out: Path, as_json: bool, **roles: str | None
+    deck_name: str,
+    first: float,
+    last: float | None,
+    count: int,
+    out: Path,
+    as_json: bool,
+    **roles: str | None,
 ) -> None:
     """Poles sliding and stuck, exact angles that hide a state, and which sensor would help most."""
     import numpy as np
@@ -71,8 +81,8 @@ def analyse_angle(
     declared = declare(load_deck(deck_name))
     model = flatten(declared)
     torque, measured = series_spring(model, roles["spring"]).effort, swept_angle(model, roles["measured"])
-    if not last > first:
-        raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
+    last = usual_last(model) if last is None else last
+    check_angles(first, last)
     angles = np.linspace(first, last, count)
     ranking, unranked = _ranking(model, angles, measured, torque)
     views: list[View] = [Observability(measured=(measured,)), Stability(torque=torque)]

@@ -11,7 +11,7 @@ import click
 
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
-from .range_remarks import range_remarks, warn
+from .range_remarks import check_angles, range_remarks, usual_last, warn
 from .units import Number
 
 if TYPE_CHECKING:
@@ -90,22 +90,25 @@ class _Evaluation:
 @deck_option
 @click.option("--law", type=click.Choice(list(GAINS)), default="pid", show_default=True,
               help="A PID, or speed by tangent stiffness.")  # fmt: skip
-@click.option("--bandwidth", type=Number("Hz"), default=None,
+@click.option("--bandwidth", type=Number("Hz", above=0.0), default=None,
               help="Of the scheduled law; by default 12 Hz at 1 kHz.")  # fmt: skip
-@click.option("--proportional", type=Number("rad/s/N/m"), default=None, help="Gain Kp of the torque loop.")
+@click.option("--proportional", type=Number("rad/s/N/m", above=0.0), default=None,
+              help="Gain Kp of the torque loop.")  # fmt: skip
 @click.option("--integral", type=Number("rad/s^2/N/m"), default=None, help="Gain Ki of the torque loop.")
 @click.option("--derivative", type=Number("rad/N/m"), default=None, help="Gain Kd of the torque loop.")
-@click.option("--amplitude", "amplitudes", type=Number("N*m"), multiple=True,
+@click.option("--amplitude", "amplitudes", type=Number("N*m", above=0.0), multiple=True,
               help="Of the desired torque; several times for several. By default a fifth and three fifths of "
               "the largest torque, half of that for a spring of one sign.")  # fmt: skip
-@click.option("--to", "last", type=Number("deg"), default="50 deg", show_default=True, help="Last angle.")
-@click.option("--load-inertia", "inertias", type=Number("kg*m^2"), multiple=True,
+@click.option("--to", "last", type=Number("deg", above=0.0), default=None,
+              help="Last angle; by default that of the contour, 50 deg at most.")  # fmt: skip
+@click.option("--load-inertia", "inertias", type=Number("kg*m^2", above=0.0), multiple=True,
               help="Of a free load; several times for several. By default from a tenth of the motor's to a "
               "thousand times.")  # fmt: skip
 @click.option("--load-amplitude", type=Number("deg"), default="10 deg", show_default=True,
               help="Of the load's angle where no torque is wanted.")  # fmt: skip
-@click.option("--delay", type=click.IntRange(0), default=1, show_default=True, help="In samples.")
-@click.option("--sample-time", type=Number("s"), default="1 ms", show_default=True, help="Of the controller.")
+@click.option("--delay", type=click.IntRange(0, 100), default=1, show_default=True, help="In samples.")
+@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+              help="Of the controller.")  # fmt: skip
 @out_option("out/loop", writes=_FILES)
 @json_option
 @click.pass_context
@@ -129,6 +132,9 @@ def loop(
 
     fixed, moved = _loops(deck_name, _law(options), options["delay"], options["sample_time"])
     names = ("amplitudes", "last", "inertias", "load_amplitude")
+    if options["last"] is None:
+        options["last"] = usual_last(fixed.plant)
+    check_angles(0.0, options["last"])
     asked = _Asked(**{name: options[name] for name in names}, gain=GAINS[options["law"]])
     with Steps().step("evaluation of the loop"):
         result = _evaluated(fixed, moved, asked)

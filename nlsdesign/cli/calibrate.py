@@ -69,6 +69,10 @@ def calibrate(
     from ..deck import load_deck
     from ..progress import Steps
 
+    if plan and folders:
+        raise MeasurementError(
+            "--records", "stands beside --plan, which reads none", next_step="leave one of both out"
+        )
     deck = load_deck(deck_name)
     actuator = declare(deck)
     prior = read_joint_numbers(known) if known else None

@@ -26,11 +26,14 @@ _LAW = click.option(
     help="Of the controller: speed by tangent stiffness, or a PID.",
 )
 _BANDWIDTH = click.option(
-    "--bandwidth", type=Number("Hz"), default=None, help="Of the scheduled law; by default 12 Hz at 1 kHz."
+    "--bandwidth",
+    type=Number("Hz", above=0.0),
+    default=None,
+    help="Of the scheduled law; by default 12 Hz at 1 kHz.",
 )
 _VELOCITY_BANDWIDTH = click.option(
     "--velocity-bandwidth",
-    type=Number("Hz"),
+    type=Number("Hz", above=0.0),
     default=None,
     help="Of the velocity loop inside; by default 45 Hz at 1 kHz.",
 )
@@ -88,7 +91,7 @@ def controller_of(
 )
 @deck_option
 @law_options
-@click.option("--sample-time", type=Number("ms"), default="1 ms", show_default=True,
+@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
               help="Of what is computed in steps.")  # fmt: skip
 @out_option(
     "out/controller",

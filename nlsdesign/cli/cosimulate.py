@@ -56,15 +56,21 @@ WIRE_HELP = (
 @click.option("--order", multiple=True, metavar="INSTANCE",
               help="Order in which sampled FMUs compute; without it all read before any computes. "
                    "Repeatable.")  # fmt: skip
-@click.option("--stop", type=Number("s"), required=True, help="End, for instance '5 s'.")
+@click.option("--stop", type=Number("s", above=0.0), required=True, help="End, for instance '5 s'.")
 @click.option(
-    "--step", type=Number("ms"), default=None, help="Longest communication step, for instance '1 ms'."
+    "--step",
+    type=Number("ms", above=0.0),
+    default=None,
+    help="Longest communication step, for instance '1 ms'.",
 )
 @click.option("--coupling", type=click.Choice(["extrapolated", "iterated", "held"]), default="extrapolated",
               show_default=True, help="Of continuous FMUs: second order, second order with roll-back, "
                                       "first order.")  # fmt: skip
 @click.option(
-    "--patience", type=Number("s"), default=30.0, help="Longest call into an FMU; '30 s' by default."
+    "--patience",
+    type=Number("s", above=0.0),
+    default=30.0,
+    help="Longest call into an FMU; '30 s' by default.",
 )
 @click.option("--halvings", type=click.IntRange(2, 10), default=None,
               help="Also halve the step so often and print how the signals converge.")  # fmt: skip
@@ -90,6 +96,8 @@ def cosimulation(stop: float, halvings: int | None, out: Path, as_json: bool, **
         system = _system(given, Path(folder))
         inputs = pairs("--input", given["inputs"], _signal)
         stepping = _stepping(given["step"], given["coupling"], given["patience"], steps)
+        if given["signals"]:  # before the work
+            _check_globs(given["signals"], [*system.recorded(), *inputs])
         with steps.step("co-simulation"):
             run = system.run(inputs=inputs, stop=stop, stepping=stepping)
         study = None
@@ -115,7 +123,7 @@ def _system(given: Mapping[str, Any], folder: Path) -> FmuSystem:
     own = FmuSystem(
         fmus=pairs("--fmu", given["fmus"], Path),
         wires=pairs("--wire", given["wires"], read_wire),
-        parameters=pairs("--set", given["parameters"], float),
+        parameters=pairs("--set", given["parameters"], _finite),
         order=given["order"],
     )
     if given["system"] is None:
@@ -173,12 +181,15 @@ def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[st
     return content
 
 
-def _listed(run: CoSimulation, globs: tuple[str, ...]) -> list[str]:
-    """Return the names that fit one of the globs; without a glob inputs and outputs, but no items of rows."""
-    names = list(run.trace.signals)
+def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
     for each in globs:
         if not fnmatch.filter(names, each):
             raise unknown_name("--signals", each, names)
+
+
+def _listed(run: CoSimulation, globs: tuple[str, ...]) -> list[str]:
+    """Return the names that fit one of the globs; without a glob inputs and outputs, but no items of rows."""
+    names = list(run.trace.signals)
     if globs:
         return [n for n in names if any(fnmatch.fnmatchcase(n, each) for each in globs)]
     return [n for n in names if n in run.ends and not n.endswith("]")] or names
@@ -302,4 +313,11 @@ def _signal(text: str) -> Sine:
     from ..simulation import Sine
 
     size, at, frequency = text.partition("@")
-    return Sine(float(size), float(frequency)) if at else Sine(0.0, 0.0, float(size))
+    return Sine(_finite(size), _finite(frequency)) if at else Sine(0.0, 0.0, _finite(size))
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError
+    return number

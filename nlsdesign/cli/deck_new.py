@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,6 +60,8 @@ def new(
     from ..components.assembly.deck_writer import declare
     from ..deck import read_deck, template_names
 
+    if path.endswith(("/", os.sep)) or not Path(path).name.strip("."):
+        raise click.BadParameter(f"'{path}' is no name of a file, for instance leg.toml")
     file = Path(path) if path.endswith(".toml") else Path(f"{path}.toml")
     refuse_to_replace(file, force)
     asking = not (yes or others["as_json"]) and on_terminal()
@@ -84,7 +88,7 @@ def new(
         click.echo(f"warning: {remark}")
     commands = ", ".join(map(shown_command, chosen.ready_for))
     click.echo(f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {commands}")
-    click.echo(f"next: nlsdesign deck check {file}")
+    click.echo(f"next: nlsdesign deck check {shlex.quote(str(file))}")
 
 
 def on_terminal() -> bool:
@@ -131,8 +135,13 @@ def _given(template: DeckTemplate, given: tuple[str, ...]) -> dict[str, Quantity
         known = template.deck.numbers()
         if name not in known:
             raise unknown_name(f"template {template.name}: number", name, known)
+        if name in numbers:
+            raise click.BadParameter(f"'{name}' is set twice; remove one")
         usual = template.deck.quantity(name)
-        numbers[name] = _read(value, usual, GIVEN)
+        try:
+            numbers[name] = _read(value, usual, GIVEN)
+        except NlsError as error:
+            raise error.at(f"--set {name}") from None
     return numbers
 
 
@@ -167,7 +176,7 @@ def _inertia(
         raise click.UsageError(f"template {template.name} has no motor with a gear; leave --inertia out")
     ratio = numbers.get(at.ratio, template.deck.quantity(at.ratio))
     given = _read(text, template.deck.quantity(at.name), GIVEN)
-    return {at.name: at.converted(given, at=place, ratio=ratio)}
+    return template.carried(at, numbers) | {at.name: at.converted(given, at=place, ratio=ratio)}
 
 
 def _asked_material(template: DeckTemplate) -> str | None:
@@ -203,6 +212,9 @@ def _asked(
         if at is not None and question.name == at.name:
             about = question
             continue
+        if at is not None:
+            usual = template.carried(at, {**known, **answers}).get(question.name, question.usual)
+            question = AskedNumber(question.name, question.meaning, usual)
         answers |= _answer(question)
     if about is not None and at is not None:
         ratio = {**known, **answers}.get(at.ratio, template.deck.quantity(at.ratio))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -68,7 +69,7 @@ def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:
     if as_json:
         show_json({"file": out, "deck": read.name})
         return
-    click.echo(f"written: {out}; next: nlsdesign deck check {out}")
+    click.echo(f"written: {out}; next: nlsdesign deck check {shlex.quote(str(out))}")
 
 
 @deck.command(
@@ -184,7 +185,7 @@ def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
     if as_json:
         show_json({"file": out, "numbers": numbers})
         return
-    click.echo(f"written: {out}, {numbers} numbers; next: nlsdesign diagnose --deck {out}")
+    click.echo(f"written: {out}, {numbers} numbers; next: nlsdesign diagnose --deck {shlex.quote(str(out))}")
 
 
 def _short(given: Quantity) -> str:

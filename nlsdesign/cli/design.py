@@ -161,13 +161,13 @@ def _as_text(given: dict[str, Any]) -> str:
                 raise ValueRangeError(
                     f"--{option} '{text}'", "is not NAME = {...}", next_step=f"write {form}"
                 )
-    quoted = ", ".join(f'"{name}"' for name in given["free"])
+    quoted = ", ".join(map(_quoted, given["free"]))
     lines = [f"free = [{quoted}]"] if quoted else []
     targets = []
     if given["target"]:
         targets.append(str(given["target"]))
     if given["target_file"]:
-        targets.append(f"file = '{given['target_file'].absolute()}'")
+        targets.append(f"file = {_quoted(str(given['target_file'].absolute()))}")
     if given["maximum"] or given["angle"]:
         if not (given["maximum"] and given["angle"]):
             raise ValueRangeError(
@@ -181,9 +181,21 @@ def _as_text(given: dict[str, Any]) -> str:
             f'ExponentialTorque = {{maximum = "{given["maximum"]}", angle = "{given["angle"]}", '
             f"shape = {given['shape']}}}"
         )
+    if not targets:
+        raise ValueRangeError(
+            "no target", "is given",
+            next_step='write --maximum "5 N·m" --angle "53 deg", or --target, --target-file or --task',
+        )  # fmt: skip
     for head, rows in (("target", targets), *((f"{k}s", given[k]) for k in ("limit", "goal"))):
         lines += [f"[{head}]", *rows]
     return "\n".join([*lines, "[stock]", *given["stock"]]) + "\n"
+
+
+def _quoted(text: str) -> str:
+    """Return a text as TOML, whatever quotes and backslashes are in it."""
+    import json
+
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _searched(job: DesignJob, given: dict[str, Any]) -> DesignJob:

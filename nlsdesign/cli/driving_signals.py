@@ -24,6 +24,9 @@ _WAVE = re.compile(r"\s(?:sine|step)\s|@")
 FORMS = "'2 A', '2 A sine 5 Hz', '2@5', '1 A + 2 A sine 5 Hz' or '2 A step 0.1 s'"
 
 
+_ROWS_OF_A_PERIOD = 4
+
+
 @dataclass(frozen=True)
 class StepAt:
     """Zero, and from a time on a constant.
@@ -171,6 +174,44 @@ def read_inputs(model: FlatModel, given: Sequence[str]) -> dict[str, Sine | Step
         except NlsError as error:
             raise error.at(f"--input {name}") from None
     return inputs | _rates_of(model, inputs)
+
+
+def check_rows(inputs: Mapping[str, Any], stop: float, step: float) -> None:
+    """Refuse sines that the rows of a run cannot show, and steps that come after its end.
+
+    The machine is driven by the sine itself, but table, picture and sizes know the rows alone: with fewer
+    than four to a period they show another signal.
+
+    Parameters
+    ----------
+    inputs
+        By name; what is neither sine nor step is passed over.
+    stop
+        End of the run in s.
+    step
+        Between two rows in s.
+
+    Raises
+    ------
+    ValueRangeError
+        If a period has fewer than four rows, or a step begins at the end or later.
+    """
+    from ..simulation import Sine
+
+    for name, signal in inputs.items():
+        if isinstance(signal, Sine) and step * abs(signal.frequency) > (1.0 + 1e-9) / _ROWS_OF_A_PERIOD:
+            raise ValueRangeError(
+                f"--input {name}: {signal.frequency:g} Hz",
+                f"has {1.0 / (step * abs(signal.frequency)):.2g} rows to a period, at least "
+                f"{_ROWS_OF_A_PERIOD} are needed",
+                next_step=f"write --step '{50.0 / abs(signal.frequency):.2g} ms'",
+            )
+        if isinstance(signal, StepAt) and signal.begin >= stop:
+            raise ValueRangeError(
+                f"--input {name}: step at {signal.begin:g} s",
+                f"comes after the run, which ends at {stop:g} s",
+                next_step="give a longer --stop, or an earlier step",
+            )  # fmt: skip
 
 
 def _check_input(where: str, name: str, model: FlatModel) -> None:

@@ -18,7 +18,7 @@ from .overwriting import out_file_option
     ),
 )
 @deck_option
-@out_file_option(None, "File to write, NAME.mo.")
+@out_file_option(None, "File to write, NAME.mo.", ending=".mo")
 @click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
 @click.option(
     "--output",

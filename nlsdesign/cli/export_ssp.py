@@ -27,7 +27,7 @@ from .overwriting import out_file_option
 )
 @click.option("--version", type=click.Choice(["1.0", "2.0"]), default="1.0", show_default=True,
               help="Of the standard.")  # fmt: skip
-@out_file_option(None, "File to write.")
+@out_file_option(None, "File to write, NAME.ssp.", ending=".ssp")
 @json_option
 def export_ssp(version: str, out: Path, as_json: bool, **given: tuple[str, ...]) -> None:
     """Write FMUs and their wires as one SSP archive, which other tools and 'cosimulate --system' run."""

@@ -46,7 +46,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
 @click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
-@click.option("--window", type=Number("s"), default=None,
+@click.option("--window", type=Number("s", above=0.0), default=None,
               help="Simulate the whole model over windows instead, for instance '1 s'.")  # fmt: skip
 @export_option
 @sample_time_option

@@ -39,7 +39,7 @@ def flash_options(command: F) -> F:
         "for it, and what that costs is said.",
     )(command)  # fmt: skip
     return click.option(
-        "--table-error", type=Number("N*m"), metavar="TORQUE",
+        "--table-error", type=Number("N*m", above=0.0), metavar="TORQUE",
         help="Torque error that the table may cause, for instance 1mN.m.  [default: 0.02 % of the largest "
         "torque]",
     )(command)  # fmt: skip

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .observer_certificate import ToProve
 
 sample_time_option = click.option(
-    "--sample-time", type=Number("ms"), default="1 ms", show_default=True,
+    "--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
     help="Of what is computed in steps.",
 )  # fmt: skip
 real_option = click.option(
@@ -85,6 +85,9 @@ def observer(
     from .observer_certificate import prove, with_statement, write_proved
     from .observer_spread import content_of, show_errors, spread_errors, write_errors
 
+    drawn = context.get_parameter_source("draws") is not click.core.ParameterSource.DEFAULT
+    if drawn and not options["with_errors"]:
+        raise click.UsageError("--draws belongs to --errors; add it, or leave --draws out", ctx=context)
     kind, wanted = _what_is_asked(context, options)
     deck = load_deck(deck_name)
     declared = declare(deck)

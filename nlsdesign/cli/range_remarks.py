@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..errors import UnitError, visible
+from ..errors import UnitError, ValueRangeError, visible
 from ..quantity import typeset_unit
 
 if TYPE_CHECKING:
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from ..model import FlatModel
 
 _COUNT = 41
+_MOST = 100.0
+"""Angle in rad: contours end at one turn, springs without one at a few."""
 
 _SAME_ANGLE = 1e-4
 """Relative: a design finds the end of its contour numerically, and the remark prints four digits."""
@@ -60,6 +62,42 @@ def range_remarks(
             "angle"
         )
     return remarks
+
+
+def usual_last(model: FlatModel) -> float:
+    """Return the angle to which a command goes that is not told: the end of the contour, 50° at most.
+
+    Parameters
+    ----------
+    model
+        Its cams say where a contour ends.
+    """
+    from ..observer.scheduling.scheduled import whole_contour
+
+    return min(math.radians(50.0), whole_contour(model).upper)
+
+
+def check_angles(first: float, last: float) -> None:
+    """Refuse angles in the wrong order, and those that no spring is turned by.
+
+    Parameters
+    ----------
+    first, last
+        In rad.
+
+    Raises
+    ------
+    ValueRangeError
+        If the last does not lie above the first, or one is more than a hundred radians.
+    """
+    if not last > first:
+        raise ValueRangeError("--to", "must lie above --from", next_step="give the smaller angle as --from")
+    for option, angle in (("--from", first), ("--to", last)):
+        if abs(angle) > _MOST:
+            raise ValueRangeError(
+                f"{option} {math.degrees(angle):.4g}°", f"is more than {math.degrees(_MOST):.0f}°",
+                next_step="stay within the contour, or within a few turns where there is none",
+            )  # fmt: skip
 
 
 def beyond_contour(model: FlatModel, angles: Iterable[float]) -> list[str]:

@@ -12,7 +12,7 @@ import click
 
 from ..errors import ValueRangeError, unknown_name
 from ..quantity import typeset_unit
-from .driving_signals import FORMS, read_input_file, read_inputs, read_pairs, size_in
+from .driving_signals import FORMS, check_rows, read_input_file, read_inputs, read_pairs, size_in
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_file_option
 from .units import Number, split_number
@@ -61,9 +61,9 @@ def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
               "Others rest. Repeatable.")  # fmt: skip
 @click.option("--input-file", type=_file, default=None,
               help="CSV with inputs over time: heads 'time [s]' and 'motor.current [A]'.")  # fmt: skip
-@click.option("--stop", type=Number("s"), default=None,
+@click.option("--stop", type=Number("s", above=0.0), default=None,
               help="End, for instance '2 s'; by default that of --input-file.")  # fmt: skip
-@click.option("--step", type=Number("ms"), default="1 ms", show_default=True,
+@click.option("--step", type=Number("ms", above=0.0), default="1 ms", show_default=True,
               help="Longest time between two rows; the integrator has steps of its own.")  # fmt: skip
 @click.option("--initial", multiple=True, metavar="STATE=NUMBER",
               help="A state at the begin, e.g. 'motor.angle=10 deg'. Repeatable.")  # fmt: skip
@@ -138,6 +138,7 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
         inputs, times = _with_file(given, model, inputs)
     if times is None:
         raise ValueRangeError("--stop", "is not given", next_step='write for instance --stop "2 s"')
+    check_rows(inputs, float(times[-1]), float(times[1] - times[0]))
     start = _initial(model, given["initial"])
     _chosen(model, given["signals"])  # before the work
     steps = Steps()
@@ -195,11 +196,12 @@ def _times(stop: float | None, step: float) -> Any:
     """Return equal steps no longer than asked for, ``None`` without an end."""
     import numpy as np
 
-    for option, value in (("--stop", stop), ("--step", step)):
-        if value is not None and not (0.0 < value < math.inf):
-            raise ValueRangeError(f"{option} {value:g} s", "is not a time above zero")
     if stop is None:
         return None
+    if step > stop:
+        raise ValueRangeError(
+            f"--step {step:g} s", f"is longer than the run, {stop:g} s", next_step="take a shorter --step"
+        )
     count = max(1, math.ceil(stop / step * (1.0 - 1e-12)))
     if count > _MOST_ROWS:
         raise ValueRangeError(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UnitError
+from ..errors import NlsError, UnitError, ValueRangeError
 from ..quantity import Quantity, quantity, same_dimension, typeset_unit, with_unit
 from ..written_numbers import split_number as split_number
 
@@ -24,18 +24,37 @@ class Number(_Kind):
     ----------
     unit
         A unit of the expected dimension.
+    above
+        In SI; what is not larger is refused before any work.
     """
 
     name = "number unit"
 
-    def __init__(self, unit: str) -> None:
-        self.unit = unit
+    def __init__(self, unit: str, *, above: float | None = None) -> None:
+        self.unit, self.above = unit, above
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the value in SI."""
+        """Return the value in SI; errors name the option.
+
+        Raises
+        ------
+        UnitError
+            If the unit is missing or measures something else.
+        ValueRangeError
+            If the number is not finite, or not larger than what it has to exceed.
+        """
         if isinstance(value, float):
             return value
-        return parse_number(str(value), self.unit).number
+        option = param.opts[0] if param is not None and param.opts else "number"
+        try:
+            number = parse_number(str(value), self.unit).number
+        except NlsError as error:
+            raise error.at(option) from None
+        if self.above is not None and not number > self.above:
+            unit = typeset_unit(self.unit)
+            rule = "must be above zero" if self.above == 0.0 else f"must be above {self.above:g} in SI"
+            raise ValueRangeError(f"{option} '{value}'", rule, next_step=f"write for instance '1 {unit}'")
+        return number
 
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nlsdesign import quantity
-from nlsdesign.export import Late, SamplesOf, Wire, cosimulate, export_fmu
+from nlsdesign.export import FmuSystem, Late, SamplesOf, Wire, cosimulate, export_fmu
 from nlsdesign.simulation import Sine
 from tests.command_line import Run, run
 from tests.hand_built import controller, observer, plant
@@ -98,8 +98,16 @@ def test_a_mistake_is_named_and_nothing_is_written(
     assert not (tmp_path / "y.csv").exists()
 
 
+@pytest.mark.parametrize("number", ["nan", "1@inf", "x"])
+def test_an_input_that_is_no_finite_number_is_refused(run: Run, fmus: dict[str, Path], number: str) -> None:
+    call = ("cosimulate", "--fmu", f"plant={fmus['plant']}", "--stop", "0.05 s", "--out", "y.csv")
+    status, _, err = run(*call, "--input", f"plant.motor.current={number}")
+    assert status == 2
+    assert f"'{number}' cannot be read" in err
+
+
 def test_inputs_and_outputs_are_listed_and_other_signals_on_request(
-    run: Run, fmus: dict[str, Path], tmp_path: Path
+    run: Run, fmus: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     call = ("cosimulate", "--fmu", f"plant={fmus['plant']}", "--stop", "0.05 s", "--out", "y.csv")
     status, out, err = run(*call)
@@ -113,6 +121,7 @@ def test_inputs_and_outputs_are_listed_and_other_signals_on_request(
     assert left >= len(inner)
     out = run(*call, "--force", "--signals", "plant.der(*")[1]
     assert inner[0] in out
+    monkeypatch.setattr(FmuSystem, "run", lambda *_, **__: pytest.fail("the name comes before the work"))
     status, _, err = run(*call, "--force", "--signals", "plant.nothing*")
     assert status == 2
     assert "--signals 'plant.nothing*': no such name" in err

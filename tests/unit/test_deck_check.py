@@ -12,6 +12,7 @@ from nlsdesign.components.assembly.deck_remarks import deck_remarks
 from nlsdesign.components.assembly.deck_template import load_template
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import Deck, deck_names, load_deck, read_deck, template_names
+from nlsdesign.errors import DeckError
 from tests.command_line import Run
 from tests.command_line import run as run
 
@@ -91,6 +92,25 @@ def test_the_table_says_what_to_do_and_json_says_the_same(run: Run) -> None:
 @pytest.mark.parametrize("name", DECKS)
 def test_decks_of_the_project_hold_no_likely_slip(name: str) -> None:
     assert deck_remarks(declare(deck_of(name))) == []
+
+
+def test_a_rubber_whose_curve_has_no_spread_is_named_until_one_is_written() -> None:
+    template = load_template("cam-actuator")
+    text = template.filled("own", material="natural_rubber_treloar")
+    machine = declare(read_deck(text, Path("own.toml")))
+    (said,) = deck_remarks(machine)
+    assert said.startswith("spring.rubber.stiff: its curve has no spread")
+    assert "write its constants into [spring.rubber.stiff] with a spread" in said
+    row = ", ".join(map(repr, machine.quantities()["spring.rubber.stiff.moduli"].values))
+    spread = f'moduli = {{value = [{row}], unit = "Pa", source = "assumed: batches differ", spread = 0.1}}'
+    written = f"{text}\n[spring.rubber.stiff]\n{spread}\n"
+    assert deck_remarks(declare(read_deck(written, Path("own.toml")))) == []
+
+
+def test_a_file_that_is_no_deck_is_not_looked_for_as_a_name(tmp_path: Path) -> None:
+    (tmp_path / "run1.csv").write_text("t_s\n0\n", encoding="utf8")
+    with pytest.raises(DeckError, match=r"run1\.csv'.*does not end in \.toml"):
+        load_deck(tmp_path / "run1.csv")
 
 
 def slips(old: str, new: str, *, template: str = "cam-actuator") -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -105,6 +106,22 @@ def test_an_inertia_is_converted_from_the_rotor_and_from_the_output(run: Run, tm
     assert "divided by the gear ratio squared, 50^2" in inertia.source
 
 
+def test_another_gear_ratio_carries_the_count_of_an_encoder_on_the_rotor_with_it(
+    run: Run, tmp_path: Path
+) -> None:
+    words = ("deck", "new", "a", "--template", "cam-actuator", "--set", "motor.gear_ratio=50")
+    at_rotor = ("--inertia", "140 g*cm^2", "--inertia-at", "rotor")
+    for more in ((), at_rotor):
+        assert run(*words, *more, "--force")[0] == 0
+        count = declare(load_deck(tmp_path / "a.toml")).quantities()["motor_encoder.quantum"]
+        assert count.number == pytest.approx(2.0 * math.pi / 4096 / 50, rel=5e-3), (
+            "4096 counts, over the gear"
+        )
+        assert count.source.endswith("times 10/50, for another gear ratio")
+    assert run(*words, "--set", "motor_encoder.quantum=1 mrad", "--force")[0] == 0
+    assert declare(load_deck(tmp_path / "a.toml")).quantities()["motor_encoder.quantum"].number == 1e-3
+
+
 def test_another_gear_ratio_carries_the_inertia_at_the_output_with_it(run: Run, tmp_path: Path) -> None:
     template = load_template("cam-actuator")
     assert run("deck", "new", "a", "--template", template.name, "--set", "motor.gear_ratio=30")[0] == 0
@@ -129,6 +146,17 @@ def test_another_gear_ratio_carries_the_inertia_at_the_output_with_it(run: Run, 
         (("--template", "cam-actuator", "--set", "motor.gearratio=3"), 2, "did you mean 'motor.gear_ratio'"),
         (("--template", "cam-actuator", "--set", "motor.gear_ratio=3 kg"), 2, "write '3'"),
         (("--template", "cam-actuator", "--set", "motor.gear_ratio"), 2, "NAME=VALUE"),
+        (("--template", "cam-actuator", "--set", "motor.gear_ratio="), 2, "--set motor.gear_ratio: ''"),
+        (
+            ("--template", "cam-actuator", "--set", "motor.gear_ratio=0"),
+            2,
+            "motor.gear_ratio: gear_ratio = 0",
+        ),
+        (
+            ("--template", "cam-actuator", "--set", "motor.gear_ratio=5", "--set", "motor.gear_ratio=6"),
+            2,
+            "'motor.gear_ratio' is set twice",
+        ),
         (("--template", "cam-actuator", "--set", "motor.inertia=3"), 2, "has no unit"),
         (("--template", "cam-actuator", "--set", "spring.cam.lever_arm=3 mm"), 2, "row of numbers"),
         (("--template", "cam-actuator", "--set", "spring.cam.last_angle=9 rad"), 2, "must lie in"),
@@ -142,6 +170,20 @@ def test_what_cannot_be_is_refused_and_nothing_is_written(
     result, _, err = run("deck", "new", "own.toml", *words)
     assert (result, said in err) == (status, True), err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [".", "", "folder/", "leg.toml/"])
+def test_what_is_no_name_of_a_file_is_refused(run: Run, tmp_path: Path, name: str) -> None:
+    status, _, err = run("deck", "new", name, "--template", "specimen")
+    assert (status, list(tmp_path.iterdir())) == (2, [])
+    assert "is no name of a file" in err
+
+
+def test_the_next_command_can_be_copied_where_the_name_has_blanks(run: Run) -> None:
+    status, out, _ = run("deck", "new", "my leg", "--template", "specimen")
+    assert status == 0
+    assert "next: nlsdesign deck check 'my leg.toml'" in out
+    assert run("deck", "copy", "test_rig", "my rig.toml")[1].endswith("deck check 'my rig.toml'\n")
 
 
 def test_a_file_that_is_there_is_replaced_by_force_alone(run: Run, tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -250,6 +253,17 @@ def test_a_give_is_rounded_to_the_side_that_is_enough(value: float, upper: bool,
     bound = Bound("Limit", "size", ca.SX(0), 1e-3 if upper else 5e-3, upper, "mm", 1e-3)
     give = Give(bound, abs(1e-3 * value - bound.value))
     assert f"(to {end} mm)" in str(give)
+
+
+def test_rubber_that_is_a_block_and_no_strip_is_said() -> None:
+    """30 mm by 30 mm and 6 mm long: S = 900/(120·6) = 1.25, and 1 + 2·S² = 4.1."""
+    settings = replace(QUICK, look_for_remedies=False, starts=1)
+    sizes = {"spring.rubber.area": quantity(9.0, "cm^2"), "spring.rubber.rest_length": quantity(6.0, "mm")}
+    for changed, said in ((sizes, ["4.1 times as stiff"]), ({}, [])):
+        machine = actuator(CONCAVE).with_values(changed)
+        design = design_cam(machine, target=TARGET, free=CONTOUR, keep=KEEP, settings=settings)
+        found = [re.search(r"4\.1 times as stiff|$", each)[0] for each in design.remarks if "block" in each]
+        assert found == said
 
 
 # Ten seconds; defaults that hold are tried in every run.

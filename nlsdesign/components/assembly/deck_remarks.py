@@ -15,6 +15,8 @@ _FASTEST, _SLOWEST = 5e5, 50.0
 """Acceleration in rad/s² that the largest current gives to the rotor alone: faster ones are tiny and without
 iron, slower ones carry a flywheel. Catalogue motors from 10 W to 1 kW lie between 1e3 and 2e5."""
 _WIDE, _WIDEST = 1.0, 2.0
+_FITTED = ".fitted_strain"
+"""The number that only a law fitted to a curve has: the strain to which it was fitted."""
 
 
 def deck_remarks(machine: Assembly) -> list[str]:
@@ -32,7 +34,13 @@ def deck_remarks(machine: Assembly) -> list[str]:
     >>> deck_remarks(declare(load_deck("austin2015_as_printed")))
     []
     """
-    return [*_spreads(machine.quantities()), *_ends(machine), *_ratios(machine), *_inertias(machine)]
+    return [
+        *_spreads(machine.quantities()),
+        *_exact_rubber(machine.quantities()),
+        *_ends(machine),
+        *_ratios(machine),
+        *_inertias(machine),
+    ]
 
 
 def _spreads(numbers: Mapping[str, Quantity]) -> Iterator[str]:
@@ -41,6 +49,18 @@ def _spreads(numbers: Mapping[str, Quantity]) -> Iterator[str]:
             yield (
                 f"{name}: spread = {number.spread:g} means ± {100 * number.spread:g} % -> write spread = "
                 f"{number.spread / 100:g} if {number.spread:g} % was meant"
+            )
+
+
+def _exact_rubber(numbers: Mapping[str, Quantity]) -> Iterator[str]:
+    """Yield the laws that are fitted to a curve and have no spread, as where a source measured one sample."""
+    for fitted in (name for name in numbers if name.endswith(_FITTED)):
+        law = fitted.removesuffix(_FITTED)
+        constants = [number for name, number in numbers.items() if name.startswith(f"{law}.")]
+        if not any(number.spread for number in constants):
+            yield (
+                f"{law}: its curve has no spread; tolerances, fits and observers take this rubber as exactly "
+                f"known -> write its constants into [{law}] with a spread, for instance 0.1"
             )
 
 

@@ -15,6 +15,7 @@ from ...quantity import Quantity
 from ..mechanics.bodies import GearedMotor
 from ..mechanics.gear import Gear
 from ..mechanics.motor import ElectricMotor
+from ..sensing.sensors import Encoder
 from .deck_writer import declare
 from .named_parts import Assembly
 from .part_text import number_of, text_of
@@ -86,7 +87,9 @@ class DeckTemplate:
         return dict(_materials("", self.deck.tables))
 
     def carried(self, at: MotorInertia, numbers: Mapping[str, Quantity]) -> dict[str, Quantity]:
-        """Return the inertia of the motor at the output where a gear has another ratio than the template.
+        """Return what another gear ratio than that of the template changes at the output.
+
+        That is the inertia of the motor, and one count of an encoder on its rotor.
 
         Parameters
         ----------
@@ -98,15 +101,23 @@ class DeckTemplate:
         Returns
         -------
         dict
-            The inertia by its name; empty where the ratio is that of the template, where the inertia itself
-            is given, or where it is that of the rotor, which no gear changes.
+            Numbers by name, without those that are given; empty where the ratio is that of the template, or
+            where the motor stands in front of the gear, so that no gear changes what is seen there.
         """
-        if at.place == ROTOR or at.ratio not in numbers or at.name in numbers:
+        if at.place == ROTOR or at.ratio not in numbers or numbers[at.ratio].number <= 0.0:
             return {}
-        usual, ratio, new = self.deck.quantity(at.name), self.deck.quantity(at.ratio), numbers[at.ratio]
-        factor = (new.number / ratio.number) ** 2
-        source = f"{usual.source}; times ({new}/{ratio})^2, for another gear ratio"
-        return {at.name: Quantity(float(f"{usual.number * factor:.6g}"), usual.unit, source, usual.spread)}
+        ratio, new = self.deck.quantity(at.ratio), numbers[at.ratio]
+        share = new.number / ratio.number
+        factors = {at.name: (share**2, f"times ({new}/{ratio})^2")}
+        factors |= {name: (1.0 / share, f"times {ratio}/{new}") for name in at.counts}
+        carried = {}
+        for name, (factor, how) in factors.items():
+            if name not in numbers:
+                usual = self.deck.quantity(name)
+                source = f"{usual.source}; {how}, for another gear ratio"
+                value = float(f"{usual.number * factor:.6g}")
+                carried[name] = Quantity(value, usual.unit, source, usual.spread)
+        return carried
 
     def filled(
         self,
@@ -194,11 +205,14 @@ class MotorInertia:
         ``"rotor"`` or ``"output"``: where the component takes it.
     ratio
         Full name of the ratio of the gear.
+    counts
+        Full names of the counts of encoders that read the angle at the output.
     """
 
     name: str
     place: str
     ratio: str
+    counts: tuple[str, ...] = ()
 
     def converted(self, given: Quantity, *, at: str, ratio: Quantity) -> Quantity:
         """Return an inertia as the component takes it; the source says how it was converted.
@@ -237,7 +251,10 @@ def motor_inertia(machine: Assembly) -> MotorInertia | None:
     """
     for name, part in machine.parts:
         if isinstance(part, GearedMotor):
-            return MotorInertia(f"{name}.inertia", OUTPUT, f"{name}.gear_ratio")
+            angle = f"{name}.angle"
+            encoders = [(each, sensor) for each, sensor in machine.parts if isinstance(sensor, Encoder)]
+            counts = tuple(f"{each}.quantum" for each, sensor in encoders if sensor.of == angle)
+            return MotorInertia(f"{name}.inertia", OUTPUT, f"{name}.gear_ratio", counts)
     for name, part in machine.parts:
         if isinstance(part, Gear) and isinstance(machine[part.between[0]], ElectricMotor):
             return MotorInertia(f"{part.between[0]}.inertia", ROTOR, f"{name}.ratio")

@@ -202,9 +202,11 @@ def kinds(base: type) -> dict[str, type]:
 def _target(deck: Deck) -> Target | TaskTarget:
     table = _table(deck, "target")
     if len(table) != 1:
+        rule = f"has {len(table)} entries, a design has one target" if table else "none is given"
         raise DeckError(
-            deck.place("target"), f"has {len(table)} entries, a design has one target",
-            next_step=f'keep one of: file = "...", TaskTarget, {", ".join(kinds(Target))}',
+            deck.place("target"), rule,
+            next_step=f'{"keep" if table else "write"} one of: file = "...", '
+                      f'TaskTarget, {", ".join(kinds(Target))}',
         )  # fmt: skip
     ((name, given),) = table.items()
     if name == "file":
@@ -365,6 +367,8 @@ def _settings(deck: Deck) -> DesignSettings:
         if name not in _SEARCH:
             raise unknown_name(place, name, _SEARCH)
         given = _number(raw, place).number if isinstance(raw, str) else _plain(raw, place)
+        if name != "largest_error" and given != int(given):
+            raise DeckError(place, f"{brief(raw)} is not a whole number")
         values[name] = float(given) if name == "largest_error" else int(given)
     values["draws"] = _draws(deck)
     return _placed(lambda: DesignSettings(**values), deck.place("search"))

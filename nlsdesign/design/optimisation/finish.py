@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,6 +33,8 @@ from .size_ranges import size_ranges
 Floats = NDArray[np.float64]
 
 _ACTIVE = 1e-3
+_STIFFER = 0.1
+"""Share by which clamped ends may stiffen a piece of rubber unsaid; the published element has 0.08."""
 _AT_END = 1e-6
 _CONTROL_VALUES = 64
 _DEARER = 1.2
@@ -182,7 +185,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         if settings.look_for_size_ranges
         else (),
         miss=_miss(solved, limits),
-        remarks=(*_remarks(search), *_ends(solved), *_beyond_defaults(solved), *remarks),
+        remarks=(*_remarks(search), *_ends(solved), *_beyond_defaults(solved), *_blocks(solved), *remarks),
         drive=problem.law.cam.drive,
     )
 
@@ -271,6 +274,33 @@ def _beyond_defaults(solved: SolvedSearch) -> Iterator[str]:
             excess = (state.value - state.bound) * (1.0 if state.upper else -1.0)
             if excess > _ACTIVE * bound.scale:
                 yield f"beyond what the declared cable and rubber allow: {state}"
+
+
+def _blocks(solved: SolvedSearch) -> Iterator[str]:
+    """Yield the pieces of rubber that are too short for their section to be strips.
+
+    A law of stress over strain is that of a slender strip. Clamped ends hold a piece sideways: with the shape
+    factor S, section over free surface, its stiffness is about 1 + 2·S² times that. A section whose form is
+    not known is taken as a square.
+
+    Source: Gent 2012.
+    """
+    values = solved.search.question.model.values
+    for piece in solved.search.problem.law.cam.specimens:
+        sides = [
+            solved.changes[name].number if name in solved.changes else values[name]
+            for name in (*piece.section, piece.rest_length)
+        ]
+        *section, length = sides
+        width, thickness = section if len(section) == 2 else [math.sqrt(section[0])] * 2
+        stiffer = 2.0 * (width * thickness / (2.0 * (width + thickness) * length)) ** 2
+        if stiffer > _STIFFER:
+            yield (
+                f"{piece.name}: {1e3 * length:.3g} mm long with {1e6 * width * thickness:.4g} mm² of section "
+                f"is a block, no strip: clamped ends make it about {1.0 + stiffer:.2g} times as stiff as its "
+                f"law says -> ask for a longer one (RestLengthRange), more elements or thinner strips, or "
+                f"measure it"
+            )
 
 
 def _remarks(search: Search) -> tuple[str, ...]:

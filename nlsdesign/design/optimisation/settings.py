@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 from ...errors import ValueRangeError
 from ..curves.numbers import in_si
+from ..tolerance.monte_carlo import FEWEST_DRAWS
 from .limits import Limit
+
+_LARGEST_ERROR = 0.5
 
 
 def _quiet() -> None:
@@ -60,7 +63,22 @@ class DesignSettings:
 
     def __post_init__(self) -> None:
         in_si("largest_error", self.largest_error, "1", minimum=1e-6, maximum=1.0)
+        if self.largest_error > _LARGEST_ERROR:
+            raise ValueRangeError(
+                f"largest_error = {self.largest_error:g}",
+                f"is {100 * self.largest_error:g} % of the largest torque, which nearly any curve meets",
+                next_step=f'write "{self.largest_error:g} %" if per cent were meant; at most 50 %',
+            )
         if self.starts < 1:
             raise ValueRangeError(
                 f"starts = {self.starts}", "a search needs a starting point", next_step="take 4"
             )
+        if self.seed < 0:
+            raise ValueRangeError(
+                f"seed = {self.seed}", "a seed is a whole number from zero on", next_step="take 1"
+            )
+        if self.draws < 0 or 0 < self.draws < FEWEST_DRAWS:
+            raise ValueRangeError(
+                f"draws = {self.draws}", f"a tolerance needs at least {FEWEST_DRAWS} draws",
+                next_step="take 200, or 0 for no tolerance",
+            )  # fmt: skip

@@ -116,6 +116,22 @@ class FmuSystem:
     parameters: Mapping[str, float] = field(default_factory=dict)
     order: tuple[str, ...] = ()
 
+    def recorded(self) -> list[str]:
+        """Return the names of what a run would record, without running anything.
+
+        Raises
+        ------
+        ExportError
+            If an FMU is damaged or cannot be used.
+        UnknownNameError
+            If a wire names what does not exist.
+        """
+        with tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-") as folder:
+            descriptions = unpacked_fmus(self.fmus, Path(folder))
+            check_wires(descriptions, {target: as_wire(source) for target, source in self.wires.items()})
+        shown = [f"{name}.{v.name}" for name, each in descriptions.items() for v in each.shown]
+        return list(dict.fromkeys([*shown, *self.wires]))
+
     def run(
         self,
         *,

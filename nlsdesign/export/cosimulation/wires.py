@@ -220,7 +220,12 @@ def gain_to(descriptions: Mapping[str, FmuDescription], target: str, wire: Wire)
         return number  # a unit of a foreign FMU that cannot be read here
     if not isinstance(wire.gain, Quantity):
         if (to.factor, to.mechanical) != (of.factor, of.mechanical):
-            raise _apart(target, wire.source, names, "give the gain a unit, nls.quantity(VALUE, UNIT)")
+            unit = f"{names[0] or 1}/{(names[1] or '1').replace('*', '/').replace('.', '/')}"
+            hint = (
+                f"give the gain a unit: '{target}={wire.source}*1 {unit}' behind --wire, "
+                f"nls.quantity(1, '{unit}') in Python"
+            )
+            raise _apart(target, wire.source, names, hint)
         return number
     by = parse_unit(wire.gain.unit)
     if tuple(a + b for a, b in zip(of.mechanical, by.mechanical, strict=True)) != to.mechanical:

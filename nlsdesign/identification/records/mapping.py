@@ -149,7 +149,7 @@ def read_mapping(path: Path) -> ColumnMap:
         If it is not valid or a column lacks signal or unit.
     """
     try:
-        tables = tomllib.loads(text_of(path, MeasurementError, next_step="write it again as TOML"))
+        tables = tomllib.loads(text_of(path, MeasurementError, next_step="name a records.toml"))
     except (ValueError, RecursionError) as error:
         raise MeasurementError(
             path.name,
@@ -210,8 +210,9 @@ def _check_fields(where: str, given: Mapping[str, Any], known: Sequence[str], be
     for key in given:
         if key not in known:
             raise MeasurementError(
-                f"{where}{between}{key}", "no such field", did_you_mean=nearest(key, known)
-            )
+                f"{where}{between}{key}", "no such field",
+                did_you_mean=nearest(key, known), next_step=f"use one of: {', '.join(known)}",
+            )  # fmt: skip
 
 
 def _seconds(where: str, given: Any) -> float | None:
