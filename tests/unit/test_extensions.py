@@ -159,3 +159,34 @@ def test_long_work_of_the_live_page_knows_them_too(lab: Path, tmp_path: Path, as
         done = BackgroundWork("flatten", 1, _in_long_work, (machine,)).wait(120.0)
     assert (done.state, done.message) == ("done", "")
     assert done.value[0]
+
+
+@pytest.mark.slow
+def test_a_package_beside_the_command_reaches_a_session_of_the_live_page(
+    lab: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``python -m nlsdesign`` finds packages in its folder; the session is started without it."""
+    import asyncio
+    import json
+
+    from nlsdesign.live.session_process import SessionProcess
+
+    (tmp_path / "beside").mkdir()
+    (tmp_path / "beside" / "__init__.py").write_bytes((lab / "src/rubber_lab/laws.py").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend("")
+
+    async def first_words() -> str:
+        heard: asyncio.Queue[str] = asyncio.Queue()
+        process = SessionProcess(str(lab / DECK), ("beside",))
+        try:
+            await process.start()
+            process.listen(heard.put)
+            await process.from_page({"what": "show", "number": 1})
+            return await asyncio.wait_for(heard.get(), 120.0)
+        finally:
+            process.kill()
+            await process.gone()
+
+    answer = json.loads(asyncio.run(first_words()))
+    assert (answer["what"], answer["answer"]["controls"]["title"]) == ("answer", "jointed")
