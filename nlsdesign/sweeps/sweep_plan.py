@@ -33,7 +33,7 @@ class PointPlan:
     Raises
     ------
     ValueRangeError
-        If there are no axes or two of them change the same number.
+        If there are no axes, or two of them change the same number.
     NlsError
         If a name does not exist, or a value does not fit it.
     """
