@@ -31,13 +31,15 @@ _DRAWS = (
     "distribution that the axes were drawn from, not of machines that are built."
 )
 _NO_DRAWS = (
-    "Points of a grid, a list or a Saltelli plan are no independent draws: there is no probability behind "
-    "these shares, so no interval is given."
+    "Points of a grid, a list, a Saltelli plan or samples that are crossed are no independent draws: there "
+    "is no probability behind these shares, or less than their number says, so no interval is given."
 )
 _SHARES = (
     "The share of the variance of an answer that an axis causes over the range that was swept; another range "
-    "gives other shares. Black strokes are 95 % intervals; a share whose interval holds zero is not shown to "
-    "differ from it."
+    "gives other shares."
+)
+_STROKES = (
+    " Black strokes are 95 % intervals; a share whose interval holds zero is not shown to differ from it."
 )
 
 
@@ -57,7 +59,7 @@ def histogram_sections(content: PageContent) -> list[Section]:
     content
         Of the page.
     """
-    bounded = {axis.kind for axis in content.varying_axes()} <= _DRAWN_AT_RANDOM
+    bounded = _are_draws(content)
     names = content.answers[:MOST_HISTOGRAMS]
     everything = [_distribution(content, name, bounded=bounded) for name in names]
     drawn = [each for each in everything if len(np.unique(each.column.values)) > 1]
@@ -82,6 +84,16 @@ def histogram_sections(content: PageContent) -> list[Section]:
         TableSection("Quantiles", heads, rows, folded=True,
                      caption="Quantiles of each answer; no bound where the points are too few for one."),
     ]  # fmt: skip
+
+
+def _are_draws(content: PageContent) -> bool:
+    """Return whether all axes were drawn at once; samples that are crossed repeat their values."""
+    axes = content.varying_axes()
+    count = len(content.table)
+    return all(
+        axis.kind in _DRAWN_AT_RANDOM and 2 * len(np.unique(content.table.values[axis.name])) > count
+        for axis in axes
+    )
 
 
 def _distribution(content: PageContent, name: str, *, bounded: bool) -> _Distribution:
@@ -133,7 +145,8 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
         remarks = dict.fromkeys(remark for each in shown.values() for remark in each.remarks)
         sections.append(
             FigureSection(
-                "What causes the differences", _shares_figure(shown), caption=_methods(shown), means=_SHARES,
+                "What causes the differences", _shares_figure(shown), caption=_methods(shown),
+                means=_SHARES + (_STROKES if _have_intervals(shown) else ""),
                 assumed=" ".join(["Axes are independent.", *(f"{r[0].upper()}{r[1:]}." for r in remarks)]),
             )
         )  # fmt: skip
@@ -141,6 +154,13 @@ def sensitivity_sections(content: PageContent) -> list[Section]:
         caption = "Answers for which no share of the variance is given, and why."
         sections.append(TableSection("No sensitivity", ("answer", "reason"), refused, caption=caption))
     return sections
+
+
+def _have_intervals(shown: dict[str, AnswerSensitivity]) -> bool:
+    errors = [
+        error for each in shown.values() for i in each.indices for error in (i.first_error, i.total_error)
+    ]
+    return any(np.isfinite(error) and error > 0.0 for error in errors)
 
 
 def _methods(shown: dict[str, AnswerSensitivity]) -> str:

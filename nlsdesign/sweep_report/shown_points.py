@@ -13,7 +13,7 @@ from ..sweeps.ranked_points import RankedPoints
 
 MOST_OTHERS: Final = 1500
 MOST_KEPT: Final = 10_000
-_UNITS: Final = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "m^2": ("mm^2", 1e6)}
+_UNITS: Final = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "m^2": ("mm^2", 1e6), "m^3": ("cm^3", 1e6)}
 _SEED: Final = 0
 
 
