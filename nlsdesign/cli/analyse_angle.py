@@ -47,7 +47,11 @@ _HEADINGS = {
 @click.option("--to", "last", type=Number("deg"), default=None,
               help="Last angle; by default that of the contour, 50 deg at most.")  # fmt: skip
 @click.option(
-    "--count", type=click.IntRange(2, 100_000), default=26, show_default=True, help="Number of angles, at least 2."
+    "--count",
+    type=click.IntRange(2, 100_000),
+    default=26,
+    show_default=True,
+    help="Number of angles, at least 2.",
 )
 @measured_option
 @spring_option

@@ -40,7 +40,12 @@ SIMULATE = ("simulate", "--deck", SOFT, "--stop", "1 s", "--input")
         (("cosimulate", "--fmu", "a=b", "--stop", "0 s", "--out", "x.csv"), "--stop '0 s'"),
         (("design", "--deck", CAM, *CURVE, "--seed", "-3"), "seed = -3"),
         (("design", "--deck", CAM, *CURVE, "--draws", "-3"), "draws = -3"),
-        (("design", "--deck", CAM, *CURVE, "--draws", "5"), "draws = 5: a tolerance needs at least 20 draws"),
+        (
+            ("design", "--deck", CAM, *CURVE, "--draws", "5"),
+            "draws = 5: a tolerance needs 20 to 100000 draws",
+        ),
+        (("design", "--deck", CAM, *CURVE, "--draws", "100000000"), "draws = 100000000"),
+        (("design", "--deck", CAM, *CURVE, "--starts", "100000000"), "starts = 100000000"),
         (("design", "--deck", CAM, *CURVE, "--largest-error", "1"), 'write "1 %"'),
         (("design", "--deck", CAM), "no target: is given -> write --maximum"),
     ],
