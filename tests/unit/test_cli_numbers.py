@@ -37,6 +37,7 @@ SIMULATE = ("simulate", "--deck", SOFT, "--stop", "1 s", "--input")
         (("analyse", "--deck", SOFT, "--from", "10 deg", "--to", "5 deg"), "--to: must lie above --from"),
         (("fit", "--deck", SOFT, "--records", ".", "--window", "-1 s"), "--window '-1 s'"),
         (("diagnose", "--deck", SOFT, "--records", ".", "--sample-time", "0 s"), "--sample-time '0 s'"),
+        (("diagnose", "--deck", SOFT, "--records", ".", "--sample-time", "5 s"), "must be at most 1000 ms"),
         (("cosimulate", "--fmu", "a=b", "--stop", "0 s", "--out", "x.csv"), "--stop '0 s'"),
         (("design", "--deck", CAM, *CURVE, "--seed", "-3"), "seed = -3"),
         (("design", "--deck", CAM, *CURVE, "--draws", "-3"), "draws = -3"),
