@@ -107,7 +107,7 @@ class _Evaluation:
 @click.option("--load-amplitude", type=Number("deg"), default="10 deg", show_default=True,
               help="Of the load's angle where no torque is wanted.")  # fmt: skip
 @click.option("--delay", type=click.IntRange(0, 100), default=1, show_default=True, help="In samples.")
-@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+@click.option("--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
               help="Of the controller.")  # fmt: skip
 @out_option("out/loop", writes=_FILES)
 @json_option

@@ -91,7 +91,7 @@ def controller_of(
 )
 @deck_option
 @law_options
-@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+@click.option("--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
               help="Of what is computed in steps.")  # fmt: skip
 @out_option(
     "out/controller",

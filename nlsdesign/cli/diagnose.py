@@ -59,7 +59,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     help="Design the torque observer again from the better model, write it as C and FMU, and compare it.",
 )
 @export_option
-@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+@click.option("--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
               help="Of the observer.")  # fmt: skip
 @spring_option
 @measured_option

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .observer_certificate import ToProve
 
 sample_time_option = click.option(
-    "--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+    "--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
     help="Of what is computed in steps.",
 )  # fmt: skip
 real_option = click.option(

@@ -87,7 +87,7 @@ def certify_continuous_gain(
     ),
 )
 @deck_option
-@click.option("--sample-time", type=Number("ms", above=0.0), default="1 ms", show_default=True,
+@click.option("--sample-time", type=Number("ms", above=0.0, up_to=1.0), default="1 ms", show_default=True,
               help="Of what is computed in steps.")  # fmt: skip
 @spring_option
 @measured_option

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import NlsError, UnitError, ValueRangeError
-from ..quantity import Quantity, quantity, same_dimension, typeset_unit, with_unit
+from ..quantity import Quantity, parse_unit, quantity, same_dimension, typeset_unit, with_unit
 from ..written_numbers import split_number as split_number
 
 if TYPE_CHECKING:
@@ -26,12 +26,14 @@ class Number(_Kind):
         A unit of the expected dimension.
     above
         In SI; what is not larger is refused before any work.
+    up_to
+        In SI; what is larger is refused before any work.
     """
 
     name = "number unit"
 
-    def __init__(self, unit: str, *, above: float | None = None) -> None:
-        self.unit, self.above = unit, above
+    def __init__(self, unit: str, *, above: float | None = None, up_to: float | None = None) -> None:
+        self.unit, self.above, self.up_to = unit, above, up_to
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the value in SI; errors name the option.
@@ -41,7 +43,7 @@ class Number(_Kind):
         UnitError
             If the unit is missing or measures something else.
         ValueRangeError
-            If the number is not finite, or not larger than what it has to exceed.
+            If the number is not finite, or outside its bounds.
         """
         if isinstance(value, float):
             return value
@@ -54,6 +56,9 @@ class Number(_Kind):
             unit = typeset_unit(self.unit)
             rule = "must be above zero" if self.above == 0.0 else f"must be above {self.above:g} in SI"
             raise ValueRangeError(f"{option} '{value}'", rule, next_step=f"write for instance '1 {unit}'")
+        if self.up_to is not None and number > self.up_to:
+            most = with_unit(f"{self.up_to / parse_unit(self.unit).factor:g}", self.unit)
+            raise ValueRangeError(f"{option} '{value}'", f"must be at most {most}")
         return number
 
 

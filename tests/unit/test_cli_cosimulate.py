@@ -106,6 +106,17 @@ def test_an_input_that_is_no_finite_number_is_refused(run: Run, fmus: dict[str, 
     assert f"'{number}' cannot be read" in err
 
 
+def test_a_sine_between_the_steps_is_refused_and_one_with_four_is_not(
+    run: Run, fmus: dict[str, Path], tmp_path: Path
+) -> None:
+    call = ("cosimulate", "--fmu", f"plant={fmus['plant']}", "--stop", "0.01 s", "--out", "y.csv")
+    status, _, err = run(*call, "--input", "plant.motor.current=1@5000", "--step", "1 ms")
+    assert status == 2
+    assert "5000 Hz: has 0.2 steps to a period" in err
+    assert not (tmp_path / "y.csv").exists()
+    assert run(*call, "--input", "plant.motor.current=1@250", "--step", "1 ms")[0] == 0
+
+
 def test_inputs_and_outputs_are_listed_and_other_signals_on_request(
     run: Run, fmus: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

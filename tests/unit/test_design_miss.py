@@ -73,7 +73,7 @@ def test_the_largest_error_is_the_designers() -> None:
     assert not design.met, "22 mN·m are 0.44 %"
     with pytest.raises(ValueRangeError, match="largest_error"):
         DesignSettings(largest_error=0.0)
-    with pytest.raises(ValueRangeError, match="starts = 0"):
+    with pytest.raises(ValueRangeError, match="starts = 0: a search has from 1"):
         DesignSettings(starts=0)
 
 

@@ -252,8 +252,11 @@ def motor_inertia(machine: Assembly) -> MotorInertia | None:
     for name, part in machine.parts:
         if isinstance(part, GearedMotor):
             angle = f"{name}.angle"
-            encoders = [(each, sensor) for each, sensor in machine.parts if isinstance(sensor, Encoder)]
-            counts = tuple(f"{each}.quantum" for each, sensor in encoders if sensor.of == angle)
+            counts = tuple(
+                f"{each}.quantum"
+                for each, sensor in machine.parts
+                if isinstance(sensor, Encoder) and sensor.of == angle
+            )
             return MotorInertia(f"{name}.inertia", OUTPUT, f"{name}.gear_ratio", counts)
     for name, part in machine.parts:
         if isinstance(part, Gear) and isinstance(machine[part.between[0]], ElectricMotor):

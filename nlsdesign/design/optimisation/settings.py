@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from ...errors import ValueRangeError
 from ..curves.numbers import in_si
-from ..tolerance.monte_carlo import FEWEST_DRAWS
+from ..tolerance.monte_carlo import FEWEST_DRAWS, MOST_DRAWS
 from .limits import Limit
 
 _LARGEST_ERROR = 0.5
+_MOST_STARTS = 10_000
 
 
 def _quiet() -> None:
@@ -69,16 +70,15 @@ class DesignSettings:
                 f"is {100 * self.largest_error:g} % of the largest torque, which nearly any curve meets",
                 next_step=f'write "{self.largest_error:g} %" if per cent were meant; at most 50 %',
             )
-        if self.starts < 1:
-            raise ValueRangeError(
-                f"starts = {self.starts}", "a search needs a starting point", next_step="take 4"
-            )
+        if not 1 <= self.starts <= _MOST_STARTS:
+            rule = f"a search has from 1 to {_MOST_STARTS} starting points"
+            raise ValueRangeError(f"starts = {self.starts}", rule, next_step="take 4")
         if self.seed < 0:
             raise ValueRangeError(
                 f"seed = {self.seed}", "a seed is a whole number from zero on", next_step="take 1"
             )
-        if self.draws < 0 or 0 < self.draws < FEWEST_DRAWS:
+        if self.draws and not FEWEST_DRAWS <= self.draws <= MOST_DRAWS:
             raise ValueRangeError(
-                f"draws = {self.draws}", f"a tolerance needs at least {FEWEST_DRAWS} draws",
+                f"draws = {self.draws}", f"a tolerance needs {FEWEST_DRAWS} to {MOST_DRAWS} draws",
                 next_step="take 200, or 0 for no tolerance",
             )  # fmt: skip

@@ -25,7 +25,7 @@ from .trimming import Trim, Trimmed, trimmed
 Floats = NDArray[np.float64]
 
 _ANGLES = 101
-FEWEST_DRAWS, _MOST = 20, 100_000
+FEWEST_DRAWS, MOST_DRAWS = 20, 100_000
 _SMALL = 0.01
 """Share of the variance below which a cause counts to first order where less of it is asked for."""
 _NODES, _STRATA = 41, 800
@@ -102,7 +102,7 @@ def tolerance_analysis(
     >>> tolerance_analysis(actuator, target=curve, draws=20).trim_first
     'spring.pretension'
     """
-    _checked("draws", draws, FEWEST_DRAWS, _MOST)
+    _checked("draws", draws, FEWEST_DRAWS, MOST_DRAWS)
     _checked("seed", seed, 0, 2**63)
     model = flatten(with_smooth_cables(spring)) if isinstance(spring, Assembly) else spring
     rules, cam = rules or SpreadRules(), series_cam(model, name)

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import ConvergenceError, ExportError, ValueRangeError, unknown_name
+from ...simulation.signals import Sine
 from ...simulation.trace import Trace
 from .coupling import Stepping
 from .fmu_archive import unpack
@@ -36,6 +37,7 @@ from .run_plan import Given, Link, Plan, points_of
 from .wires import Wire, as_wire, check_wires, delay_of, ends, gain_to, split_name
 
 Array = NDArray[np.float64]
+_STEPS_OF_A_PERIOD = 4
 Signal: TypeAlias = Callable[[float], float] | tuple[ArrayLike, ArrayLike]
 """A function of time in s, or times and values between which it is linear and beyond which it is held."""
 DEFAULT_STEP = 1e-3
@@ -244,6 +246,7 @@ class _Run:
         self._links = tuple(self._link(target, wire) for target, wire in wires.items())
         times = [each.sample_time for each in descriptions.values() if each.sample_time is not None]
         self._step = min(times, default=DEFAULT_STEP) if stepping.step is None else stepping.step
+        _check_fast(inputs, self._step)
 
     def result(self, parts: int) -> CoSimulation:
         """Run, and once more with half the step where that tells an error."""
@@ -427,6 +430,18 @@ def check_signals(
         if name in wires:
             raise ExportError(
                 f"input '{name}'", "is driven by a wire and by a signal", next_step="remove one of them"
+            )
+
+
+def _check_fast(inputs: Mapping[str, Signal], step: float) -> None:
+    """Refuse sines of which an instance would see another signal: it gets one value a step."""
+    for name, signal in inputs.items():
+        if isinstance(signal, Sine) and _STEPS_OF_A_PERIOD * step * abs(signal.frequency) > 1.0 + 1e-9:
+            raise ValueRangeError(
+                f"input '{name}': {signal.frequency:g} Hz",
+                f"has {1.0 / (step * abs(signal.frequency)):.2g} steps to a period, at least "
+                f"{_STEPS_OF_A_PERIOD} are needed",
+                next_step=f"take a step of {50.0 / abs(signal.frequency):.2g} ms, or a slower sine",
             )
 
 
