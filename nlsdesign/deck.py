@@ -228,6 +228,11 @@ def deck_names() -> list[str]:
     return sorted(path.stem for path in (folder("models") / "decks").glob("*.toml"))
 
 
+def template_names() -> list[str]:
+    """Return the names of the templates that come with the project."""
+    return sorted(path.stem for path in (folder("models") / "templates").glob("*.toml"))
+
+
 def load_deck(name: str | Path) -> Deck:
     """Read a deck by file name, or by the name of one that comes with the project.
 

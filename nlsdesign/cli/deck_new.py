@@ -56,9 +56,9 @@ def new(
     those of the template are taken unless --set gives another. A name without .toml gets it.
     """
     from ..components.assembly.deck_remarks import deck_remarks
-    from ..components.assembly.deck_template import load_template, motor_inertia, plain_name, template_names
+    from ..components.assembly.deck_template import load_template, motor_inertia, plain_name
     from ..components.assembly.deck_writer import declare
-    from ..deck import read_deck
+    from ..deck import read_deck, template_names
 
     if path.endswith(("/", os.sep)) or not Path(path).name.strip("."):
         raise click.BadParameter(f"'{path}' is no name of a file, for instance leg.toml")

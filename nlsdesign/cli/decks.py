@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..deck import deck_names, load_deck
+from ..deck import deck_names, load_deck, template_names
 from ..errors import NlsError
 from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
@@ -37,7 +37,7 @@ deck.add_command(new)
 @json_option
 def list_decks(as_json: bool) -> None:
     """List the decks that come with the project, and the templates of `deck new`."""
-    from ..components.assembly.deck_template import load_template, template_names
+    from ..components.assembly.deck_template import load_template
 
     decks = {name: load_deck(name) for name in deck_names()}
     templates = {name: load_template(name) for name in template_names()}

@@ -51,13 +51,19 @@ def serve(
 def _checked(name: str) -> str:
     """Return a name that the page can begin with.
 
-    A deck that cannot be read ends the command, not the page.
+    A deck that cannot be read ends the command, not the page. What comes with the project is not read here:
+    that takes libraries for which the page would have to wait.
     """
-    from ..components.assembly.deck_template import template_names
-    from ..components.assembly.deck_writer import declare
-    from ..deck import load_deck
+    from ..deck import deck_names, load_deck, template_names
+    from ..errors import unknown_name
 
-    if name in template_names():
+    bundled = (*deck_names(), *template_names())
+    if name in bundled:
         return name
-    declare(load_deck(name))
-    return str(Path(name).resolve()) if Path(name).exists() else name
+    if not name.endswith(".toml") and not Path(name).is_dir():
+        raise unknown_name("deck", name, bundled)
+    deck = load_deck(name)
+    from ..components.assembly.deck_writer import declare
+
+    declare(deck)
+    return str(Path(name).resolve())

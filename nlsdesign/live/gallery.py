@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..components.assembly.deck_template import load_template, template_names
+from ..components.assembly.deck_template import load_template
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
-from ..deck import Deck, deck_names, load_deck, read_deck
+from ..deck import Deck, deck_names, load_deck, read_deck, template_names
 from ..design import contour_of_cam
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque

@@ -227,18 +227,17 @@ class QuickSolver:
             Its numbers in SI by name, where its program is not kept; empty where there is no design.
         """
         program = self.program(question)
-        values = program.outputs.scaled_values(values if last is None else last.numbers.values)
-        begin = program.rows.completed(question, values)
+        begin = _Beginning(program, question, values if last is None else last.numbers.values)
         contradicted, self._contradicted = self._contradicted is program, None
         if contradicted:
             # Limits that contradicted each other a moment ago are asked first.
-            kept = program.softened.conflict(question, begin)
+            kept = program.softened.conflict(question, begin.unknowns)
             if kept.state == "infeasible":
                 self._contradicted = program
                 return None, kept
-        outcome = self._tried(program, question, last, values)
+        outcome = self._tried(begin, last)
         if outcome.state != "solved" and not contradicted:
-            kept = program.softened.conflict(question, begin)
+            kept = program.softened.conflict(question, begin.unknowns)
             if kept.state == "infeasible":
                 self._contradicted = program
                 return None, kept
@@ -278,22 +277,46 @@ class QuickSolver:
             return None
         return QuickDesign(program, question, outcome.point, outcome.cost)
 
-    def _tried(
-        self,
-        program: QuickProgram,
-        question: LiveQuestion,
-        last: QuickDesign | None,
-        values: Mapping[str, float],
-    ) -> QuickOutcome:
-        if not values:
-            return program.from_starts(question)
+    def _tried(self, begin: _Beginning, last: QuickDesign | None) -> QuickOutcome:
+        program, question = begin.program, begin.question
         known = last is not None and last.program is program
         if last is not None and known:
             outcome = program.beside(question, last.point)
             if outcome.state in ("solved", "infeasible"):
                 return outcome
-        outcome = program.from_values(question, values)
+        if not begin.values:
+            return program.from_starts(question)
+        outcome = program.from_values(question, begin.values)
         return outcome if known or outcome.state == "solved" else program.from_starts(question)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beginning:
+    """Where a search begins; computed where it is asked for, which most drags do not.
+
+    Parameters
+    ----------
+    program
+        Of the question.
+    question
+        That is asked.
+    numbers
+        Of the last good design in SI by name; empty where there is none.
+    """
+
+    program: QuickProgram
+    question: LiveQuestion
+    numbers: Mapping[str, float]
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Numbers that the program knows, scaled."""
+        return self.program.outputs.scaled_values(self.numbers)
+
+    @cached_property
+    def unknowns(self) -> Floats:
+        """All unknowns of the program."""
+        return self.program.rows.completed(self.question, self.values)
 
 
 def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:

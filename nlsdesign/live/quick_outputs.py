@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..design.optimisation.variables import DesignVariable, scaled
 from .question import LiveQuestion
 from .quick_rows import QuickRows
 
@@ -51,7 +50,7 @@ class QuickOutputs:
             Scaled.
         """
         values = np.array(self._in_si(unknowns)).ravel()
-        return {v.name: float(value) for v, value in zip(self._chosen, values, strict=True)}
+        return {v.name: float(value) for v, value in zip(self._rows.chosen, values, strict=True)}
 
     def scaled_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return values in SI as this program scales them, those that it knows.
@@ -61,16 +60,11 @@ class QuickOutputs:
         values
             In SI by name.
         """
-        return {v.name: scaled(v, values[v.name]) for v in self._chosen if v.name in values}
-
-    @property
-    def _chosen(self) -> list[DesignVariable]:
-        problem = self._rows.problem
-        return [*problem.scalars, *(problem.contour.all() if problem.contour else ())]
+        return {v.name: self._rows.scaled(v, values[v.name]) for v in self._rows.chosen if v.name in values}
 
     @cached_property
     def _in_si(self) -> ca.Function:
-        values = ca.vertcat(*[v.value for v in self._chosen])
+        values = ca.vertcat(*[v.value for v in self._rows.chosen])
         return ca.Function("chosen", [self._rows.problem.vector], [values])
 
     @cached_property

@@ -19,7 +19,7 @@ from ..design import Target
 from ..design.optimisation.limits import Bound
 from ..design.optimisation.problem import SymbolicTarget, design_problem
 from ..design.optimisation.solve import GOALS
-from ..design.optimisation.variables import scaled
+from ..design.optimisation.variables import DesignVariable, VariableScale, scale_of, scaled
 from ..design.statics.equilibrium import elastic_law
 from ..design.statics.rounding import has_corners
 from .movable_target import MovableTarget
@@ -142,13 +142,34 @@ class QuickRows:
             state = numbers[variable.name]
             ends = (state.minimum, state.maximum) if state.free else (state.value, state.value)
             low[i], high[i] = (
-                scaled(variable, end) if math.isfinite(end) else natural
+                self.scaled(variable, end) if math.isfinite(end) else natural
                 for end, natural in zip(ends, (low[i], high[i]), strict=True)
             )
         if "last_direction" in self._names:
             at, last = self._names.index("last_direction"), question.target.last_angle
             low[at], high[at] = last, last + math.pi / 2
         return low, high
+
+    def scaled(self, variable: DesignVariable, value: float) -> float:
+        """Return the symbol's value at which a variable has a value in SI, within its range.
+
+        Parameters
+        ----------
+        variable
+            Of this structure.
+        value
+            In SI.
+        """
+        return scaled(variable, value, self._scales_of_variables[variable.name])
+
+    @cached_property
+    def chosen(self) -> list[DesignVariable]:
+        """Sizes and variables of the contour."""
+        return [*self.problem.scalars, *(self.problem.contour.all() if self.problem.contour else ())]
+
+    @cached_property
+    def _scales_of_variables(self) -> dict[str, VariableScale]:
+        return {variable.name: scale_of(variable) for variable in self.chosen}
 
     def numbers_of(self, question: LiveQuestion) -> Floats:
         """Return the numbers of the target.

@@ -9,9 +9,9 @@ import pytest
 
 from nlsdesign.cli.readiness import readiness
 from nlsdesign.components.assembly.deck_remarks import deck_remarks
-from nlsdesign.components.assembly.deck_template import load_template, template_names
+from nlsdesign.components.assembly.deck_template import load_template
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import Deck, deck_names, load_deck, read_deck
+from nlsdesign.deck import Deck, deck_names, load_deck, read_deck, template_names
 from nlsdesign.errors import DeckError
 from tests.command_line import Run
 from tests.command_line import run as run

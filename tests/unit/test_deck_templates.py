@@ -20,10 +20,9 @@ from nlsdesign.components.assembly.deck_template import (
     MotorInertia,
     load_template,
     motor_inertia,
-    template_names,
 )
 from nlsdesign.components.assembly.deck_writer import declare
-from nlsdesign.deck import load_deck, read_deck
+from nlsdesign.deck import load_deck, read_deck, template_names
 from nlsdesign.quantity import quantity
 from tests.command_line import Run
 from tests.command_line import run as run

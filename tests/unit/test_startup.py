@@ -94,6 +94,17 @@ def test_a_command_does_not_load_what_it_does_not_use(loaded: Loaded, words: tup
     assert not modules & NOT_NEEDED[words]
 
 
+@pytest.mark.parametrize("deck", ["cam-actuator", "test_rig"])
+def test_the_live_page_answers_before_any_numerical_library_is_loaded(loaded: Loaded, deck: str) -> None:
+    ended = """
+import nlsdesign.live.server as server
+server.asyncio.run = lambda run: run.close()
+"""
+    modules, _ = loaded(ended + COMMAND.format(words=["serve", deck, "--no-browser"]))
+    assert "uvicorn" in modules
+    assert not modules & HEAVY
+
+
 @pytest.mark.parametrize("room", ["report", "discrepancy", "observer", "control"])
 def test_a_room_loads_sympy_and_python_control_only_when_it_uses_them(loaded: Loaded, room: str) -> None:
     modules, _ = loaded(f"import nlsdesign.{room}")

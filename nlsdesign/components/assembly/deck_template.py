@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...deck import Deck, read_deck
+from ...deck import Deck, read_deck, template_names
 from ...errors import DeckError, NlsError, unknown_name
 from ...locations import folder
 from ...quantity import Quantity
@@ -174,18 +174,13 @@ class DeckTemplate:
         return type(error)(f"template {self.name}: {thing}", error.rule, **words)
 
 
-def template_names() -> list[str]:
-    """Return the names of the templates that come with the project."""
-    return sorted(path.stem for path in (folder("models") / "templates").glob("*.toml"))
-
-
 def load_template(name: str) -> DeckTemplate:
     """Return a template.
 
     Parameters
     ----------
     name
-        One of :func:`template_names`.
+        One of :func:`nlsdesign.deck.template_names`.
 
     Raises
     ------

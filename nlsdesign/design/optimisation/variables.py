@@ -41,7 +41,38 @@ def scalar(variable: Variable, small: float) -> DesignVariable:
     return DesignVariable(variable.name, symbol, size * symbol, low / size, high / size, now / size)
 
 
-def scaled(variable: DesignVariable, value: float) -> float:
+class VariableScale(NamedTuple):
+    """Value of a variable in SI where its symbol is zero, and where it is one."""
+
+    at_zero: float
+    at_one: float
+
+    def position(self, value: float) -> float:
+        """Return the symbol's value at which the variable has a value in SI.
+
+        Parameters
+        ----------
+        value
+            In SI.
+        """
+        if self.at_zero > 0.0:
+            return math.log(max(value, 1e-300) / self.at_zero)
+        return value / self.at_one
+
+
+def scale_of(variable: DesignVariable) -> VariableScale:
+    """Return the scale of a variable.
+
+    Parameters
+    ----------
+    variable
+        As made by :func:`scalar`.
+    """
+    ends = (float(ca.evalf(ca.substitute(variable.value, variable.symbol, at))) for at in (0.0, 1.0))
+    return VariableScale(*ends)
+
+
+def scaled(variable: DesignVariable, value: float, scale: VariableScale | None = None) -> float:
     """Return the symbol's value at which a variable has a value in SI, within its range.
 
     Parameters
@@ -50,10 +81,8 @@ def scaled(variable: DesignVariable, value: float) -> float:
         As made by :func:`scalar`.
     value
         In SI.
+    scale
+        Of the variable, where it is known already.
     """
-    at_zero = float(ca.evalf(ca.substitute(variable.value, variable.symbol, 0.0)))
-    if at_zero > 0.0:
-        position = math.log(max(value, 1e-300) / at_zero)
-    else:
-        position = value / float(ca.evalf(ca.substitute(variable.value, variable.symbol, 1.0)))
+    position = (scale or scale_of(variable)).position(value)
     return min(max(position, variable.lower), variable.upper)

@@ -88,22 +88,19 @@ function takeAnswer(message) {
   if (message.number !== null) byId("notice").hidden = true;
   clearTimeout(waiting);
   waiting = 0;
-  requestAnimationFrame(() => {
-    showAnswer();
-    if (message.at) showAngle(message.at);
-    const number = message.number;
-    if (number !== null) afterPaint(() => questions.drawn(number, "drag to drawn"));
-  });
+  showAnswer();
+  if (message.at) showAngle(message.at);
+  const { number } = message;
+  if (number !== null) afterPaint(() => questions.drawn(number, "drag to drawn"));
   if (message.answer.seconds !== undefined && message.number !== null) performance.measure("computed", { start: 0, duration: 1e3 * message.answer.seconds });
 }
 
 function takeAngle(message) {
-  requestAnimationFrame(() => {
-    showAngle(message.at);
-    if (message.number !== null) afterPaint(() => questions.drawn(message.number, "slide to drawn"));
-  });
+  showAngle(message.at);
+  if (message.number !== null) afterPaint(() => questions.drawn(message.number, "slide to drawn"));
 }
 
+// After the frame that holds what was changed now.
 function afterPaint(then) {
   const channel = new MessageChannel();
   channel.port1.onmessage = then;

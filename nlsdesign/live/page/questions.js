@@ -1,4 +1,5 @@
-// What is asked of the session: one at a time, in order; of a drag only the newest waits.
+// What is asked of the session: one at a time, in order. Moves of one drag are sent as they come, since the
+// session takes the newest that has arrived when it is free; sent after the answer they would wait for its way back.
 
 export class Questions {
   // send(message) tells whether it went; told(busy) whether an answer is awaited.
@@ -8,6 +9,7 @@ export class Questions {
     this.number = 0;
     this.waiting = [];
     this.open = null;
+    this.dragged = null;
     this.times = new Map();
   }
 
@@ -29,8 +31,16 @@ export class Questions {
   }
 
   next() {
-    if (this.open === null && this.waiting.length > 0 && this.send(this.waiting[0])) this.open = this.waiting.shift().number;
+    while (this.waiting.length > 0 && this.ready(this.waiting[0]) && this.send(this.waiting[0])) {
+      const { number, drag } = this.waiting.shift();
+      this.open = number;
+      this.dragged = drag ?? null;
+    }
     this.told(this.busy);
+  }
+
+  ready(message) {
+    return this.open === null || (this.dragged !== null && message.drag === this.dragged);
   }
 
   // The page is left: what waits must not be lost.
