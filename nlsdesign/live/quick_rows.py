@@ -73,6 +73,9 @@ class QuickRows:
         scales = ca.vertcat(*[bound.scale for bound in self.bounds])
         self.scales = np.array(ca.Function("scales", [self.target.symbols], [scales])(parameters)).ravel()
         self._names = [v.name for v in self.problem.variables]
+        # Sizes and variables of the contour.
+        of_contour = self.problem.contour.all() if self.problem.contour else ()
+        self.chosen: list[DesignVariable] = [*self.problem.scalars, *of_contour]
 
     @cached_property
     def limit_rows(self) -> list[ca.SX]:
@@ -161,11 +164,6 @@ class QuickRows:
             In SI.
         """
         return scaled(variable, value, self._scales_of_variables[variable.name])
-
-    @cached_property
-    def chosen(self) -> list[DesignVariable]:
-        """Sizes and variables of the contour."""
-        return [*self.problem.scalars, *(self.problem.contour.all() if self.problem.contour else ())]
 
     @cached_property
     def _scales_of_variables(self) -> dict[str, VariableScale]:
