@@ -16,6 +16,8 @@ from .sessions import Sessions
 
 _PAUSE = 20.0
 """Seconds between two looks for sessions whose time is over."""
+_PAGE_FIRST = 0.5
+"""Seconds after which the process of the first session is prepared: it would be in the way of the first paint."""
 
 
 def serve(
@@ -64,7 +66,6 @@ def serve(
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             ready(access.address)
-            await sessions.prepare()
 
     async def run() -> None:
         async with _kept_in_bounds(sessions):
@@ -79,6 +80,8 @@ def serve(
 @contextlib.asynccontextmanager
 async def _kept_in_bounds(sessions: Sessions) -> AsyncIterator[None]:
     async def look() -> None:
+        await asyncio.sleep(_PAGE_FIRST)
+        await sessions.prepare()
         while True:
             await asyncio.sleep(_PAUSE)
             sessions.end_the_idle()
