@@ -17,7 +17,7 @@ from .sessions import Sessions
 _PAUSE = 20.0
 """Seconds between two looks for sessions whose time is over."""
 _PAGE_FIRST = 0.5
-"""Seconds after which the process of the first session is prepared: it would be in the way of the first paint."""
+"""Seconds before the first session is prepared: its process would be in the way of the first paint."""
 
 
 def serve(
