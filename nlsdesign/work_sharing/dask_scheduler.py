@@ -130,7 +130,7 @@ class DaskScheduler:
 
 
 def _require_address(file: Path) -> None:
-    """Refuse a file that no scheduler wrote before Dask's client begins, which complains of it at its end too."""
+    """Refuse a file that no scheduler wrote before Dask begins, which complains of it at its end too."""
     step = "name the file that the scheduler wrote (dask scheduler --scheduler-file FILE)"
     if not is_there(file):
         raise WorkSharingError(str(file), "no such file", next_step=step)
