@@ -1,7 +1,8 @@
 """What a sweep costs besides its points: overhead, memory of the driver, what a kill costs, size of results.
 
 Each run is a process of its own. The yardstick is the processor time of the same points computed one after
-the other in one process, without any of the engine. Two overheads are given: processor time of driver and
+the other without any of the engine, by as many processes at once as there are workers: two cores that both
+work are slower than one that works alone. Two overheads are given: processor time of driver and
 workers together over that of the points, and time of the workers in which no point was computed. Printed, not
 asserted; ``--write`` puts the table into ``docs/scale.md``:
 
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 WORKERS = 2
-YARDSTICK = 400
+YARDSTICK = 1000
 MARK = "<!-- written by benchmarks.sweeps from here on -->"
 COUNTED = "NLSDESIGN_COUNTED_POINTS"
 
@@ -51,9 +52,9 @@ def main() -> None:
 def table(points: int) -> str:
     """Return all measurements as Markdown."""
     load = os.getloadavg()[0]
-    before = one("yardstick", YARDSTICK)["cost"]
+    before = cost_of_a_point()
     runs = {name: one(name, points) for name in ("processes", "dask")}
-    after = one("yardstick", YARDSTICK)["cost"]
+    after = cost_of_a_point()
     cost = 0.5 * (before + after)
     lines = [
         f"{points} points of {1e3 * cost:.1f} ms each ({1e3 * before:.1f} before, {1e3 * after:.1f} after; "
@@ -86,15 +87,29 @@ def table(points: int) -> str:
     return "\n".join(lines)
 
 
+def cost_of_a_point() -> float:
+    """Return the processor time of a point without the engine, as many processes at once as workers."""
+    return sum(each["cost"] for each in at_once("yardstick", YARDSTICK, WORKERS)) / WORKERS
+
+
 def one(name: str, points: int) -> dict[str, Any]:
     """Return what one measurement gives in a process of its own."""
+    return at_once(name, points, 1)[0]
+
+
+def at_once(name: str, points: int, count: int) -> list[dict[str, Any]]:
+    """Return what a measurement gives in each of several processes that run at once."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    words = [sys.executable, "-m", "benchmarks.sweeps", "--one", name, "--points", str(points), "--out"]
     with tempfile.TemporaryDirectory() as folder:
-        words = [sys.executable, "-m", "benchmarks.sweeps", "--one", name, "--points", str(points)]
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        done = subprocess.run([*words, "--out", f"{folder}/out"], check=True, capture_output=True, text=True,
-                              env=environment)  # fmt: skip
-    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return result
+        begun = [
+            subprocess.Popen([*words, f"{folder}/{k}"], stdout=subprocess.PIPE, text=True, env=environment)
+            for k in range(count)
+        ]
+        shown = [each.communicate()[0] for each in begun]
+        if any(each.returncode for each in begun):
+            raise RuntimeError(f"{name}: a process of the measurement failed, see above")
+    return [json.loads(each.splitlines()[-1]) for each in shown]
 
 
 def asked(points: int) -> dict[str, Any]:

@@ -71,7 +71,8 @@ fi
 rm -f "$stamp"
 
 say "installing the locked packages (once; 400 MB to download, 1.6 GB on disk) ..."
-"$venv/bin/python" -m pip install $quiet --require-hashes --only-binary :all: -r requirements/locked.txt || {
+# Not compiled here, one after the other: what is imported is compiled then, and most of it never is.
+"$venv/bin/python" -m pip install $quiet --no-compile --require-hashes --only-binary :all: -r requirements/locked.txt || {
     say "the locked packages could not be installed; the reason stands above. Is there a network, a proxy to set?"
     say "With a Python that is newer than the lock, try an older one:  make PYTHON=python3.13 ..."
     exit 2

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,8 +35,15 @@ def modules(package: Path) -> dict[str, Path]:
 
 def imports(package: Path) -> list[Import]:
     """All imports in all modules: also lazy ones, those for type checking, and ``import_module("...")``."""
-    known = modules(package)
-    return [found for source, file in known.items() for found in _imports_of(source, file, known)]
+    files = modules(package)
+    return list(_imports_as_of(tuple((name, file, file.stat().st_mtime_ns) for name, file in files.items())))
+
+
+@functools.lru_cache(maxsize=2)
+def _imports_as_of(files: tuple[tuple[str, Path, int], ...]) -> tuple[Import, ...]:
+    """The same, read once for files that have not changed."""
+    known = {name: file for name, file, _ in files}
+    return tuple(found for source, file in known.items() for found in _imports_of(source, file, known))
 
 
 def cycles(edges: Iterable[tuple[str, str]]) -> list[str]:
@@ -60,12 +69,14 @@ def cycles(edges: Iterable[tuple[str, str]]) -> list[str]:
 
 def _imports_of(source: str, file: Path, known: dict[str, Path]) -> Iterator[Import]:
     package = source if file.name == "__init__.py" else source.rpartition(".")[0]
-    tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
     functions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-    lazy = {id(inner) for node in ast.walk(tree) if isinstance(node, functions) for inner in ast.walk(node)}
-    for node in ast.walk(tree):
+    waiting = deque([(ast.parse(file.read_text(encoding="utf-8"), filename=str(file)), False)])
+    while waiting:
+        node, lazy = waiting.popleft()
         for target in _targets(node, package, known):
-            yield Import(source, target, getattr(node, "lineno", 0), id(node) in lazy)
+            yield Import(source, target, getattr(node, "lineno", 0), lazy)
+        inside = lazy or isinstance(node, functions)
+        waiting.extend((child, inside) for child in ast.iter_child_nodes(node))
 
 
 def _targets(node: ast.AST, package: str, known: dict[str, Path]) -> Iterator[str]:

@@ -61,13 +61,13 @@ def whole_design(
     def progress() -> None:
         nonlocal done
         done += 1
-        stage(f"start {done} of {STARTS} is solved")
+        ended = "; then the finish, and what would help where it misses" if done == STARTS else ""
+        stage(f"start {done} of {STARTS} is solved{ended}")
 
     stage(f"solves from {STARTS} starts")
     settings = DesignSettings(
-        starts=STARTS, defaults=(), look_for_size_ranges=False, look_for_remedies=False, draws=0,
-        progress=progress,
-    )  # fmt: skip
+        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress
+    )
     try:
         return FullDesign(
             "solved", design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
@@ -102,6 +102,8 @@ def full_answer(
     view = view_of(question, quick.revision, full.design)
     missed = full.design.miss
     sentences = [] if missed is None else [f"misses its target: {missed.words}"]
+    if missed is not None and missed.advice:
+        sentences.append(f"what would help: {', or '.join(missed.advice)}")
     if solved is not None and quick.design is not None:
         sentences += _differences(full.design, solved, quick.design)
     elif quick.state != "solved":

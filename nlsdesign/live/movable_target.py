@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +85,15 @@ class MovableTarget:
         target
             The curve.
         """
-        curve = PchipInterpolator(target.angles, target.torques)
-        # The curve is monotone between its points, so the largest torque is that of a point.
-        ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
-        numbers: Floats = np.concatenate([curve.x, curve.c.T.ravel(), ends])
-        return numbers
+        return _numbers_of(target)
+
+
+@functools.lru_cache(maxsize=8)
+def _numbers_of(target: TabulatedTorque) -> Floats:
+    """Return the numbers of a curve; the same array where it is asked for again, so it cannot be changed."""
+    curve = PchipInterpolator(target.angles, target.torques)
+    # The curve is monotone between its points, so the largest torque is that of a point.
+    ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
+    numbers: Floats = np.concatenate([curve.x, curve.c.T.ravel(), ends])
+    numbers.flags.writeable = False
+    return numbers

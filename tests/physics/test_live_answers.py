@@ -307,17 +307,33 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert same.design.checked
     unanswered = full_answer(replace(full, design=None, message="stopped"), question, answer, solved)
     assert "came to no answer: stopped; shown is the quick answer, unchecked" in unanswered.message
-    miss = Miss(0.05, 0.01, 0.3, 1e-3, ("MaximumStrain",), None, ())
+    miss = Miss(0.05, 0.01, 0.3, 1e-3, ("MaximumStrain",), None, ("free rubber.area (to 2 mm^2)", "another"))
     missed = full_answer(
         replace(full, design=replace(full.design, miss=miss)), question, answer, solved
     ).message  # fmt: skip
     assert missed.startswith("misses its target: 5 % rms of the largest torque, 1 % allowed; worst at 17.2°")
     assert missed.lower().count("misses") == 1
+    assert "; what would help: free rubber.area (to 2 mm^2), or another" in missed
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
     assert "worse local optimum: 0.0175 mN·m rms against 0.0175 mN·m rms now" in worse.message
     template._history.settle(full)
     assert template.answer.source == "full"
     assert template.at(0.3).revision == template.answer.revision
+
+
+@pytest.mark.slow
+def test_a_whole_design_that_misses_names_what_would_help_and_it_does() -> None:
+    question = gallery_question("one_sided_cable_drive")
+    missed = whole_design(lambda _: None, question.actuator, question.target, question.free, question.keep)
+    assert missed.design is not None
+    assert missed.design.miss is not None
+    (advice,) = missed.design.miss.advice
+    length = "spring.cable.rope.rubber.rest_length"
+    assert advice.startswith(f"free {length} (to ")
+    helped = FreeNumber(length).applied(question, None)
+    met = whole_design(lambda _: None, helped.actuator, helped.target, helped.free, helped.keep)
+    assert met.design is not None
+    assert met.design.met
 
 
 @pytest.mark.slow

@@ -113,6 +113,14 @@ def test_a_scheduler_that_is_not_there_is_named_within_seconds(tmp_path: Path) -
         sweeping.run(tmp_path, 2, DaskScheduler(file=tmp_path / "none.json"))
 
 
+@pytest.mark.parametrize("content", ["{}", "no table", "[]", '{"address": 3}', ""])
+def test_a_file_that_no_scheduler_wrote_is_refused_before_dask_begins(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "scheduler.json"
+    file.write_text(content)
+    with pytest.raises(WorkSharingError, match=r"scheduler\.json: is no file of a Dask scheduler"):
+        DaskScheduler(file=file).connected(1.0)
+
+
 @pytest.mark.slow
 def test_a_sweep_survives_the_kill_of_a_worker(tmp_path: Path) -> None:
     port, out = free_port(), tmp_path / "worker"

@@ -89,23 +89,37 @@ function takeAnswer(message) {
   if (message.number !== null) byId("notice").hidden = true;
   clearTimeout(waiting);
   waiting = 0;
-  showAnswer();
-  if (message.at) showAngle(message.at);
-  const { number } = message;
-  if (number !== null) afterPaint(() => questions.drawn(number, "drag to drawn"));
+  if (message.at) latestAt = message.at;
+  draw(message.number, "drag to drawn");
   if (message.answer.seconds !== undefined && message.number !== null) performance.measure("computed", { start: 0, duration: 1e3 * message.answer.seconds });
 }
 
 function takeAngle(message) {
   showAngle(message.at);
-  if (message.number !== null) afterPaint(() => questions.drawn(message.number, "slide to drawn"));
+  if (message.number !== null) requestAnimationFrame(() => afterPaint(() => questions.drawn(message.number, "slide to drawn")));
 }
 
-// After the frame that holds what was changed now.
+// Answers that come within one frame are drawn once, the last of them.
+let latestAt = null, latestNumber = null, drawing = false;
+function draw(number, kind) {
+  if (number !== null) latestNumber = number;
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    const shown = latestNumber, at = latestAt;
+    drawing = false;
+    latestNumber = latestAt = null;
+    showAnswer();
+    if (at) showAngle(at);
+    if (shown !== null) afterPaint(() => questions.drawn(shown, kind));
+  });
+}
+
+// After the frame that is being made now.
 function afterPaint(then) {
   const channel = new MessageChannel();
   channel.port1.onmessage = then;
-  requestAnimationFrame(() => channel.port2.postMessage(0));
+  channel.port2.postMessage(0);
 }
 
 function refuse(message) {
