@@ -11,6 +11,7 @@ import click
 
 from ..errors import MeasurementError
 from ..writing import write_text
+from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from ..simulation import Prior
 
 KINDS = ("hung_weight", "load_cell", "free_run")
-_file = click.Path(path_type=Path, dir_okay=False)
+_file = NamedPath(dir_okay=False)
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -39,7 +40,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @deck_option
 @click.option("--kind", "kinds", multiple=True, type=click.Choice(KINDS),
               help="What was done; repeatable, once for each --records.")  # fmt: skip
-@click.option("--records", "folders", multiple=True, type=click.Path(path_type=Path),
+@click.option("--records", "folders", multiple=True, type=NamedPath(example="bench/weights"),
               help="Folder of records of that kind, with its records.toml; repeatable.")  # fmt: skip
 @click.option("--known", type=_file, default=None,
               help="joint_numbers.json of an earlier calibration, as what is known before.")  # fmt: skip

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import NlsError
+from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import out_option
 
@@ -24,7 +25,7 @@ _SOURCES = ("design", "verdict")
         "nlsdesign compare out/monday out/friday out/design/model.toml --out out/compared --json",
     )
 )
-@click.argument("results", nargs=-1, required=True, metavar="FOLDER...", type=click.Path(path_type=Path))
+@click.argument("results", nargs=-1, required=True, metavar="FOLDER...", type=NamedPath(example="out/design"))
 @out_option("out/comparison", writes=("report.html", "comparison.json"))
 @json_option
 def compare(results: tuple[Path, ...], out: Path, as_json: bool) -> None:

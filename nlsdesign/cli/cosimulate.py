@@ -13,6 +13,7 @@ import click
 
 from ..errors import ValueRangeError, unknown_name
 from ..quantity import Quantity, quantity, typeset_unit
+from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import out_file_option
 from .units import Number, parse_number
@@ -47,7 +48,7 @@ WIRE_HELP = (
     ),
 )
 @click.option("--fmu", "fmus", multiple=True, metavar="INSTANCE=FILE", help="Repeatable.")
-@click.option("--system", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE.ssp",
+@click.option("--system", type=NamedPath(dir_okay=False), default=None, metavar="FILE.ssp",
               help="An SSP archive instead of --fmu; wires and parameters are added to its own.")  # fmt: skip
 @click.option("--wire", "wires", multiple=True, metavar="TO=FROM[*GAIN][@DELAY]", help=WIRE_HELP)
 @click.option("--input", "inputs", multiple=True, metavar="INPUT=NUMBER|AMPLITUDE@HERTZ",

@@ -15,6 +15,7 @@ from ..locations import bundled
 from ..quantity import Quantity, sources, with_unit
 from ..writing import write_text
 from .deck_new import force_option, new, refuse_to_replace
+from .named_paths import NamedPath
 from .output import examples, json_option, line_width, show_json, show_table
 from .overwriting import out_file_option
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
     from .readiness import Readiness
 
-_file = click.Path(path_type=Path, dir_okay=False, exists=True)
+_file = NamedPath(dir_okay=False, exists=True)
 
 
 @click.group()
@@ -56,7 +57,7 @@ def list_decks(as_json: bool) -> None:
 
 @deck.command("copy", epilog=examples("nlsdesign deck copy austin2015_figure_consistent leg.toml"))
 @click.argument("deck_name", metavar="DECK")
-@click.argument("out", metavar="OUT.TOML", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("out", metavar="OUT.TOML", type=NamedPath(dir_okay=False, example="leg.toml"))
 @force_option
 @json_option
 def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:

@@ -12,6 +12,7 @@ import click
 
 from ..errors import NlsError, ValueRangeError
 from .design_kinds import KINDS, show_kinds
+from .named_paths import NamedPath
 from .output import DECK_HELP, examples, json_option, show_json, show_table, spring_option
 from .overwriting import out_option
 from .range_remarks import range_remarks, warn
@@ -64,12 +65,12 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @click.option("--list", "listed", type=click.Choice(KINDS), default=None,
               help="Only list what a design can be asked for: names, fields, units, defaults.")  # fmt: skip
 @click.option(
-    "--task", "task_file", type=click.Path(path_type=Path, dir_okay=False), default=None,
+    "--task", "task_file", type=NamedPath(dir_okay=False), default=None,
     help="Design file (TOML) with target, free names, limits, goals, stock.",
 )  # fmt: skip
 @click.option("--target", default=None, help="Target curve: 'PowerTorque = {coefficient = 4.35, ...}'.")
 @click.option(
-    "--target-file", type=click.Path(path_type=Path, dir_okay=False), default=None,
+    "--target-file", type=NamedPath(dir_okay=False), default=None,
     help="Target curve as CSV with units in its heads.",
 )  # fmt: skip
 @click.option("--maximum", default=None, help='Exponential target: torque at the end, e.g. "5 N·m".')

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .exported_machine import MACHINE, export_machine, export_option
+from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, measured_option, show_json, spring_option
 from .overwriting import c_names, out_option
 from .range_remarks import warn
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from ..regeneration import Regeneration
     from ..report.sections import Section
 
-_file = click.Path(path_type=Path, dir_okay=False)
+_file = NamedPath(dir_okay=False)
 _mapping = click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
 
 _OF_THIS_RUN_ALONE = ("next_record.csv", "regeneration.json")
@@ -49,7 +50,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     )
 )
 @deck_option
-@click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of CSV files.")
+@click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of CSV files.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
 @_mapping
 @click.option(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .named_paths import NamedPath
 from .output import DECK_HELP, examples, json_option, show_json, show_table
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
         "nlsdesign export check out/c --deck austin2015_figure_consistent --json",
     ),
 )
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=NamedPath(example="out/c"))
 @click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @json_option
 def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:

@@ -13,6 +13,7 @@ import click
 from ..quantity import typeset_unit
 from .exported_machine import MACHINE, ExportedMachine, export_machine, export_option
 from .observer import sample_time_option
+from .named_paths import NamedPath
 from .output import (
     deck_option,
     examples,
@@ -25,7 +26,7 @@ from .output import (
 from .overwriting import c_names, out_option
 from .units import Number
 
-_file = click.Path(path_type=Path, dir_okay=False)
+_file = NamedPath(dir_okay=False)
 
 
 def _writes(given: Mapping[str, Any]) -> list[str]:
@@ -43,7 +44,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     )
 )
 @deck_option
-@click.option("--records", type=click.Path(path_type=Path), required=True, help="Folder of records.")
+@click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of records.")
 @click.option("--hold-out", multiple=True, help="Glob of record names that no fit may use; repeatable.")
 @click.option("--mapping", type=_file, default=None, help="TOML that maps columns to signals.")
 @click.option("--window", type=Number("s", above=0.0), default=None,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ArrangementError
+from .named_paths import NamedPath
 from .output import examples, json_option, show_json
 from .units import Number
 
@@ -193,12 +194,12 @@ def learning_design(proved: Proof, model: FlatModel | None) -> AdaptiveDesign | 
         "nlsdesign observer verify out/observer/certificate.json --deck my.toml --c out/observer --json",
     ),
 )
-@click.argument("certificate", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("certificate", type=NamedPath(dir_okay=False, example="out/observer/certificate.json"))
 @click.option("--deck", "deck_name", metavar="DECK", help="Deck that should be the certified one.")
 @click.option(
     "--c",
     "code",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=NamedPath(file_okay=False),
     help="Folder of the C files; they are written anew from the deck and compared.",
 )
 @json_option

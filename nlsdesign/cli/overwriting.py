@@ -14,6 +14,7 @@ import click
 
 from ..errors import ValueRangeError
 from ..written_files import WORDS, file_state, keeping, listed_files, refuse_to_lose
+from .named_paths import NamedPath
 from .output import show_json
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -40,7 +41,7 @@ def out_option(default: str = "out", *, writes: Names = ()) -> Callable[[F], F]:
         Files that the command writes there, so far as their names are known beforehand. Those that an earlier
         run has listed there are looked at too where none is named.
     """
-    kind = click.Path(path_type=Path, file_okay=False)
+    kind = NamedPath(file_okay=False)
     text = "Folder for all files that are written."
     option = click.option(
         "--out", type=kind, default=default, show_default=True, help=text, callback=_can_be_made
@@ -72,7 +73,7 @@ def out_file_option(
     ending
         Such as ``.csv``, which the name must have.
     """
-    kind = click.Path(path_type=Path, dir_okay=False)
+    kind = NamedPath(dir_okay=False, example=default or f"my{ending or '.toml'}")
     shown = {"default": default, "show_default": True} if default else {"required": True}
     check = functools.partial(_file_can_be_made, ending=ending)
     option = click.option("--out", type=kind, help=text, callback=check, **shown)
@@ -200,7 +201,7 @@ def folder_option(name: str, text: str) -> Callable[[F], F]:
     text
         Help.
     """
-    kind = click.Path(path_type=Path, file_okay=False)
+    kind = NamedPath(file_okay=False, example="out/page")
     return click.option(name, type=kind, default=None, metavar="FOLDER", help=text, callback=_can_be_made)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import NlsError
+from .named_paths import NamedPath
 from .output import examples, json_option, show_written
 from .overwriting import out_option
 from .units import parse_number
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
         "nlsdesign report out/sweep --deck-of 17 --deck-of 42 --out out/chosen --json",
     )
 )
-@click.argument("folder", metavar="FOLDER", type=click.Path(path_type=Path))
+@click.argument("folder", metavar="FOLDER", type=NamedPath(example="out/sweep"))
 @click.option("--smaller", multiple=True, metavar="ANSWER", help="The smaller, the better; repeatable.")
 @click.option("--larger", multiple=True, metavar="ANSWER", help="The larger, the better; repeatable.")
 @click.option("--near", multiple=True, metavar="ANSWER=VALUE", help="The nearer, the better; repeatable.")

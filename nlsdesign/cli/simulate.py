@@ -13,6 +13,7 @@ import click
 from ..errors import ValueRangeError, unknown_name
 from ..quantity import typeset_unit
 from .driving_signals import FORMS, check_rows, read_input_file, read_inputs, read_pairs, size_in
+from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_file_option
 from .units import Number, split_number
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from ..model import FlatModel
     from ..simulation import Trace
 
-_file = click.Path(path_type=Path, dir_okay=False)
+_file = NamedPath(dir_okay=False)
 _MOST_ROWS = 2_000_000
 _SHOWN_EVENTS = 5
 _ROUNDING = 1e-13

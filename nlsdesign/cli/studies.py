@@ -22,6 +22,7 @@ from ..quantity import with_unit
 from ..reading import is_there, text_of
 from ..writing import make_folder
 from ..written_files import listed_files
+from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
 
@@ -247,7 +248,7 @@ def list_studies(as_json: bool) -> None:
 @click.argument("name", metavar="STUDY")
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=NamedPath(file_okay=False, example="out/hello"),
     default=None,
     help="Folder for the results; out/NAME by default.",
 )

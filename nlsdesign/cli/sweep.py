@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ExportError, ValueRangeError
+from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import folder_option, kept
 
@@ -34,9 +35,9 @@ _MOST_REASONS = 8
         "nlsdesign sweep sweep.toml --dry-run",
     )
 )
-@click.argument("file", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE")
+@click.argument("file", type=NamedPath(dir_okay=False, example="sweep.toml"), metavar="FILE")
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), default="out/sweep", show_default=True,
+    "--out", type=NamedPath(file_okay=False), default="out/sweep", show_default=True,
     help="Folder of the results; a run goes on where an earlier one in it ended.",
 )  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), default=None,
