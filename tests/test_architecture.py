@@ -14,7 +14,16 @@ from tests.import_graph import Import, cycles, imports, modules
 
 # Open to every room.
 BASE = {
-    *("bibliography", "data_frames", "errors", "extensions", "interruption", "locations", "processes"),
+    *(
+        "bibliography",
+        "command_words",
+        "data_frames",
+        "errors",
+        "extensions",
+        "interruption",
+        "locations",
+        "processes",
+    ),
     *(
         "progress",
         "quantity",

@@ -12,7 +12,7 @@ import click
 from ..errors import MeasurementError
 from ..writing import write_text
 from .named_paths import NamedPath
-from .output import deck_option, examples, json_option, show_json, show_table
+from .output import deck_option, examples, json_option, next_command, show_json, show_table
 from .overwriting import out_option
 
 if TYPE_CHECKING:
@@ -86,8 +86,9 @@ def calibrate(
         write_text(file, json.dumps(ranked.to_dict(), indent=2, ensure_ascii=False) + "\n")
         _show_plan(ranked, as_json)
         if not as_json:
-            click.echo(f"written: {file}; next: nlsdesign observer calibrate --deck {deck_name} "
-                       "--kind KIND --records FOLDER")  # fmt: skip
+            following = ["--deck", deck_name, "--kind", "KIND", "--records", "FOLDER"]
+            following += ["--known", str(known)] if known else []
+            click.echo(f"written: {file}; next: {next_command('observer', 'calibrate', *following)}")
         return
     if not folders or len(kinds) != len(folders):
         raise MeasurementError(

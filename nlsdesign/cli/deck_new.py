@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import click
 from ..errors import ExportError, NlsError, UnitError, nearest, unknown_name
 from ..quantity import Quantity, same_dimension, typeset_unit
 from ..writing import write_text
-from .output import examples, json_option, show_json
+from .output import examples, json_option, next_command, show_json
 from .readiness import shown_command
 from .units import parse_number, split_number
 
@@ -88,7 +87,7 @@ def new(
         click.echo(f"warning: {remark}")
     commands = ", ".join(map(shown_command, chosen.ready_for))
     click.echo(f"written: {file}, {len(chosen.deck.numbers())} numbers; ready for {commands}")
-    click.echo(f"next: nlsdesign deck check {shlex.quote(str(file))}")
+    click.echo(f"next: {next_command('deck', 'check', file)}")
 
 
 def on_terminal() -> bool:

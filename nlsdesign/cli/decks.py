@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +15,7 @@ from ..quantity import Quantity, sources, with_unit
 from ..writing import write_text
 from .deck_new import force_option, new, refuse_to_replace
 from .named_paths import NamedPath
-from .output import examples, json_option, line_width, show_json, show_table
+from .output import examples, json_option, line_width, next_command, show_json, show_table
 from .overwriting import out_file_option
 
 if TYPE_CHECKING:
@@ -70,7 +69,7 @@ def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:
     if as_json:
         show_json({"file": out, "deck": read.name})
         return
-    click.echo(f"written: {out}; next: nlsdesign deck check {shlex.quote(str(out))}")
+    click.echo(f"written: {out}; next: {next_command('deck', 'check', out)}")
 
 
 @deck.command(
@@ -186,7 +185,8 @@ def from_rig(rig_toml: Path, cam_csv: Path, out: Path, as_json: bool) -> None:
     if as_json:
         show_json({"file": out, "numbers": numbers})
         return
-    click.echo(f"written: {out}, {numbers} numbers; next: nlsdesign diagnose --deck {shlex.quote(str(out))}")
+    following = next_command("diagnose", "--deck", out, "--records", "FOLDER")
+    click.echo(f"written: {out}, {numbers} numbers; next: {following}")
 
 
 def _short(given: Quantity) -> str:

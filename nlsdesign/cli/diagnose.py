@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..command_words import typed_command
 from .exported_machine import MACHINE, export_machine, export_option
 from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, measured_option, show_json, spring_option
@@ -80,7 +80,7 @@ def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options:
     from ..writing import make_folder
     from ..written_files import discard
 
-    command = shlex.join(["nlsdesign", *sys.argv[1:]])
+    command = typed_command("nlsdesign", *sys.argv[1:])
     date = datetime.now().astimezone().isoformat(" ", "minutes")
     actuator = declare(load_deck(deck_name))
     mapping, hold_out = options["mapping"], options["hold_out"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -12,13 +12,14 @@ import click
 
 from ..quantity import typeset_unit
 from .exported_machine import MACHINE, ExportedMachine, export_machine, export_option
-from .observer import sample_time_option
 from .named_paths import NamedPath
+from .observer import sample_time_option
 from .output import (
     deck_option,
     examples,
     json_option,
     measured_option,
+    next_command,
     show_json,
     show_table,
     spring_option,
@@ -108,4 +109,11 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
     for sentence in machine.words():
         click.echo(sentence)
     click.echo(f"report: {page}")
-    click.echo(f"written: {file} and {deck}; next: nlsdesign diagnose --deck {deck} --records {records}")
+    following = next_command("diagnose", "--deck", deck, "--records", records, *_as_read(mapping, hold_out))
+    click.echo(f"written: {file} and {deck}; next: {following}")
+
+
+def _as_read(mapping: Path | None, hold_out: Sequence[str]) -> list[str]:
+    """Return the options with which another command reads the same records in the same way."""
+    words = [word for name in hold_out for word in ("--hold-out", name)]
+    return words if mapping is None else [*words, "--mapping", str(mapping)]

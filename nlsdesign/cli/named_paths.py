@@ -1,4 +1,4 @@
-"""Files and folders as options and arguments: an empty name is refused, it would stand for the current folder."""
+"""Files and folders as options and arguments; an empty name, which would be the current folder, is refused."""
 
 from __future__ import annotations
 

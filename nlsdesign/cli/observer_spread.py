@@ -12,7 +12,7 @@ import click
 from ..errors import ArrangementError
 from ..quantity import typeset_unit
 from .observer_kinds import CASCADE, DesignedObserver, designed_observer
-from .output import show_table
+from .output import next_command, show_table
 
 if TYPE_CHECKING:
     from ..model import FlatModel
@@ -177,4 +177,5 @@ def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
             "sensors; a few draws scatter about it"
         )
     click.echo(f"least over the spread: {errors.best}")
-    click.echo(f"what a calibration would buy: nlsdesign observer calibrate --deck {deck_name} --plan")
+    following = next_command("observer", "calibrate", "--deck", deck_name, "--plan")
+    click.echo(f"what a calibration would buy: {following}")

@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from ..command_words import typed_command
 from .terminal_tables import head_count, table_lines
 
 WIDE = 160
@@ -91,6 +92,20 @@ def show_written(as_json: bool, sentences: Sequence[str], files: Sequence[Path],
     for sentence in sentences:
         click.echo(sentence)
     click.echo(f"written: {', '.join(map(str, files))}")
+
+
+def next_command(*words: object) -> str:
+    """Return a command of this program as it can be copied, with the packages that this run was given.
+
+    Parameters
+    ----------
+    *words
+        Behind the name of the program.
+    """
+    context = click.get_current_context(silent=True)
+    packages = () if context is None else context.find_root().params.get("packages") or ()
+    given = [word for package in packages for word in ("--with", package)]
+    return typed_command("nlsdesign", *given, *words)
 
 
 def examples(*lines: str) -> str:

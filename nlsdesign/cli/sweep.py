@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import sys
 import time
 from pathlib import Path
@@ -13,7 +12,7 @@ import click
 
 from ..errors import ExportError, ValueRangeError
 from .named_paths import NamedPath
-from .output import examples, json_option, show_json, show_table
+from .output import examples, json_option, next_command, show_json, show_table
 from .overwriting import folder_option, kept
 
 if TYPE_CHECKING:
@@ -125,12 +124,12 @@ def _show_result(table: SweepTable, out: Path, page: Path | None, *, as_json: bo
 
 def _following(table: SweepTable, out: Path, page: Path | None) -> dict[str, str]:
     """Return the commands that come next, each with what it does."""
-    folder, commands = shlex.quote(str(out)), {}
+    commands = {}
     if page is None:
-        commands[f"nlsdesign report {folder}"] = "the page: points, reasons of failures, causes, decks"
+        commands[next_command("report", out)] = "the page: points, reasons of failures, causes, decks"
     if not table.done.all():
         first = int(table.values["point"][~table.done][0])
-        commands[f"nlsdesign report {folder} --deck-of {first}"] = "the deck behind a point that failed"
+        commands[next_command("report", out, "--deck-of", first)] = "the deck behind a point that failed"
     return commands
 
 

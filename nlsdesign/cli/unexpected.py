@@ -5,13 +5,13 @@ from __future__ import annotations
 import errno
 import os
 import platform
-import shlex
 import sys
 import tempfile
 import traceback
 
 import click
 
+from ..command_words import typed_command
 from ..errors import fit_for_message
 from ..interruption import usual_temporary_folder, was_interrupted
 from ..locations import version
@@ -61,7 +61,7 @@ def status_of(error: Exception) -> int:
 def _written(error: Exception) -> str:
     lines = [
         f"nlsdesign {version()}, Python {platform.python_version()}, {platform.platform()}",
-        shlex.join(["nlsdesign", *sys.argv[1:]]),
+        typed_command("nlsdesign", *sys.argv[1:]),
         *traceback.format_exception(error),
     ]
     text = "\n".join(lines).encode("utf-8", "backslashreplace")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..command_words import typed_command
 from ..errors import MissingLibraryError, visible
 from ..report import FileSection, PointTableSection, Section, TableSection, TextSection, write_report
 from ..sweeps import SweepTable
@@ -215,7 +215,7 @@ def _best(
     inner = TableSection(title, heads, cells, caption=_caption(content, len(listed)))
     points = [int(table.values["point"][row]) for row in rows]
     folder = content.points_file.parent
-    command = f"nlsdesign report {shlex.quote(source)} --deck-of POINT --out {shlex.quote(str(folder))}"
+    command = typed_command("nlsdesign", "report", source, "--deck-of", "POINT", "--out", folder)
     return PointTableSection(
         title, inner, points, decks=decks, rows=point_rows(table, ranked, content.shown),
         columns=named_columns(table), command=command,
