@@ -1,4 +1,4 @@
-"""Files and folders as options and arguments; an empty name, which would be the current folder, is refused."""
+"""Files and folders as options and arguments; an empty name, which would be the current one, is refused."""
 
 from __future__ import annotations
 
