@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,11 @@ def run(*arguments: str) -> str:
 
 
 def test_a_plan_is_a_ranked_table(tmp_path: Path) -> None:
-    out = run("--deck", LINEAR, "--plan", "--out", str(tmp_path))
+    deck = tmp_path / "stiff spring.toml"
+    deck.write_bytes(load_deck(LINEAR).path.read_bytes())
+    out = run("--deck", str(deck), "--plan", "--out", str(tmp_path))
+    following = shlex.split(out.partition("next: ")[2])
+    assert following[following.index("--deck") + 1] == str(deck)
     assert out.index("hung weight and load cell") < out.index("free run  ")
     plan = json.loads((tmp_path / "plan.json").read_text())
     errors = [row["torque_rms_Nm"] for row in plan["ranked"]]
