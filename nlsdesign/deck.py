@@ -20,6 +20,7 @@ _KEY_PART = r"""(?:[A-Za-z0-9_\-]+|"[^"]*"|'[^']*')"""
 _NAME = rf"{_KEY_PART}(?:\s*\.\s*{_KEY_PART})*"
 _HEADER = re.compile(rf"^\s*\[\[?\s*({_NAME})\s*\]")
 _KEY = re.compile(rf"^(\s*)({_NAME})\s*=")
+_ITEM = re.compile(r"\[\d+\]$")
 MOST_SPREAD = 5.0
 """Largest relative spread of a number in a deck: a factor of six."""
 _MOST_LEVELS = 64
@@ -100,6 +101,8 @@ class Deck:
         Line and column by full name.
     head
         The table ``[deck]`` itself.
+    stands_in
+        Name of the table of the file in which the tables stand; empty where they are the whole file.
     """
 
     name: str
@@ -108,20 +111,40 @@ class Deck:
     tables: Mapping[str, Any]
     places: Mapping[str, tuple[int, int]]
     head: Mapping[str, Any] = field(default_factory=dict)
+    stands_in: str = ""
+
+    def named(self, name: str) -> str:
+        """Return the name by which something stands in the file.
+
+        Parameters
+        ----------
+        name
+            Within the tables of this deck, joined by dots.
+        """
+        return f"{self.stands_in}.{name}" if self.stands_in else name
 
     def place(self, full_name: str) -> str:
-        """Return ``file:line:column: name``, with the place of the nearest table above if it has none.
+        """Return ``file:line:column: name``.
+
+        A table that only its inner tables mention stands where the first of them does; what does not stand in
+        the file at all has the place of the nearest table above.
 
         Parameters
         ----------
         full_name
             Names joined by dots.
         """
-        known = full_name
+        named = self.named(full_name)
+        inner = [place for name, place in self.places.items() if name.startswith(f"{named}.")]
+        known = named
         while known and known not in self.places:
-            known = known.rpartition(".")[0]
-        line, column = self.places.get(known, (1, 1))
-        return f"{self.path.name}:{line}:{column}: {full_name}"
+            known = _ITEM.sub("", known) if _ITEM.search(known) else known.rpartition(".")[0]
+        line, column = (
+            self.places[named]
+            if known == named and known
+            else min(inner, default=self.places.get(known, (1, 1)))
+        )
+        return f"{self.path.name}:{line}:{column}: {named}"
 
     def quantity(self, full_name: str) -> Quantity:
         """Return the number of that name.
@@ -333,16 +356,23 @@ def _not_toml(text: str, path: Path, message: str) -> DeckError:
 
 
 def _places(text: str) -> dict[str, tuple[int, int]]:
+    """Return line and column of each name; the tables of a list ``[[axes]]`` stand as ``axes[1]`` too."""
     places: dict[str, tuple[int, int]] = {}
-    table = ""
+    table, counts = "", dict[str, int]()
     for number, line in enumerate(text.splitlines(), start=1):
         header, key = _HEADER.match(line), _KEY.match(line)
+        if not header and not key:
+            continue
+        place = (number, line.index("[") + 1 if header else len(key[1]) + 1 if key else 1)
         if header:
             table = _joined(header[1])
-            places.setdefault(table, (number, line.index("[") + 1))
-        elif key:
-            full = f"{table}.{_joined(key[2])}" if table else _joined(key[2])
-            places.setdefault(full, (number, len(key[1]) + 1))
+            if line.lstrip().startswith("[["):
+                counts[table] = counts.get(table, 0) + 1
+        full = table if header else f"{table}.{_joined(key[2])}".lstrip(".") if key else ""
+        places.setdefault(full, place)
+        for listed, count in counts.items():
+            if full == listed or full.startswith(f"{listed}."):
+                places.setdefault(f"{listed}[{count}]{full.removeprefix(listed)}", place)
     return places
 
 

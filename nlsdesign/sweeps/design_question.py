@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..components.assembly.named_parts import Assembly
 from ..design import DesignSettings, Goal, Limit, Target, design_cam
-from ..design.optimisation.solve import GOALS
+from ..design.optimisation.solve import GOALS, require_designable
 from .axis_values import si_unit
 from .sweep_columns import SweepColumn
 from .sweep_question import SweepQuestion, answer
@@ -66,6 +66,13 @@ class DesignQuestion(SweepQuestion):
         chosen = [n for n in self.free or () if n in known and not isinstance(known[n].value, tuple)]
         numbers = [answer(f"designed.{n}", si_unit(known[n].unit), "chosen by the design") for n in chosen]
         return (*_ANSWERS, *numbers)
+
+    def require_fit(self, assembly: Assembly) -> None:
+        """Refuse free names, limits and goals that the assembly does not have."""
+        require_designable(
+            assembly, target=self.target, free=self.free, keep=self.keep, goals=self.goals,
+            spring=self.spring or None, settings=self.settings,
+        )  # fmt: skip
 
     def chosen(self, assembly: Assembly) -> frozenset[str]:
         """Return what is free, and the numbers of a contour that is."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..components.assembly.named_parts import Assembly
-from ..errors import ArrangementError, ValueRangeError
+from ..errors import ArrangementError, NlsError, ValueRangeError
 from ..progress import Progress, Quiet
 from ..work_sharing import Executor, PointOutcome, Processes, shared_map
 from .arrow_columns import libraries
@@ -130,6 +130,35 @@ def sweep_task(
     return SweepTask(assemblies, plan, ask, (point, *plan.columns, *answers, *states), about)
 
 
+def require_askable(task: SweepTask) -> None:
+    """Refuse a question that fits no deck of a sweep, nor its first point, whose structure may differ.
+
+    Parameters
+    ----------
+    task
+        That was checked otherwise.
+
+    Raises
+    ------
+    NlsError
+        If the question names what is not there.
+    """
+    first: NlsError | None = None
+    for assembly in task.assemblies.values():
+        try:
+            task.question.require_fit(assembly)
+            return
+        except NlsError as error:
+            first = first or error
+    try:
+        question, assembly = task.work.at(task.plan.point(0))
+        question.require_fit(assembly)
+    except NlsError:
+        if first is not None:
+            raise first from None
+        raise
+
+
 def sweep(
     actuator: Assembly | Mapping[str, Assembly],
     *,
@@ -179,8 +208,10 @@ def sweep(
         If pyarrow is not installed.
     """
     libraries()
+    task = sweep_task(actuator, axes=axes, ask=ask)
+    require_askable(task)
     return run_task(
-        sweep_task(actuator, axes=axes, ask=ask), Path(out),
+        task, Path(out),
         executor=executor or Processes(), settings=settings, progress=progress or Quiet(),
     )  # fmt: skip
 

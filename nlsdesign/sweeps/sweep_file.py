@@ -22,7 +22,7 @@ from .axis_values import unit_of_field
 from .design_question import QUICK, DesignQuestion
 from .diagnosis_question import RECORDS, DiagnosisQuestion
 from .model_questions import AngleQuestion, LoopQuestion, SpreadQuestion
-from .run_sweep import SweepTask, sweep_task
+from .run_sweep import SweepTask, require_askable, sweep_task
 from .saltelli_sample import SaltelliSample
 from .sweep_question import SweepQuestion
 
@@ -92,9 +92,16 @@ def read_sweep_file(path: Path | str) -> SweepTask:
             raise unknown_name(deck.place(key), key, _TABLES)
     assemblies = _assemblies(deck, file.parent)
     axes = [
-        _beside(_axes(deck, number, given), file.parent) for number, given in enumerate(_axes_tables(deck))
+        _beside(_axes(deck, number, given), file.parent)
+        for number, given in enumerate(_axes_tables(deck), start=1)
     ]
-    return sweep_task(assemblies, axes=axes, ask=_question(deck))
+    question = _question(deck)
+    task = sweep_task(assemblies, axes=axes, ask=question)
+    try:
+        require_askable(task)
+    except NlsError as error:
+        raise error.at(deck.place(f"ask.{type(question).__name__}")) from None
+    return task
 
 
 def _assemblies(deck: Deck, folder: Path) -> dict[str, Assembly]:
@@ -126,24 +133,25 @@ def _axes_tables(deck: Deck) -> list[Any]:
 
 
 def _axes(deck: Deck, number: int, given: Any) -> AxisSet:
-    place = f"{deck.place('axes')}, number {number + 1}"
+    place = deck.place(f"axes[{number}]")
     if not isinstance(given, Mapping) or len(given) != 1:
         raise DeckError(place, "must hold one set of axes", next_step=f"write one of: {', '.join(_AXES)}")
     ((name, fields),) = given.items()
     if name not in _AXES:
         raise unknown_name(place, name, _AXES)
-    made: AxisSet = _made(_AXES[name], fields, place)
+    made: AxisSet = _made(deck, _AXES[name], fields, f"axes[{number}].{name}")
     return made
 
 
-def _made(kind: type, fields: Any, place: str) -> Any:
+def _made(deck: Deck, kind: type, fields: Any, path: str) -> Any:
     """Return an object of a table whose values are checked where they are used."""
+    place = deck.place(path)
     if not isinstance(fields, Mapping):
         raise DeckError(place, f"{brief(fields)} is not a table", next_step="write {field = ..., ...}")
     known = {field.name: field for field in dataclasses.fields(kind)}
     for field in fields:
         if field not in known:
-            raise unknown_name(f"{place}: {kind.__name__}: field", field, known)
+            raise unknown_name(f"{deck.place(f'{path}.{field}')}: field", field, known)
     missing = [n for n, f in known.items() if n not in fields and f.default is dataclasses.MISSING]
     if missing:
         raise DeckError(place, f"{kind.__name__} lacks {', '.join(missing)}",
@@ -164,13 +172,13 @@ def _question(deck: Deck) -> SweepQuestion:
         )  # fmt: skip
     ((name, fields),) = given.items()
     if name not in _QUESTIONS:
-        raise unknown_name(deck.place("ask"), name, _QUESTIONS)
-    place = deck.place(f"ask.{name}")
+        raise unknown_name(deck.place(f"ask.{name}"), name, _QUESTIONS)
+    path = f"ask.{name}"
     if name == DesignQuestion.__name__:
         return _design(deck, fields)
     if isinstance(fields, Mapping) and "gains" in fields and name == LoopQuestion.__name__:
-        fields = {**fields, "gains": built(deck, TorqueGains, fields["gains"], f"{place}: gains")}
-    made: SweepQuestion = _made(_QUESTIONS[name], _in_si(_QUESTIONS[name], fields, place), place)
+        fields = {**fields, "gains": built(deck, TorqueGains, fields["gains"], deck.place(f"{path}.gains"))}
+    made: SweepQuestion = _made(deck, _QUESTIONS[name], _in_si(deck, _QUESTIONS[name], fields), path)
     if isinstance(made, DiagnosisQuestion):
         made = dataclasses.replace(made, records=_folder(made.records, deck.path.parent))
     return made
@@ -191,7 +199,7 @@ def _beside(axes: AxisSet, folder: Path) -> AxisSet:
     return Listed({**axes.values, RECORDS: [_folder(str(each), folder) for each in given]})
 
 
-def _in_si(kind: type, fields: Any, place: str) -> Any:
+def _in_si(deck: Deck, kind: type, fields: Any) -> Any:
     """Return the fields of a question with numbers in SI, each of the kind of its default."""
     if not isinstance(fields, Mapping):
         return fields
@@ -199,7 +207,7 @@ def _in_si(kind: type, fields: Any, place: str) -> Any:
     units = {field.name: unit_of_field(field) for field in dataclasses.fields(kind)}
     values: dict[str, Any] = {}
     for name, value in fields.items():
-        default, new = defaults.get(name), value
+        default, new, place = defaults.get(name), value, deck.place(f"ask.{kind.__name__}.{name}")
         if isinstance(default, float) and isinstance(value, str):
             try:
                 number, unit = split_number(value)
@@ -208,11 +216,11 @@ def _in_si(kind: type, fields: Any, place: str) -> Any:
                     raise UnitError(value, f"'{unit}' is no unit of it",
                                     next_step=f"give it in a unit like '{units[name] or '1'}'")  # fmt: skip
             except NlsError as error:
-                raise error.at(f"{place}: {name}") from None
+                raise error.at(place) from None
         elif isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):
             new = float(value)
         if isinstance(default, bool | int | float | str) and not isinstance(new, type(default)):
-            raise DeckError(f"{place}: {name}", f"{brief(value)} is not of the kind of {default!r}")
+            raise DeckError(place, f"{brief(value)} is not of the kind of {default!r}")
         values[name] = new
     return values
 
@@ -221,8 +229,7 @@ def _design(deck: Deck, fields: Any) -> DesignQuestion:
     prefix = f"ask.{DesignQuestion.__name__}"
     if not isinstance(fields, Mapping):
         raise DeckError(deck.place(prefix), "is no table", next_step=f"write [{prefix}]")
-    places = {k.removeprefix(f"{prefix}."): v for k, v in deck.places.items() if k.startswith(f"{prefix}.")}
-    job = job_in(Deck(deck.name, "", deck.path, fields, places))
+    job = job_in(Deck(deck.name, "", deck.path, fields, deck.places, stands_in=prefix))
     if not isinstance(job.target, Target) or any(not isinstance(each, str) for each in job.free or ()):
         raise DeckError(
             deck.place(prefix), "has a stock, or a task in place of a target",

@@ -50,6 +50,21 @@ class SweepQuestion(ABC):
             If there is no answer; its message is kept as the reason.
         """
 
+    def require_fit(self, assembly: Assembly) -> None:
+        """Refuse what the question names and an assembly does not have, before anything is computed.
+
+        Parameters
+        ----------
+        assembly
+            Of a point.
+
+        Raises
+        ------
+        NlsError
+            If the question could not be asked of it.
+        """
+        del assembly
+
     def chosen(self, assembly: Assembly) -> frozenset[str]:
         """Return the numbers that the question chooses itself, so that no axis can change them.
 
@@ -158,10 +173,8 @@ class PointWork:
         NlsError
             If there is no answer.
         """
-        named = {name: value for (name, _), value in zip(self.axes, values, strict=True)}
-        asked = {name: value for name, value in named.items() if name.startswith(f"{ASK}.")}
-        question = with_settings(self.question, asked, dict(self.axes)) if asked else self.question
-        given = question.ask(changed_assembly(self.assemblies, named))
+        question, assembly = self.at(values)
+        given = question.ask(assembly)
         if not isinstance(given, Mapping) or set(given) != set(self.answers):
             shown = sorted(given) if isinstance(given, Mapping) else brief(given)
             raise ValueRangeError(
@@ -169,6 +182,24 @@ class PointWork:
                 next_step="return a number for each name of the units",
             )  # fmt: skip
         return tuple(_number(name, given[name]) for name in self.answers)
+
+    def at(self, values: tuple[Any, ...]) -> tuple[SweepQuestion, Assembly]:
+        """Return the question of a point, and the assembly of which it is asked.
+
+        Parameters
+        ----------
+        values
+            In the order of the axes.
+
+        Raises
+        ------
+        NlsError
+            If a number or a word does not fit.
+        """
+        named = {name: value for (name, _), value in zip(self.axes, values, strict=True)}
+        asked = {name: value for name, value in named.items() if name.startswith(f"{ASK}.")}
+        question = with_settings(self.question, asked, dict(self.axes)) if asked else self.question
+        return question, changed_assembly(self.assemblies, named)
 
 
 def _number(name: str, value: object) -> float:

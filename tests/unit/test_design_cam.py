@@ -159,7 +159,8 @@ def test_a_law_with_knots_is_designed_on_too() -> None:
     [
         (["spring.cam.contuor"], UnknownNameError, "did you mean 'spring.cam.contour'"),
         (["spring.rubber.rest_lenght"], UnknownNameError, "did you mean 'spring.rubber.rest_length'"),
-        (["motor.inertia"], UnknownNameError, "free 'motor.inertia'"),
+        (["motor.inertia"], ValueRangeError, "exists, but a design cannot change it.*spring.cam.contour"),
+        (["motor"], UnknownNameError, "no such name"),
         (["spring.cam.elements"], ValueRangeError, "is a whole number"),
         ([], ValueRangeError, "free for instance 'spring.cam.contour'"),
         (["spring.cam.anchor_distance"], ValueRangeError, "free 'spring.cam.contour' too"),

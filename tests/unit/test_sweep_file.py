@@ -86,7 +86,7 @@ search.seed = 7
         (ANGLE.replace("decks", "deck"), "deck"),
         (ANGLE.replace("austin2015_figure_consistent", "austin2015_figure"), "austin2015_figure_consistent"),
         (ANGLE.replace("[[axes]]", "[[axis]]"), "sweep.toml:3:1: axis.*did you mean 'axes'"),
-        (ANGLE.replace("GridAxis", "GridAxes"), "axes, number 1.*did you mean 'GridAxis'"),
+        (ANGLE.replace("GridAxis", "GridAxes"), r"sweep.toml:3:1: axes\[1\].*did you mean 'GridAxis'"),
         (ANGLE.replace("count = 3}", "cuont = 3}"), "field 'cuont'.*did you mean 'count'"),
         (ANGLE.replace(", count = 3}", "}"), "GridAxis lacks count"),
         (ANGLE.replace("motor.inertia", "motor.inertja"), "did you mean 'motor.inertia'"),

@@ -111,7 +111,7 @@ def test_the_unit_of_a_field_of_the_file_is_checked(tmp_path: Path) -> None:
     )
     path = tmp_path / "sweep.toml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(NlsError, match=r"sweep.toml:4:1.*last.*30 N.*'N' is no unit of it.*'rad'"):
+    with pytest.raises(NlsError, match=r"sweep.toml:5:1.*last.*30 N.*'N' is no unit of it.*'rad'"):
         read_sweep_file(path)
     path.write_text(text.replace("30 N", "30 deg"), encoding="utf-8")
     asked = read_sweep_file(path).question

@@ -164,8 +164,9 @@ def job_in(deck: Deck) -> DesignJob:
             raise unknown_name(deck.place(key), key, _TABLES)
     if "target" not in deck.tables:
         raise DeckError(
-            file.name, "has no target",
-            next_step='write [target] and below it PowerTorque = {coefficient = ..., ...} or file = "..."',
+            deck.place("target") if deck.stands_in else file.name, "has no target",
+            next_step=f"write [{deck.named('target')}] and below it PowerTorque = {{coefficient = ..., ...}} "
+                      'or file = "..."',
         )  # fmt: skip
     free = _names(deck, "free")
     stock = tuple(_stock(deck))
@@ -398,7 +399,7 @@ def _names(deck: Deck, key: str) -> tuple[str, ...] | None:
 def _table(deck: Deck, key: str) -> Mapping[str, Any]:
     given = deck.tables.get(key, {})
     if not isinstance(given, Mapping):
-        raise DeckError(deck.place(key), "is not a table", next_step=f"write [{key}]")
+        raise DeckError(deck.place(key), "is not a table", next_step=f"write [{deck.named(key)}]")
     return given
 
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InfeasibleError, ValueRangeError, unknown_name
+from ...errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
 from ...model import FlatModel, Variable
 from ...model.structure import CamNames
 from ...symbolic import Expression
@@ -183,7 +183,9 @@ def design_problem(
     Raises
     ------
     UnknownNameError
-        If a free name does not exist or may not change, with the nearest that may.
+        If a free name does not exist, with the nearest that may change.
+    ValueRangeError
+        If it exists and a design cannot change it.
     ArrangementError
         If the cam has no contour, or the structure does not say which spring is meant.
     """
@@ -256,7 +258,7 @@ def _split(model: FlatModel, free: Sequence[str], cam: CamNames) -> tuple[bool, 
                 next_step=f"offer the numbers to choose from: Stock('{name}', (1, 2, 3))",
             )  # fmt: skip
         if name not in movable and name not in contours:
-            raise unknown_name("free", name, [*contours, *movable])
+            raise _not_movable(name, model, [*contours, *movable])
     if not free:
         raise ValueRangeError(
             "free = []", "nothing may change", next_step=f"free for instance '{contours[0]}'"
@@ -269,6 +271,16 @@ def _split(model: FlatModel, free: Sequence[str], cam: CamNames) -> tuple[bool, 
             next_step=f"free '{contours[0]}' too",
         )
     return contour_is_free, [v for name, v in movable.items() if name in free]
+
+
+def _not_movable(name: str, model: FlatModel, movable: Sequence[str]) -> NlsError:
+    """Return the error on a name that cannot be free: it does not exist, or a design cannot change it."""
+    if name not in {v.name for v in model.parameters}:
+        return unknown_name("free", name, movable)
+    return ValueRangeError(
+        f"free: '{name}'", "exists, but a design cannot change it",
+        next_step=f"free one of: {', '.join(movable)}; set other numbers in the deck, or sweep them",
+    )  # fmt: skip
 
 
 def _sizes(law: ElasticLaw, target: Target) -> tuple[float, float]:

@@ -82,7 +82,7 @@ def design_cam(
     ConvergenceError
         If the solver stops without a solution.
     ValueRangeError
-        If a free number changes neither a goal nor a limit.
+        If a free number cannot be changed by a design, or changes neither a goal nor a limit.
     UnknownNameError
         If a free name does not exist.
     ArrangementError
@@ -100,6 +100,38 @@ def design_cam(
     # Not from the combination that was tried, but from what was given.
     made = derived(design.actuator, actuator, "designed")
     return replace(design, changes=(*stock, *design.changes), actuator=made)
+
+
+def require_designable(
+    actuator: Assembly,
+    *,
+    target: Target,
+    free: Sequence[str] | None,
+    keep: Sequence[Limit],
+    goals: Sequence[Goal],
+    spring: str | None,
+    settings: DesignSettings,
+) -> None:
+    """Refuse, without a search, a design whose names do not fit the assembly.
+
+    Parameters
+    ----------
+    actuator, target, free, keep, goals, spring, settings
+        As for :func:`design_cam`, without stocks.
+
+    Raises
+    ------
+    UnknownNameError
+        If a free name, or a name in a limit or goal, does not exist.
+    ValueRangeError
+        If something may not be free, or changes neither a goal nor a limit.
+    ArrangementError
+        If the structure does not say which spring is meant, or its cam has no contour.
+    """
+    names = None if free is None else tuple(free)
+    require_once(names or (), [])
+    question, movable = Wanted(target, names, tuple(keep), spring, tuple(goals)).question(actuator, settings)
+    question.search(movable).require_influence()
 
 
 @dataclass(frozen=True, eq=False)
