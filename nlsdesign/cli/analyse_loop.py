@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .loop_findings import stretches
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_option
 from .range_remarks import check_angles, range_remarks, usual_last, warn
@@ -62,15 +63,13 @@ class _Evaluation:
 
         result = []
         for response in self.responses:
-            for f, verdict in zip(response.frequency, response.verdicts, strict=True):
-                if not verdict.holds:
-                    result.append(f"sine of {_sine(response)} at {f:.3g} Hz: {verdict}")
+            for where, words in stretches(response.frequency, response.verdicts):
+                result.append(f"sine of {_sine(response)} at {where}: {words}")
         for torque, verdict in zip(self.held.torque, self.held.verdicts, strict=True):
             if not verdict.holds:
                 result.append(f"{torque:g} N·m held: {verdict}")
-        for f, verdict in zip(self.zero.frequency, self.zero.verdicts, strict=True):
-            if not verdict.holds:
-                result.append(f"no torque wanted, load moved at {f:.3g} Hz: {verdict}")
+        for where, words in stretches(self.zero.frequency, self.zero.verdicts):
+            result.append(f"no torque wanted, load moved at {where}: {words}")
         linear = self.margins[0].linear
         lost = np.degrees(linear.angles[linear.reached & ~linear.stable()])
         if len(lost):
@@ -354,7 +353,7 @@ def _shown(result: _Evaluation) -> None:
     show_table(f"Margins over the angle, {linear.mode}", columns, table)
     moved = result.zero
     zero = [
-        [f"{f:g}", _text(1e3 * t), _text(1e3 * e), str(v)]
+        [f"{f:.3g}", _text(1e3 * t), _text(1e3 * e), str(v)]
         for f, t, e, v in zip(moved.frequency, moved.rms, moved.energy, moved.verdicts, strict=True)
     ]
     show_table("No torque wanted, load moved", ("Hz", "mN·m rms", "mJ lost per cycle", "verdict"), zero)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from click.testing import CliRunner
 
 from nlsdesign.cli.analyse_loop import _loops, loop
-from nlsdesign.control import only_side, sine_response
+from nlsdesign.cli.loop_findings import stretches
+from nlsdesign.control import LoopVerdict, only_side, sine_response
 
 FINGER = str(Path(__file__).parents[2] / "models" / "templates" / "one-sided-finger.toml")
 
@@ -28,6 +30,9 @@ def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp
     assert status == 1
     assert not found["stable"]
     assert any(line.startswith("2.8 N·m held: limit cycle of ±") for line in found["findings"])
+    # The sine limit-cycles at nearly all frequencies, which is one finding with their range.
+    (sine,) = [line for line in found["findings"] if line.startswith("sine of ")]
+    assert sine.startswith("sine of ±2.8 N·m at 0.1 to 8.6 Hz (19 of 20 frequencies): limit cycle of ±0.0")
     (onset,) = found["onset"]
     assert onset["value"] == pytest.approx(38.1, rel=0.05)
     assert onset["linear"] == pytest.approx(37.5, rel=0.05)
@@ -42,6 +47,22 @@ def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp
         .read_text("utf-8")
         .startswith("amplitude [N*m],offset [N*m],frequency [Hz],")
     )
+
+
+def test_frequencies_side_by_side_with_one_verdict_share_a_finding() -> None:
+    def ended(state: str, size: float, frequency: float, share: float) -> LoopVerdict:
+        return LoopVerdict(state, size, frequency, share, 20.0, 0.05)
+
+    settled, none = ended("settled", 0.01, math.nan, 0.0), ended("no answer", 0.0, math.nan, 0.0)
+    swings = [ended("limit cycle", size, 40.0, share) for size, share in ((0.1, 0.5), (1.0, 1.0))]
+    frequencies = [0.1, 0.2, 0.4, 0.8, 1.6, 3.2]
+    found = dict(stretches(frequencies, [swings[0], swings[1], settled, swings[0], none, none]))
+    assert found == {
+        "0.1 to 0.2 Hz (2 of 6 frequencies)": "limit cycle of ±0.1 to 1 N·m at 40 Hz, current up to 20 A, "
+        "50 to 100 % of the time at the current limit",
+        "0.8 Hz": str(swings[0]),
+        "1.6 to 3.2 Hz (2 of 6 frequencies)": "no answer",
+    }
 
 
 @pytest.mark.slow
