@@ -12,11 +12,12 @@ import click
 
 from ..errors import ValueRangeError, unknown_name
 from ..quantity import typeset_unit
-from .driving_signals import FORMS, check_rows, read_input_file, read_inputs, read_pairs, size_in
+from .driving_signals import FORMS, check_rows, read_input_file, read_inputs
+from .given_numbers import BARE, given_start, given_words, with_given_values
 from .named_paths import NamedPath
 from .output import deck_option, examples, json_option, show_json, show_table
 from .overwriting import out_file_option
-from .units import Number, split_number
+from .units import Number
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -67,9 +68,10 @@ def _further(given: Mapping[str, Any]) -> tuple[str, ...]:
 @click.option("--step", type=Number("ms", above=0.0), default="1 ms", show_default=True,
               help="Longest time between two rows; the integrator has steps of its own.")  # fmt: skip
 @click.option("--initial", multiple=True, metavar="STATE=NUMBER",
-              help="A state at the begin, e.g. 'motor.angle=10 deg'. Repeatable.")  # fmt: skip
+              help=f"A state at the begin, e.g. 'motor.angle=10 deg'. {BARE}. Repeatable.")  # fmt: skip
 @click.option("--value", "values", multiple=True, metavar="NAME=NUMBER",
-              help="Another number of the deck, e.g. 'motor.inertia=0.02 kg*m^2'. Repeatable.")  # fmt: skip
+              help="Another number of the deck, e.g. 'motor.inertia=0.02 kg*m^2'. Without a unit as for "
+              "--initial, but refused where the deck writes it in mm or the like. Repeatable.")  # fmt: skip
 @click.option("--signals", multiple=True, metavar="GLOB",
               help="What is written, drawn and listed, e.g. 'spring.*'; by default all is written. "
               "Repeatable.")  # fmt: skip
@@ -131,7 +133,8 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     from ..simulation import limits_reached, measure
     from ..simulation import simulate as integrate
 
-    actuator = _changed(declare(load_deck(deck_name)), given)
+    actuator, values = with_given_values(declare(load_deck(deck_name)), given["values"])
+    actuator = _read_as_asked(actuator, given["friction"])
     model = flatten(actuator)
     inputs: dict[str, Any] = dict(read_inputs(model, given["inputs"]))
     times = _times(given["stop"], given["step"])
@@ -140,7 +143,7 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     if times is None:
         raise ValueRangeError("--stop", "is not given", next_step='write for instance --stop "2 s"')
     check_rows(inputs, float(times[-1]), float(times[1] - times[0]))
-    start = _initial(model, given["initial"])
+    start, begin = given_start(model, given["initial"])
     _chosen(model, given["signals"])  # before the work
     steps = Steps()
     with steps.step("simulation"):
@@ -153,10 +156,12 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
     written.write_csv(given["out"])
     files = [given["out"]]
     if not given["table_only"]:
-        files += _drawn(model, run, shown, (given["out"], deck_name, warnings))
+        files += _drawn(model, run, shown, (given["out"], deck_name, warnings, {**values, **begin}))
     if given["as_json"]:
-        show_json(_content(run, shown, warnings, files))
+        show_json(_content(run, shown, warnings, files) | {"values": values, "initial": begin})
         return
+    for line in given_words(values, begin):
+        click.echo(line)
     show_table(f"{model.name} over {times[-1]:g} s", _COLUMNS, _rows(run, shown))
     for event in run.events[:_SHOWN_EVENTS]:
         click.echo(f"event: {event}")
@@ -171,26 +176,13 @@ def _forward(deck_name: str, given: Mapping[str, Any]) -> None:
 _COLUMNS = ("signal", "smallest", "largest", "rms", "at the end", "unit")
 
 
-def _changed(actuator: Assembly, given: Mapping[str, Any]) -> Assembly:
-    """Return the machine with the numbers and the reading of friction that are asked for."""
+def _read_as_asked(actuator: Assembly, friction: str) -> Assembly:
+    """Return the machine with the reading of friction that is asked for."""
     from ..components.assembly.smooth_form import sharpened, smoothed
-    from ..errors import NlsError
-    from ..quantity import quantity
 
-    declared = actuator.quantities()
-    for name, text in read_pairs("--value", given["values"]).items():
-        if name not in declared:
-            raise unknown_name("--value", name, declared)
-        try:
-            number, unit = split_number(text)
-            unit = unit or declared[name].unit
-            changed = quantity(number, unit, source="given on the command line")
-            actuator = actuator.with_values({name: changed})
-        except NlsError as error:
-            raise error.at(f"--value {name}") from None
-    if given["friction"] == "sharp":
+    if friction == "sharp":
         return sharpened(actuator)
-    return smoothed(actuator) if given["friction"] == "smooth" else actuator
+    return smoothed(actuator) if friction == "smooth" else actuator
 
 
 def _times(stop: float | None, step: float) -> Any:
@@ -233,21 +225,6 @@ def _with_file(given: Mapping[str, Any], model: FlatModel, typed: Mapping[str, A
     return {**typed, **{n: np.interp(times, time, v) for n, v in columns.items()}}, times
 
 
-def _initial(model: FlatModel, given: Sequence[str]) -> dict[str, float]:
-    from ..errors import NlsError
-
-    units = {v.name: v.unit for v in model.states}
-    start = {}
-    for name, text in read_pairs("--initial", given).items():
-        if name not in units:
-            raise unknown_name("--initial", name, units)
-        try:
-            start[name] = size_in(text, units[name])
-        except NlsError as error:
-            raise error.at(f"--initial {name}") from None
-    return start
-
-
 def _chosen(model: FlatModel, globs: Sequence[str]) -> list[str]:
     """Return the names that fit one of the globs, all without a glob."""
     everything = model.states + model.inputs + model.outputs + model.signals
@@ -283,13 +260,16 @@ def _recorded(readings: Trace, model: FlatModel, run: Trace) -> Trace:
 
 
 def _drawn(
-    model: FlatModel, run: Trace, shown: Sequence[str], about: tuple[Path, str, Sequence[str]]
+    model: FlatModel,
+    run: Trace,
+    shown: Sequence[str],
+    about: tuple[Path, str, Sequence[str], Mapping[str, str]],
 ) -> list[Path]:
     """Write the picture and the page beside the table."""
     from ..figures import run_over_time, write_figures
     from ..report import FigureSection, FileSection, TableSection, TextSection, write_report
 
-    out, deck_name, warnings = about
+    out, deck_name, warnings, taken = about
     picture = run_over_time(run, shown)
     (file,) = write_figures(out.parent, {out.stem: picture})
     page = out.with_suffix(".html")
@@ -313,7 +293,7 @@ def _drawn(
         ),
         FileSection("Files", {out: "all rows", file: "the picture"}, caption="Written beside this page."),
     ]
-    facts = {"deck": f"`{deck_name}`", "time": f"{run.time[-1]:g} s"}
+    facts = {"deck": f"`{deck_name}`", "time": f"{run.time[-1]:g} s", **taken}
     return [file, write_report(page, *sections, title=f"{model.name}: simulation", facts=facts)]
 
 

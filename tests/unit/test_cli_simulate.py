@@ -204,6 +204,8 @@ def test_a_cable_that_is_left_is_warned_of_on_both_sides(run: Run) -> None:
         (("--stop", "1 s", "--initial", "motor.angel=1 rad"), "did you mean 'motor.angle'?"),
         (("--stop", "1 s", "--value", "motor.inertai=1 kg*m^2"), "did you mean 'motor.inertia'?"),
         (("--stop", "1 s", "--value", "motor.inertia=1 kg"), "motor.inertia"),
+        (("--stop", "1 s", "--value", "motor.torque_constant=55"), "write '55 mN·m/A' if that is meant"),
+        (("--stop", "1 s", "--value", "motor.inertia=much"), "write for instance '0.000597 kg·m²'"),
         (("--stop", "1 s", "--signals", "motr.*"), "--signals 'motr.*': no such name"),
         (("--stop", "1 s", "--input-file", "none.csv"), "cannot be read"),
         (("--stop", "1 s", "--mapping", "map.toml"), "--mapping is of a --record"),
@@ -217,6 +219,22 @@ def test_what_cannot_be_simulated_is_named_before_anything_is_written(
     assert (status, out) == (2, "")
     assert rule in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_number_without_a_unit_is_in_that_of_the_model_and_the_run_says_what_it_took(run: Run) -> None:
+    words = (*QUICK, "--deck", DECK, "--stop", "0.01 s")
+    bare = (*words, "--value", "spring.stiffness=3", "--initial", "motor.angle=0.25")
+    status, out, _ = run(*bare)
+    assert status == 0
+    assert out.splitlines()[:2] == [
+        "with spring.stiffness = 3 N·m/rad in place of 1.7 N·m/rad",
+        "begins at motor.angle = 0.25 rad",
+    ]
+    by_unit = (*words, "--value", "spring.stiffness=3000 mN*m/rad", "--initial", "motor.angle=250 mrad")
+    first, second = (json.loads(run(*each, "--json")[1]) for each in (bare, by_unit))
+    assert first["signals"] == second["signals"]
+    assert first["initial"] == second["initial"] == {"motor.angle": "0.25 rad"}
+    assert first["values"] == {"spring.stiffness": "3 N·m/rad in place of 1.7 N·m/rad"}
 
 
 @pytest.mark.parametrize(
