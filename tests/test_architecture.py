@@ -25,6 +25,7 @@ BASE = {
         "processes",
     ),
     *(
+        "prefixes",
         "progress",
         "quantity",
         "reading",

@@ -13,6 +13,7 @@ from ..components.assembly.named_parts import Assembly
 from ..errors import ArrangementError, InfeasibleError, unknown_name
 from ..model import flatten
 from ..model.roles import series_spring
+from ..prefixes import shared_prefix, without_power
 from ..simulation import Prior
 from .bench_response import bench_response
 from .bench_test import CalibrationTest, FreeRunTest, HungWeightTest, LoadCellTest
@@ -101,20 +102,30 @@ class CalibrationPlan:
     reach: Mapping[str, float] = field(default_factory=dict)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return a table: calibration, torque of the resting spring and further errors in mN·m, spreads."""
-        names = tuple(self.now.errors)
-        rows = []
+        """Return a table: calibration, torque of the resting spring and further errors, spreads.
+
+        Errors are in the units of :attr:`heads`.
+        """
+        rows, names, factor = [], tuple(self.now.errors), self._prefix()[0]
         for each in (self.now, *self.ranked):
             narrowed = list(each.narrowed(self.now.known).items())[:4]
             spreads = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in narrowed)
             sizes = (each.torque_rms, *(each.errors[name] for name in names))
-            rows.append((each.title, *(f"{1e3 * size:.3g}" for size in sizes), spreads))
+            rows.append((each.title, *(without_power(factor * size) for size in sizes), spreads))
         return rows
 
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Heads of :meth:`rows`, with the unit of the errors."""
+        unit = self._prefix()[1]
+        errors = ("spring torque at rest", *self.now.errors)
+        return ("calibration", *(f"{name}, {unit}" for name in errors), "spreads, best four")
+
+    def _prefix(self) -> tuple[float, str]:
+        return shared_prefix([self.now.torque_rms, *self.now.errors.values()], "N*m")
+
     def __str__(self) -> str:
-        further = (f"{name}, mN·m" for name in self.now.errors)
-        heads = ("calibration", "spring torque at rest, mN·m", *further, "spreads")
-        return "\n".join("  ".join(row) for row in (heads, *self.rows()))
+        return "\n".join("  ".join(row) for row in (self.heads, *self.rows()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for ``plan.json``: errors before and after, and spreads by number."""

@@ -63,12 +63,12 @@ class _Evaluation:
 
         result = []
         for response in self.responses:
-            for where, words in stretches(response.frequency, response.verdicts):
+            for where, words in stretches(response.frequency.tolist(), response.verdicts):
                 result.append(f"sine of {_sine(response)} at {where}: {words}")
         for torque, verdict in zip(self.held.torque, self.held.verdicts, strict=True):
             if not verdict.holds:
                 result.append(f"{torque:g} N·m held: {verdict}")
-        for where, words in stretches(self.zero.frequency, self.zero.verdicts):
+        for where, words in stretches(self.zero.frequency.tolist(), self.zero.verdicts):
             result.append(f"no torque wanted, load moved at {where}: {words}")
         linear = self.margins[0].linear
         lost = np.degrees(linear.angles[linear.reached & ~linear.stable()])

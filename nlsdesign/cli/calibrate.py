@@ -147,8 +147,6 @@ def _show_plan(ranked: CalibrationPlan, as_json: bool) -> None:
     if as_json:
         show_json(ranked.to_dict())
         return
-    further = [f"{name}, mN·m" for name in ranked.now.errors]
-    heads = ("calibration", "spring torque at rest, mN·m", *further, "spreads, best four")
-    show_table("What a calibration buys", heads, ranked.rows())
+    show_table("What a calibration buys", ranked.heads, ranked.rows())
     for title, reason in ranked.left_out.items():
         click.echo(f"{title} is left out: {reason}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..errors import ExportError, ValueRangeError
+from ..prefixes import prefixed
 from ..quantity import typeset_unit
 from .observer_kinds import DesignedObserver, designed_observer
 from .units import Bytes, Number
@@ -72,8 +73,9 @@ class SizedObserver:
         words = f"table: {len(compact.angles)} angles {kind}, {len(compact.columns)} columns"
         if error is not None:
             words += (
-                f"; it moves the torque by at most {1e3 * error.largest:.3g} m{unit}, {1e3 * error.rms:.2g} "
-                f"m{unit} rms, of {error.full_scale:.3g} {unit} ({100.0 * error.share:.2g} %)"
+                f"; it moves the torque by at most {prefixed(error.largest, unit)}, "
+                f"{prefixed(error.rms, unit, digits=2)} rms, of {error.full_scale:.3g} {unit} "
+                f"({100.0 * error.share:.2g} %)"
             )
         if self.code is None:
             return words, f"flash of the tables: {self.tables} B; the code was not measured: no compiler"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ArrangementError
+from ..prefixes import shared_prefix, without_power
 from ..quantity import typeset_unit
 from .observer_kinds import CASCADE, DesignedObserver, designed_observer
 from .output import next_command, show_table
@@ -160,15 +161,16 @@ def show_errors(errors: SpreadErrors, kind: str, deck_name: str) -> None:
     deck_name
         As the command was given it.
     """
-    unit = typeset_unit(errors.unit)
+    unit, causes = typeset_unit(errors.unit), errors.ranked_causes(kind)[:CAUSES]
+    factor, shown = shared_prefix([size for _, size in causes], errors.unit)
     title = (
-        f"Torque error in m{unit} rms, sines of {errors.torque:.3g} {unit}, "
+        f"Torque error in {errors.shown_in} rms, sines of {errors.torque:.3g} {unit}, "
         f"{errors.drawn.shape[1]} draws of the spread"
     )
     heads = ("observer", "Hz", "exact numbers", "median", "90 %", "rms", "bound on rms")
     show_table(title, heads, errors.rows())
-    ranked = [[name, f"{1e3 * size:.3g}"] for name, size in errors.ranked_causes(kind)[:CAUSES]]
-    show_table("Causes", (f"{kind}: cause, one standard deviation off", f"m{unit} rms"), ranked)
+    ranked = [[name, without_power(factor * size)] for name, size in causes]
+    show_table("Causes", (f"{kind}: cause, one standard deviation off", f"{shown} rms"), ranked)
     if errors.lost:
         click.echo(f"{errors.lost} drawn machines do not run and are in no figure")
     if len(errors.bound):

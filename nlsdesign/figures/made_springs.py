@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from ..design import ToleranceResult
 from ..errors import ValueRangeError
+from ..prefixes import shared_prefix
 from .number_text import significant
 from .style import AFTER, BEFORE, GRID, INK, MUTED, SURFACE, described, legend, panels, styled
 
@@ -42,15 +43,16 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     places = -np.arange(len(names), dtype=float)
     tones = [BEFORE.light, *([AFTER.light] * len(result.trims)), *([MUTED.light] * len(causes))]
     hatches = ["///", *([""] * (len(result.trims) + len(causes)))]
-    values = [1e3 * each.value for _, each in whole] + [1e3 * each.alone for each in causes]
+    factor, unit = shared_prefix([*(each.value for _, each in whole), *(c.alone for c in causes)], "N*m")
+    values = [factor * each.value for _, each in whole] + [factor * each.alone for each in causes]
     bars = axes.barh(places, values, 0.66, color=tones, edgecolor=SURFACE.light)
     for bar, hatch in zip(bars, hatches, strict=True):
         bar.set_hatch(hatch)
     ends = [value for value in values]
     for k, (_, each) in enumerate(whole):
         upper = each.upper if np.isfinite(each.upper) else each.value
-        axes.hlines(places[k], 1e3 * each.lower, 1e3 * upper, color=INK.light, linewidth=1.3)
-        ends[k] = 1e3 * upper
+        axes.hlines(places[k], factor * each.lower, factor * upper, color=INK.light, linewidth=1.3)
+        ends[k] = factor * upper
     for place, value, end in zip(places, values, ends, strict=True):
         axes.annotate(
             significant(value, 3), (end, place), (4, 0), color=INK.light, fontsize=8, va="center",
@@ -61,15 +63,15 @@ def tolerance_bars(result: ToleranceResult) -> Figure:
     axes.set_ylim(places[-1] - 0.6, 0.6)
     axes.margins(x=0.1)
     axes.set_xlim(left=0.0)
-    axes.set_xlabel("95 % quantile of the rms torque error in mN·m")
+    axes.set_xlabel(f"95 % quantile of the rms torque error in {unit}")
     axes.set_title(f"{len(result.errors)} made springs")
     best = min((each.value, name) for name, each in whole)
     return described(
         figure,
         f"95 % quantile of the rms torque error of {len(result.errors)} made springs: "
-        f"{significant(1e3 * built.value, 3)} mN·m as built, {significant(1e3 * best[0], 3)} mN·m at best "
-        f"({best[1]}). Largest cause alone: {causes[0].cause.name}, "
-        f"{significant(1e3 * causes[0].alone, 3)} mN·m.",
+        f"{significant(factor * built.value, 3)} {unit} as built, {significant(factor * best[0], 3)} {unit} "
+        f"at best ({best[1]}). Largest cause alone: {causes[0].cause.name}, "
+        f"{significant(factor * causes[0].alone, 3)} {unit}.",
     )
 
 
@@ -87,8 +89,10 @@ def torque_band(result: ToleranceResult) -> Figure:
     # No hatch: printed to PDF it covers what lies behind it. Dashed edges tell the bands without colour.
     bands = [("as built", result.band, BEFORE.light, "--")]
     bands += [(f"{each.name} trimmed", each.band, AFTER.light, "-") for each in result.trims[:1]]
+    widest = [float(np.max(band[2] - band[0])) for _, band, _, _ in bands]
+    factor, unit = shared_prefix(widest, "N*m")
     for label, band, tone, dash in bands:
-        for axes, scale, off in ((upper, 1.0, 0.0 * wanted), (lower, 1e3, wanted)):
+        for axes, scale, off in ((upper, 1.0, 0.0 * wanted), (lower, factor, wanted)):
             low, middle, high = (scale * (row - off) for row in band)
             axes.fill_between(
                 degrees, low, high, facecolor=tone, alpha=0.28, edgecolor=tone, linewidth=0.9,
@@ -100,16 +104,15 @@ def torque_band(result: ToleranceResult) -> Figure:
     lower.grid(color=GRID.light)
     upper.set_ylabel("torque in N·m")
     upper.set_title("Torque of made springs")
-    lower.set_ylabel("error in mN·m")
+    lower.set_ylabel(f"error in {unit}")
     lower.set_title("Made minus target")
     lower.set_xlabel("angle in degrees")
     legend(upper, columns=2)
-    widest = [float(np.max(band[2] - band[0])) for _, band, _, _ in bands]
-    after = f", {significant(1e3 * widest[1], 3)} mN·m after the trim" if len(widest) > 1 else ""
+    after = f", {significant(factor * widest[1], 3)} {unit} after the trim" if len(widest) > 1 else ""
     return described(
         figure,
         f"Band of the torque over the angle up to {degrees[-1]:.0f}° within which 90 % of the made springs "
-        f"lie, with the target; at most {significant(1e3 * widest[0], 3)} mN·m wide as built{after}. "
+        f"lie, with the target; at most {significant(factor * widest[0], 3)} {unit} wide as built{after}. "
         "Errors below.",
     )
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..design import Target
 from ..errors import ValueRangeError
 from ..identification.statistics.metrics import Agreement
+from ..prefixes import shared_prefix
 from .lines import thinned
 from .number_text import root_mean_square, significant
 from .style import AFTER, DASHES, GRID, INK, MUTED, described, legend, look, panels, styled
@@ -37,10 +38,15 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
     degrees = np.degrees(grid)
     low, high = target.band(grid)
     half = float(high[-1] - target.torque(grid)[-1])
+    errors = {
+        label: torque - target.torque(np.clip(angle, 0.0, target.last_angle))
+        for label, (angle, torque) in designs.items()
+    }
+    factor, unit = shared_prefix([half, *(root_mean_square(error) for error in errors.values())], "N*m")
     if half > 0.0:
-        label = f"tolerance ± {significant(1e3 * half, 3)} mN·m"
+        label = f"tolerance ± {significant(factor * half, 3)} {unit}"
         upper.fill_between(degrees, low, high, color=GRID.light, label=label)
-        lower.axhspan(-1e3 * half, 1e3 * half, color=GRID.light)
+        lower.axhspan(-factor * half, factor * half, color=GRID.light)
     upper.plot(
         degrees, target.torque(grid), color=INK.light, linewidth=1.2, linestyle=(0, (4, 2)), label="target"
     )
@@ -48,19 +54,19 @@ def torque_against_target(target: Target, designs: Mapping[str, Curve]) -> Figur
     summaries = []
     for number, (label, (angle, torque)) in enumerate(designs.items()):
         tone, dash, _ = look(number)
-        error = torque - target.torque(np.clip(angle, 0.0, target.last_angle))
+        error = errors[label]
         rms = root_mean_square(error)
-        summaries.append(f"{label} {significant(1e3 * rms, 2)} mN·m")
+        summaries.append(f"{label} {significant(factor * rms, 2)} {unit}")
         upper.plot(np.degrees(angle), torque, color=tone, linestyle=dash, label=label)
         lower.plot(
             np.degrees(angle),
-            1e3 * error,
+            factor * error,
             color=tone,
             linestyle=dash,
-            label=f"{label}: rms {significant(1e3 * rms, 2)} mN·m",
+            label=f"{label}: rms {significant(factor * rms, 2)} {unit}",
         )
     _label(upper, "torque in N·m", "Torque of the spring")
-    _label(lower, "error in mN·m", "Design minus target")
+    _label(lower, f"error in {unit}", "Design minus target")
     lower.set_xlabel("angle in degrees")
     return described(
         figure,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from ..components.assembly.named_parts import Assembly
 from ..design import CamDesign, DesignSettings, Limit, Target, design_cam
 from ..errors import ConvergenceError, InfeasibleError
+from ..prefixes import prefixed
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
 from .question import LiveQuestion
@@ -121,7 +122,7 @@ def full_answer(
 def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> list[str]:
     """Return in words where the quick answer was another optimum, or the finished assembly is another."""
     cost, largest, sentences = design.starts[design.taken].cost, design.target.largest, []
-    was, there = f"{1e3 * quick.rms_error:.3g} mN·m rms", f"{1e3 * design.predicted_rms:.3g} mN·m rms"
+    was, there = (f"{prefixed(each)} rms" for each in (quick.rms_error, design.predicted_rms))
     if solved.cost > cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
             f"the quick answer was a worse local optimum: {was} against {there} now, both before the finish"
@@ -133,8 +134,9 @@ def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> l
         )
     if abs(design.rms - quick.rms_error) > _DIFFERS * largest:
         sentences.append(
-            f"the finished assembly gives {1e3 * design.rms:.3g} mN·m rms where the quick answer gave "
-            f"{1e3 * quick.rms_error:.3g}: its cam sets in over an angle, and knots of its rubber are sharp"
+            f"the finished assembly gives {prefixed(design.rms)} rms where the quick answer gave "
+            f"{prefixed(quick.rms_error)}: its cam sets in over an angle, and knots of its rubber are "
+            "sharp"
         )
     return sentences
 

@@ -18,6 +18,7 @@ from ..figures import (
 )
 from ..model import FlatModel
 from ..observer import SpreadErrors
+from ..prefixes import prefixed, shared_prefix, without_power
 from ..quantity import three_digits, typeset_unit
 from .diagnosis import ROLES, fitted_table
 from .page import write_report
@@ -188,10 +189,12 @@ def write_observer_report(
         If the file cannot be written.
     """
     first, unit = errors.observers[0], typeset_unit(errors.unit)
+    causes = errors.ranked_causes(first)
+    factor, shown = shared_prefix([size for _, size in causes], errors.unit)
     keys = tuple(
         KeyNumber(
             f"{name}, median over the spread",
-            f"{three_digits(1e3 * float(np.max(errors.quantile(name, 0.5))))} m{unit} rms",
+            f"{prefixed(float(np.max(errors.quantile(name, 0.5))), errors.unit)} rms",
             f"at the worst of {', '.join(f'{f:g}' for f in errors.frequencies)} Hz",
         )
         for name in errors.observers
@@ -209,11 +212,11 @@ def write_observer_report(
         ),
         TableSection(
             "Torque errors", heads, tuple(tuple(row) for row in errors.rows()),
-            caption=f"In m{unit}, root mean square.",
+            caption=f"In {errors.shown_in}, root mean square.",
         ),
         TableSection(
-            f"Causes, {first}", ("number", f"m{unit} rms"),
-            tuple((name, f"{1e3 * size:.3g}") for name, size in errors.ranked_causes(first)),
+            f"Causes, {first}", ("number", f"{shown} rms"),
+            tuple((name, without_power(factor * size)) for name, size in causes),
             caption="Torque error where one number is off by one standard deviation.", folded=True,
         ),
         _files(files),

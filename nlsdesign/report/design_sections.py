@@ -18,6 +18,7 @@ from ..figures import (
     torque_band,
 )
 from ..model import flatten
+from ..prefixes import prefixed, shared_prefix
 from ..quantity import three_digits
 from .cam_section import CamSection
 from .page import write_report
@@ -110,22 +111,28 @@ def _key_numbers(design: CamDesign) -> tuple[KeyNumber, ...]:
     share = 100.0 * design.rms / design.target.largest
     verdict = "meets its target" if design.met else "misses its target"
     numbers = [
-        KeyNumber("torque error", f"{three_digits(1e3 * design.rms)} mN·m rms", f"{share:.2g} %; {verdict}"),
-        KeyNumber("largest error", f"{three_digits(1e3 * design.check.largest)} mN·m", "nominal numbers"),
+        KeyNumber("torque error", f"{_shown(design.rms)} rms", f"{share:.2g} %; {verdict}"),
+        KeyNumber("largest error", _shown(design.check.largest), "nominal numbers"),
         KeyNumber("cable force", f"{three_digits(float(design.curves.forces.max()))} N", "largest"),
         KeyNumber(
             "limits reached", str(len(design.active_limits)), ", ".join(design.active_limits) or "none"
         ),
     ]
     if design.tolerance is not None and design.tolerance.causes:
-        built = three_digits(1e3 * design.tolerance.quantiles[-1].value)
+        built = _shown(design.tolerance.quantiles[-1].value)
         trims = design.tolerance.trims[:1]
-        after = [three_digits(1e3 * each.quantiles[-1].value) for each in trims]
+        after = [_shown(each.quantiles[-1].value) for each in trims]
         note = f"as built → {trims[0].name} trimmed" if trims else "as built"
         label = f"{100 * design.tolerance.quantiles[-1].share:g} % of made springs"
-        number = KeyNumber(label, f"{(after or [built])[0]} mN·m rms", note, before=built if after else "")
+        number = KeyNumber(label, f"{(after or [built])[0]} rms", note, before=built if after else "")
         numbers.insert(2, number)
     return tuple(numbers)
+
+
+def _shown(torque: float) -> str:
+    """Return a torque with three digits and the prefix that fits."""
+    factor, unit = shared_prefix([torque], "N*m")
+    return f"{three_digits(factor * torque)} {unit}"
 
 
 def _moved(design: CamDesign) -> list[Section]:
@@ -188,14 +195,18 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
         Of a tolerance analysis in which something deviates.
     """
     head, *rows = result.table()
-    built, trim = result.quantiles[-1], result.trims[0] if result.trims else None
-    after = "" if trim is None else f"; {1e3 * trim.quantiles[-1].value:.0f} once {trim.name} is trimmed"
+    built, trim = prefixed(result.quantiles[-1].value, digits=2), result.trims[0] if result.trims else None
+    after = (
+        ""
+        if trim is None
+        else f"; {prefixed(trim.quantiles[-1].value, digits=2)} once {trim.name} is trimmed"
+    )
     return [
         FigureSection(
             "Torque error of made springs",
             tolerance_bars(result),
             caption="95 % of the springs stay below.",
-            means=f"95 % of {len(result.errors)} made springs are within {1e3 * built.value:.0f} mN·m rms as "
+            means=f"95 % of {len(result.errors)} made springs are within {built} rms as "
             f"built{after}. {_advice(result)}",
             assumed="; ".join(dict.fromkeys(_reason(c.cause) for c in result.causes if c.cause.assumed)),
         ),
@@ -214,8 +225,9 @@ def tolerance_sections(result: ToleranceResult) -> list[Section]:
             "Causes",
             (*head[:6], "share, trimmed", "halved, trimmed", "known, trimmed"),
             tuple(rows),
-            caption="Share of the variance in %, and the 95 % quantile in mN·m rms: of the cause alone, if "
-            "it were half as large, and if it were known before the cam is made; then after the trim.",
+            caption=f"Share of the variance in %, and the 95 % quantile in {result.shown_in} rms: of the "
+            "cause alone, if it were half as large, and if it were known before the cam is made; then after "
+            "the trim.",
             folded=True,
         ),
     ]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...components.assembly.named_parts import Assembly
 from ...data_frames import Axis, data_frame
+from ...prefixes import prefixed, without_power
 from ...quantity import Quantity, parse_unit, with_unit
 from ..curves.target import Target
 from ..drawing.cam_drawing import fingerprint
@@ -389,7 +390,8 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     rows += [
         (
             "torque error",
-            f"{1e3 * check.rms:.3g} mN·m rms ({share * check.rms:.2g} %), {1e3 * largest:.3g} mN·m at most",
+            f"{prefixed(check.rms)} rms ({without_power(share * check.rms, 2)} %), "
+            f"{prefixed(largest)} at most",
         ),
         *_spread_rows(design),
         ("cable force", f"{curves.forces[0]:.4g} to {curves.forces.max():.4g} N in each cable"),
@@ -424,7 +426,7 @@ def _starts(design: CamDesign) -> str:
     ratio = others[0].cost / best.cost if best.cost > 0.0 else 1.0
     if ratio < 1.001:
         return text + "; the next best is as good, within 0.1 % of the cost"
-    return text + f"; the next best has {ratio:.4g} times the cost, {1e3 * others[0].rms:.3g} mN·m rms"
+    return text + f"; the next best has {ratio:.4g} times the cost, {prefixed(others[0].rms)} rms"
 
 
 def _spread_rows(design: CamDesign) -> list[tuple[str, str]]:
@@ -432,11 +434,11 @@ def _spread_rows(design: CamDesign) -> list[tuple[str, str]]:
     if spread is None:
         return []
     worst = spread.quantiles[-1]
-    below = f"{1e3 * worst.value:.4g} mN·m rms ({len(spread.errors)} draws)"
+    below = f"{prefixed(worst.value, digits=4)} rms ({len(spread.errors)} draws)"
     text = f"{100 * worst.share:g} % of made springs below {below}"
     if spread.trims:
         trim = spread.trims[0]
-        text += f", {1e3 * trim.quantiles[-1].value:.4g} after a trim of {trim.name}"
+        text += f", {prefixed(trim.quantiles[-1].value, digits=4)} after a trim of {trim.name}"
     first = spread.measure_first
     return [("over the spread", text), *([] if first is None else [("measure first", first)])]
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtr
 
 from ...data_frames import Axis, data_frame
+from ...prefixes import prefixed, shared_prefix, without_power
 from ...quantity import parse_unit, with_unit
 from ..curves.target import Target
 from .causes import Cause
@@ -43,8 +44,9 @@ class QuantileEstimate:
     upper: float
 
     def __str__(self) -> str:
-        ends = " to ".join(f"{1e3 * end:.4g}" for end in (self.lower, self.upper))
-        return f"{100 * self.share:g} % below {1e3 * self.value:.4g} mN·m rms ({ends} with 95 % confidence)"
+        factor, unit = shared_prefix([self.value], "N*m")
+        low, value, high = (without_power(factor * each, 4) for each in (self.lower, self.value, self.upper))
+        return f"{100 * self.share:g} % below {value} {unit} rms ({low} to {high} with 95 % confidence)"
 
 
 def quantile(errors: Floats, share: float) -> QuantileEstimate:
@@ -209,10 +211,13 @@ class ToleranceResult:
 
     def rows(self) -> list[tuple[str, str]]:
         """Return a summary: pairs of text."""
-        rows = [("nominal", f"{1e3 * self.nominal_rms:.4g} mN·m rms")]
+        rows = [("nominal", f"{prefixed(self.nominal_rms, digits=4)} rms")]
         rows += [("as built", str(each)) for each in self.quantiles]
         rows.append(
-            ("worst", f"{_millis(self.worst)} mN·m rms of {len(self.errors)} draws, seed {self.seed}")
+            (
+                "worst",
+                f"{prefixed(self.worst, digits=4)} rms of {len(self.errors)} draws, seed {self.seed}",
+            )
         )
         rows += [(f"trim {k + 1}", str(each)) for k, each in enumerate(self.trims)]
         named = (
@@ -248,9 +253,18 @@ class ToleranceResult:
         }
 
     def table(self) -> list[tuple[str, ...]]:
-        """Return the causes as rows of text under a head: shares in per cent, 95 % quantiles in mN·m rms."""
+        """Return the causes as rows of text under a head: shares in %, 95 % quantiles in `shown_in`."""
         head = ("cause", "±", "share", "alone", "halved", "known", "share", "halved", "known")
-        return [head, *(_cells(each) for each in self.causes)]
+        factor, _ = self._prefix()
+        return [head, *(_cells(each, factor) for each in self.causes)]
+
+    @property
+    def shown_in(self) -> str:
+        """Unit in which :meth:`table` shows quantiles."""
+        return self._prefix()[1]
+
+    def _prefix(self) -> tuple[float, str]:
+        return shared_prefix([size for each in self.causes for size in _sizes(each)], "N*m")
 
     def __str__(self) -> str:
         rows, table = self.rows(), self.table()
@@ -258,7 +272,8 @@ class ToleranceResult:
         lines = ["tolerance", *(f"  {name:<{width}}  {text}" for name, text in rows)]
         sizes = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
         lines.append(
-            "  causes: share of the variance in %, 95 % quantile in mN·m rms; as built, after the trim"
+            f"  causes: share of the variance in %, 95 % quantile in {self.shown_in} rms; as built, after "
+            "the trim"
         )
         for row in table:
             cells = [
@@ -273,10 +288,14 @@ class ToleranceResult:
         return "\n".join(lines)
 
 
-def _cells(each: CauseEffect) -> tuple[str, ...]:
-    built = (_per_cent(each.share), *(_millis(n) for n in (each.alone, each.halved, each.measured)))
-    after = (each.halved_after_trim, each.measured_after_trim)
-    left = (_per_cent(each.share_after_trim), *(_millis(n) for n in after))
+def _sizes(each: CauseEffect) -> tuple[float, ...]:
+    """Return the quantiles of a cause in N·m: three as built, two after the trim."""
+    return each.alone, each.halved, each.measured, each.halved_after_trim, each.measured_after_trim
+
+
+def _cells(each: CauseEffect, factor: float) -> tuple[str, ...]:
+    sizes = [without_power(factor * size, 4) for size in _sizes(each)]
+    built, left = (_per_cent(each.share), *sizes[:3]), (_per_cent(each.share_after_trim), *sizes[3:])
     return each.cause.name, each.cause.size, *built, *left
 
 
@@ -286,7 +305,3 @@ def _per_cent(share: float) -> str:
 
 def _least(causes: Sequence[CauseEffect], values: Sequence[float]) -> str | None:
     return causes[int(np.argmin(values))].cause.name if causes else None
-
-
-def _millis(value: float) -> str:
-    return f"{1e3 * value:.4g}"

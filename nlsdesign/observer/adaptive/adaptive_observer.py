@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from ...errors import ArrangementError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
+from ...prefixes import prefixed
 from ...quantity import typeset_unit
 from ...simulation.prior import Prior, declared_prior
 from ..scheduling.forms import finished, minimal_form
@@ -101,8 +102,8 @@ class AdaptiveDesign:
         for d, effect in enumerate(self.directions.effect):
             where = "spring" if self.directions.torque_share[d] > 0.5 else "drive"
             words = self.directions.in_words(d)
-            lines.append(f"    [{d + 1}] {1e3 * effect:.3g} m{unit}, {where}: {words}")
-        return "\n".join([*lines, f"  left out: {1e3 * self.directions.left_out:.2g} m{unit}"])
+            lines.append(f"    [{d + 1}] {prefixed(effect, unit)}, {where}: {words}")
+        return "\n".join([*lines, f"  left out: {prefixed(self.directions.left_out, unit, digits=2)}"])
 
 
 def design_adaptive_observer(

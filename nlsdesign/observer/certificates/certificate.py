@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...errors import ArrangementError, ConvergenceError, MeasurementError, ValueRangeError
 from ...model import FlatModel
+from ...prefixes import shared_prefix, without_power
 from ..scheduling.gains import ConstantGain
 from ..scheduling.scheduled import ObserverDesign
 from .co_design import fastest, lyapunov_function
@@ -98,10 +99,12 @@ class Certificate:
         if isinstance(self.torque, str):
             return first, f"No bound on the torque error is certified: {self.torque}."
         a, t = self.assumptions, self.torque
-        causes = ", ".join(f"{name} {1e3 * value:.3g}" for name, value in t.causes.items())
+        factor, unit = shared_prefix([t.total, *t.causes.values()], "N*m")
+        total = f"{without_power(factor * t.total, 4)} {unit}"
+        causes = ", ".join(f"{name} {without_power(factor * value)}" for name, value in t.causes.items())
         second = (
             "Once a wrong start is forgotten, the estimated torque is at the instants of sampling within "
-            f"{1e3 * t.total:.4g} mN·m of that of the deck's model ({causes} mN·m), for every current "
+            f"{total} of that of the deck's model ({causes} {unit}), for every current "
             f"and friction, every motion from {a.angles[0]:.4g} to {a.angles[1]:.4g} rad with at most "
             f"{a.speed:g} rad/s, an angle measured to {a.angle_error:.3g} rad, and "
             f"{sum(v > 0.0 for v in a.spreads.values())} parameters of the spring anywhere in their ranges, "

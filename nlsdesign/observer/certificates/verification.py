@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import NlsError
 from ...model import FlatModel
+from ...prefixes import prefixed
 from ..scheduling.scheduled import ObserverDesign, design_observer_with_details
 from ..scheduling.table import Grid
 from .certificate import Certificate, contracts, hashes_of_code, within_condition
@@ -315,7 +316,7 @@ def _torque(certificate: Certificate, model: FlatModel, design: ObserverDesign) 
         again = torque_bound(model, design, certificate.assumptions)
     except NlsError as error:  # nothing can be bounded, so nothing may be claimed
         return Check("torque bound", False, str(error))
-    return Check("torque bound", _covers(claimed, again), f"{1e3 * again.total:.4g} mN·m found again")
+    return Check("torque bound", _covers(claimed, again), f"{prefixed(again.total, digits=4)} found again")
 
 
 def _covers(claimed: TorqueErrorBound, again: TorqueErrorBound) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import ArrangementError, ConvergenceError, ValueRangeError
 from ...model import FlatModel
 from ...model.roles import measured_motion, spring_torque
+from ...prefixes import prefixed
 from ...quantity import typeset_unit
 from ...simulation.sampled_batch import run_batch
 from ..adaptive.adaptive_observer import AdaptiveDesign, design_adaptive_observer
@@ -101,9 +102,8 @@ def choose_observer(
         return ObserverOfChoice(cascade, f"cascade, for no adaptive observer can be designed: {error}", ())
     effects = adaptive.directions.effect * adaptive.directions.torque_share
     alone = math.hypot(float(np.linalg.norm(effects)), adaptive.directions.left_out)
-    both = (
-        f"expected over the spread {1e3 * learned:.3g} against {1e3 * alone:.3g} m{unit} rms of the cascade"
-    )
+    sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
+    both = f"expected over the spread {sizes} of the cascade"
     if learned < alone:
         return ObserverOfChoice(adaptive, f"adaptive: {both}", (alone, learned))
     return ObserverOfChoice(cascade, f"cascade: the adaptive one has {both}", (alone, learned))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...data_frames import Axis, data_set
 from ...errors import ArrangementError, ConvergenceError, unknown_name
 from ...model import FlatModel
+from ...prefixes import shared_prefix
 from ...quantity import three_digits
 from ...simulation.buffered import Translate, as_it_is
 from ...simulation.prior import Prior, declared_prior
@@ -130,19 +131,35 @@ class SpreadErrors:
         return data_set(data, axes=axes, units=dict.fromkeys(data, self.unit))
 
     def rows(self) -> list[list[str]]:
-        """Return a table: observer, frequency, error with exact numbers, median and 90 % over the spread."""
-        rows = []
+        """Return a table in `shown_in`: observer, errors with exact numbers, and over the spread."""
+        rows, factor = [], self.shown_factor
         for i, name in enumerate(self.observers):
             median, most, rms = self.quantile(name, 0.5), self.quantile(name, 0.9), self.rms(name)
             for k, f in enumerate(self.frequencies):
                 numbers = [self.exact[i, k], median[k], most[k], rms[k]]
-                cells = [three_digits(1e3 * value) for value in numbers]
-                bound = three_digits(1e3 * self.bound[k]) if len(self.bound) else "not computed"
+                cells = [three_digits(factor * value) for value in numbers]
+                bound = three_digits(factor * self.bound[k]) if len(self.bound) else "not computed"
                 rows.append([name, f"{f:g}", *cells, bound])
         return rows
 
+    @property
+    def shown_in(self) -> str:
+        """Unit in which :meth:`rows` shows errors, typeset."""
+        return self._prefix()[1]
+
+    @property
+    def shown_factor(self) -> float:
+        """Factor from SI to :attr:`shown_in`."""
+        return self._prefix()[0]
+
+    def _prefix(self) -> tuple[float, str]:
+        most = [self.quantile(name, 0.9) for name in self.observers]
+        return shared_prefix([*self.exact.ravel(), *np.ravel(most)], self.unit)
+
     def __str__(self) -> str:
-        head = f"torque error, m{self.unit} rms, {self.torque:.3g} {self.unit}, {self.drawn.shape[1]} draws"
+        head = (
+            f"torque error, {self.shown_in} rms, {self.torque:.3g} {self.unit}, {self.drawn.shape[1]} draws"
+        )
         lines = [head, "observer  Hz  exact numbers  median  90 %  rms  no estimator below"]
         lines += ["  ".join(row) for row in self.rows()]
         return "\n".join([*lines, f"least over the spread: {self.best}"])
