@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -57,8 +58,8 @@ class BoughtBy(NamedTuple):
 
     @property
     def torque_rms(self) -> float:
-        """Root mean square over the angles of the standard deviation of the torque, N·m."""
-        return float(np.sqrt(np.mean(self.torque**2))) if len(self.torque) else 0.0
+        """Root mean square over the angles of the standard deviation of the torque, N·m; nan without any."""
+        return float(np.sqrt(np.mean(self.torque**2))) if len(self.torque) else math.nan
 
     def narrowed(self, before: Prior) -> dict[str, tuple[float, float]]:
         """Return the spreads before and after of the numbers that become better known, the most so first.
@@ -109,8 +110,8 @@ class CalibrationPlan:
         rows, names, factor = [], tuple(self.now.errors), self._prefix()[0]
         for each in (self.now, *self.ranked):
             narrowed = list(each.narrowed(self.now.known).items())[:4]
-            spreads = ", ".join(f"{n} {100 * a:.2g} → {100 * b:.2g} %" for n, (a, b) in narrowed)
-            sizes = (each.torque_rms, *(each.errors[name] for name in names))
+            spreads = ", ".join(f"{n} {_per_cent(a)} → {_per_cent(b)} %" for n, (a, b) in narrowed)
+            sizes = (*([each.torque_rms] if len(self.angles) else []), *(each.errors[name] for name in names))
             rows.append((each.title, *(without_power(factor * size) for size in sizes), spreads))
         return rows
 
@@ -118,24 +119,45 @@ class CalibrationPlan:
     def heads(self) -> tuple[str, ...]:
         """Heads of :meth:`rows`, with the unit of the errors."""
         unit = self._prefix()[1]
-        errors = ("spring torque at rest", *self.now.errors)
+        errors = (*(["spring torque at rest"] if len(self.angles) else []), *self.now.errors)
         return ("calibration", *(f"{name}, {unit}" for name in errors), "spreads, best four")
+
+    def words(self) -> tuple[str, ...]:
+        """Return what the table does not say: no spring, no spread, or one that the torque does not feel."""
+        if not self.now.known.names:
+            return (
+                "nothing is to be calibrated: no number of the deck has a spread -> write spread = 0.1 where "
+                "a number is known to a tenth",
+            )
+        if not len(self.angles):
+            return (
+                "the machine has no spring, so there is no torque of a resting spring to know better; "
+                "calibrations are ranked by the spreads of all numbers alike",
+            )
+        if self.now.torque_rms == 0.0:
+            return (
+                "the torque of the resting spring is taken as exactly known: none of its numbers has a "
+                "spread -> write the spread of its stiffness, or of its rubber and cam",
+            )
+        return ()
 
     def _prefix(self) -> tuple[float, str]:
         return shared_prefix([self.now.torque_rms, *self.now.errors.values()], "N*m")
 
     def __str__(self) -> str:
-        return "\n".join("  ".join(row) for row in (self.heads, *self.rows()))
+        return "\n".join(["  ".join(row) for row in (self.heads, *self.rows())] + list(self.words()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for ``plan.json``: errors before and after, and spreads by number."""
         return {
-            "ranked_by": self.ranked_by or "torque of the resting spring",
-            "now": {"torque_rms_Nm": self.now.torque_rms, "errors": dict(self.now.errors)},
+            "ranked_by": self.ranked_by
+            or ("torque of the resting spring" if len(self.angles) else "spreads of all numbers"),
+            "words": list(self.words()),
+            "now": {"torque_rms_Nm": _plain(self.now.torque_rms), "errors": dict(self.now.errors)},
             "ranked": [
                 {
                     "calibration": each.title,
-                    "torque_rms_Nm": each.torque_rms,
+                    "torque_rms_Nm": _plain(each.torque_rms),
                     "errors": dict(each.errors),
                     "spreads": {
                         name: {"before": a, "after": b}
@@ -147,6 +169,15 @@ class CalibrationPlan:
             "left_out": dict(self.left_out),
             "reach": dict(self.reach),
         }
+
+
+def _per_cent(spread: float) -> str:
+    return without_power(100.0 * spread, 2)
+
+
+def _plain(size: float) -> float | None:
+    """Return a number as JSON can hold it."""
+    return size if math.isfinite(size) else None
 
 
 def what_calibration_buys(

@@ -77,9 +77,10 @@ def planned_bench(model: FlatModel, kind: CalibrationTest, known: Prior) -> Benc
     share = 1.0
     while True:
         runs = [_run(model, response, sweep) for sweep in _sweeps(model, kind, response, share)]
-        most = max(float(np.max(np.abs(run.course.command))) for _, run in runs)
+        # A drive that saturates by itself has no command for a motion that is too fast for it.
+        most = float(np.max([np.max(np.abs(run.course.command)) for _, run in runs]))
         limit = _limit(model)
-        if most <= _CURRENT * limit:
+        if math.isfinite(most) and most <= _CURRENT * limit:
             return bench_evidence(model, kind, channels, runs, known=known)
         share *= 0.8
         if share < 0.05:
@@ -190,7 +191,8 @@ def _run(model: FlatModel, response: BenchResponse, sweep: _Sweep) -> tuple[str,
     still = np.zeros(len(rate))
     course = BenchCourse(step, sweep.motion, rate, still, still + sweep.weight)
     free = response.along(course, np.zeros(response.columns))
-    command = (np.gradient(rate, step) - free.value[0]) / free.value[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        command = (np.gradient(rate, step) - free.value[0]) / free.value[1]
     course = course._replace(command=command)
     shown = response.along(course, np.zeros(response.columns))
     measured = shown.value[2:]

@@ -148,5 +148,7 @@ def _show_plan(ranked: CalibrationPlan, as_json: bool) -> None:
         show_json(ranked.to_dict())
         return
     show_table("What a calibration buys", ranked.heads, ranked.rows())
+    for sentence in ranked.words():
+        click.echo(sentence)
     for title, reason in ranked.left_out.items():
         click.echo(f"{title} is left out: {reason}")

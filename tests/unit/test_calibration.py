@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -416,8 +417,35 @@ def test_better_instruments_buy_more(actuator: Assembly) -> None:
     assert poor["motor.torque_constant"] == pytest.approx(2e-2, rel=0.3)
 
 
+def test_a_spring_without_a_spread_has_nothing_to_be_calibrated() -> None:
+    exact = deck("austin2015_stiff_spring")
+    numbers = exact.quantities()
+    known = exact.with_values({"spring.stiffness": replace(numbers["spring.stiffness"], spread=0.0)})
+    plan = what_calibration_buys(known, [HungWeightTest()])
+    assert plan.now.torque_rms == 0.0
+    assert "none of its numbers has a spread" in plan.words()[0]
+    still = exact.with_values({name: replace(each, spread=0.0) for name, each in numbers.items()})
+    plan = what_calibration_buys(still, [HungWeightTest()])
+    assert plan.words()[0].startswith("nothing is to be calibrated: no number of the deck has a spread")
+
+
+def test_a_drive_that_saturates_is_planned_slowly_enough() -> None:
+    """No command gives a motion that is too fast for it; a division by zero would be a plan of nothing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plan = what_calibration_buys(deck("xl330_pendulum"), [FreeRunTest()])
+    assert all(math.isfinite(reach) for reach in plan.reach.values())
+
+
 def test_machines_without_a_spring_can_be_planned() -> None:
     plan = what_calibration_buys(deck("dfki_pendulum"))
     assert "load cell" in plan.left_out
-    assert plan.now.torque_rms == 0.0
+    # No spring, so there is no torque: never a zero that looks like a result.
+    assert plan.heads == ("calibration", "spreads, best four")
+    assert all(len(row) == 2 for row in plan.rows())
+    assert "has no spring" in plan.words()[0]
+    written = json.loads(json.dumps(plan.to_dict(), allow_nan=False))
+    assert written["now"]["torque_rms_Nm"] is None
+    assert written["ranked_by"] == "spreads of all numbers"
+    assert "e+" not in str(plan)
     assert {each.title for each in plan.ranked} >= {"hung weight", "free run"}
