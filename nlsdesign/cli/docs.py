@@ -11,6 +11,9 @@ from ..errors import unknown_name
 from ..locations import folder
 from .output import examples, json_option, show_json
 
+_SITE = "site"
+"""Folder of what the pages on the web are built from."""
+
 
 @click.command(
     epilog=examples("nlsdesign docs", "nlsdesign docs design_a_cam", "nlsdesign docs conventions --print"),
@@ -25,6 +28,8 @@ def docs(page: str | None, whole: bool, as_json: bool) -> None:
     """
     pages = dict(_pages(folder("docs")))
     if page is None:
+        if whole:
+            raise click.UsageError("--print needs a PAGE, for instance: nlsdesign docs conventions --print")
         if as_json:
             show_json(
                 {"folder": folder("docs"), "pages": {name: title for name, (_, title) in pages.items()}}
@@ -41,14 +46,18 @@ def docs(page: str | None, whole: bool, as_json: bool) -> None:
         raise unknown_name("page", page, pages)
     file, title = pages[matches[0]]
     if as_json:
-        show_json({"page": matches[0], "title": title, "file": file})
+        text = {"text": file.read_text(encoding="utf-8")} if whole else {}
+        show_json({"page": matches[0], "title": title, "file": file, **text})
     else:
         click.echo(file.read_text(encoding="utf-8") if whole else str(file))
 
 
 def _pages(place: Path) -> Iterator[tuple[str, tuple[Path, str]]]:
-    """Yield name, file and title of each page."""
-    for file in sorted(place.rglob("*.md"), key=lambda each: (len(each.parts), each.name)):
+    """Yield name, file and title of each page, folder by folder; what a site is made of is no page."""
+    files = sorted(place.rglob("*.md"), key=lambda each: (len(each.parts), each.parent, each.name))
+    for file in files:
+        if file.relative_to(place).parts[0] == _SITE:
+            continue
         with file.open(encoding="utf-8") as stream:
             title = stream.readline().removeprefix("#").strip()
         yield file.relative_to(place).with_suffix("").as_posix(), (file, title)
