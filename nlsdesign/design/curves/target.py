@@ -146,7 +146,8 @@ class ExponentialTorque(Target):
     angle
         Last angle in rad.
     shape
-        c; negative for a softening curve. Zero would be a straight line: see :class:`PowerTorque`.
+        c of the law, a bare number in 1/rad; negative for a softening curve. Zero would be a straight line:
+        see :class:`PowerTorque`.
 
     Raises
     ------
@@ -202,7 +203,7 @@ class PowerTorque(Target):
     coefficient
         C in N·m/radⁿ, a bare number.
     exponent
-        n.
+        n of the law, a pure number from 1 on.
     angle
         Last angle in rad.
 
@@ -249,7 +250,7 @@ class TabulatedTorque(Target):
     torques
         From zero, nowhere negative, in N·m.
     weights
-        Of the error at each point, see :meth:`Target.weight_law`; straight between them. Empty for one
+        Weight of the error at each point, see :meth:`Target.weight_law`; straight between them. Empty for one
         everywhere.
     slopes
         Stiffness at each point in N·m/rad, where it is known; empty for the monotone cubic.

@@ -26,13 +26,15 @@ class TaskTarget:
     joint
         Instead of a file: ``"ankle"``, ``"knee"`` or ``"hip"`` in walking.
     body_mass
-        In kg, where the torques are stated per body mass.
+        Mass of the body in kg, where the torques are stated per body mass.
     scale
         Share of the torque that the actuator gives.
     gear_ratio
-        Another than the declared one.
-    goal, symmetry
-        As for ``TaskProblem``.
+        Another gear ratio than the declared one, a pure number.
+    goal
+        What is made small over the task: ``LeastEnergy`` or ``LeastPeakPower``.
+    symmetry
+        ``OddSpring``, ``OneSidedSpring`` or ``TwoBranchSpring``.
 
     Raises
     ------

@@ -31,7 +31,7 @@ class EnergyLost(Goal):
     Parameters
     ----------
     frequency
-        Of the cam angle, which turns as a sine, in Hz.
+        Frequency of the cam angle, which turns as a sine, in Hz.
     amplitude
         Largest angle in rad; the last angle of the target if it is left out.
     weight
@@ -68,7 +68,7 @@ class BothStrokes(Goal):
     Parameters
     ----------
     frequencies
-        Of the cam angle, which turns as a sine, in Hz; all count alike.
+        Frequencies of the cam angle, which turns as a sine, in Hz; all count alike.
     amplitude
         Largest angle in rad; the last angle of the target if it is left out.
 

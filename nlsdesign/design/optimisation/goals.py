@@ -98,7 +98,7 @@ class LeastRubber(Goal):
     weight
         Cost of that volume.
     energy_density
-        In J/m³; it only scales.
+        Strain energy by which the volume is scaled, in J/m³.
     """
 
     weight: float = 1e-3

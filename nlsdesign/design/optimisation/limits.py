@@ -102,7 +102,7 @@ class MinimumRadiusOfCurvature(Limit):
     Parameters
     ----------
     radius
-        In m.
+        Least radius of curvature, in m.
     """
 
     radius: Quantity | float
@@ -124,7 +124,7 @@ class MaximumCamRadius(Limit):
     Parameters
     ----------
     radius
-        In m.
+        Largest distance from the centre, in m.
     """
 
     radius: Quantity | float
@@ -144,7 +144,7 @@ class MaximumStrain(Limit):
     Parameters
     ----------
     strain
-        Pure number.
+        Largest nominal strain, a pure number.
     """
 
     strain: Quantity | float
@@ -168,7 +168,7 @@ class MaximumStress(Limit):
     stress
         Strength as nominal stress in Pa.
     safety_factor
-        At least 1.
+        What the strength is divided by, a pure number of at least 1.
     """
 
     stress: Quantity | float
@@ -193,7 +193,7 @@ class MaximumCableTension(Limit):
     Parameters
     ----------
     tension
-        In N.
+        Largest force of one cable, in N.
     """
 
     tension: Quantity | float
@@ -213,7 +213,7 @@ class PositiveStiffness(Limit):
     Parameters
     ----------
     minimum
-        In N·m/rad.
+        Least tangent stiffness, in N·m/rad.
     """
 
     minimum: Quantity | float = 0.0
@@ -237,7 +237,7 @@ class MaximumTorqueError(Limit):
     Parameters
     ----------
     rms
-        In N·m.
+        Largest rms torque error, in N·m.
     """
 
     rms: Quantity | float
@@ -260,7 +260,7 @@ class ParameterRange(Limit):
     Parameters
     ----------
     minimum, maximum
-        In SI.
+        Least and largest value of the parameter, in SI.
     """
 
     minimum: Quantity | float
@@ -290,9 +290,9 @@ class NumberRange(Limit):
     Parameters
     ----------
     name
-        Full name.
+        Full name of the number, as the deck has it.
     minimum, maximum
-        Quantities, or bare numbers in SI.
+        Least and largest value: quantities in a unit of the number, or bare numbers in SI.
 
     Raises
     ------
@@ -332,7 +332,13 @@ class NumberRange(Limit):
 
 @dataclass(frozen=True)
 class PretensionRange(ParameterRange):
-    """Extension at angle zero between two lengths in m."""
+    """Extension at angle zero between two lengths in m.
+
+    Parameters
+    ----------
+    minimum, maximum
+        Least and largest extension, in m.
+    """
 
     def __post_init__(self) -> None:
         self._checked("m", 0.0, 1.0)
@@ -345,7 +351,13 @@ class PretensionRange(ParameterRange):
 
 @dataclass(frozen=True)
 class AreaRange(ParameterRange):
-    """Cross-section of each piece of rubber between two areas in m²."""
+    """Cross-section of each piece of rubber between two areas in m².
+
+    Parameters
+    ----------
+    minimum, maximum
+        Least and largest cross-section, in m².
+    """
 
     def __post_init__(self) -> None:
         self._checked("m^2", 1e-8, 0.1)
@@ -358,7 +370,13 @@ class AreaRange(ParameterRange):
 
 @dataclass(frozen=True)
 class RestLengthRange(ParameterRange):
-    """Rest length of each piece of rubber between two lengths in m."""
+    """Rest length of each piece of rubber between two lengths in m.
+
+    Parameters
+    ----------
+    minimum, maximum
+        Least and largest rest length, in m.
+    """
 
     def __post_init__(self) -> None:
         self._checked("m", 1e-4, 1.0)
@@ -371,7 +389,13 @@ class RestLengthRange(ParameterRange):
 
 @dataclass(frozen=True)
 class AnchorDistance(ParameterRange):
-    """Distance from the centre to the anchor of the cable between two lengths in m."""
+    """Distance from the centre to the anchor of the cable between two lengths in m.
+
+    Parameters
+    ----------
+    minimum, maximum
+        Least and largest distance, in m.
+    """
 
     def __post_init__(self) -> None:
         self._checked("m", 1e-3, 1e6)

@@ -23,7 +23,7 @@ class OverTravel(Limit):
     Parameters
     ----------
     angle
-        Beyond the last angle of the target, in rad.
+        Travel beyond the last angle of the target, in rad.
     limits
         Those that must hold there: strain, stress, cable tension.
 
@@ -70,7 +70,7 @@ class TorqueWithin(Limit):
     Parameters
     ----------
     band
-        The two curves.
+        Lower and upper curve, in N·m over rad; in a design file the columns of the target's file.
 
     Raises
     ------

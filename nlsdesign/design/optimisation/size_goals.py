@@ -61,11 +61,11 @@ class LeastMass(Goal):
     Parameters
     ----------
     rubber_density
-        In kg/m³.
+        Mass of the rubber per volume, in kg/m³.
     plate_thickness
-        Of the cam, in m.
+        Thickness of the plates of the cam, in m.
     plate_density
-        In kg/m³.
+        Mass of the plates per volume, in kg/m³.
     weight
         Cost of 100 g.
     """

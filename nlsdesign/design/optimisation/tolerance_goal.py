@@ -47,7 +47,7 @@ class ToleranceQuantile(Goal):
     Parameters
     ----------
     share
-        Of the made springs.
+        Share of the made springs that stay below, between 0 and 1.
     trims
         Full names of what is set after assembly, together; ``None`` for the pretension, empty for nothing.
     rules
@@ -122,7 +122,7 @@ class TrimRoom(Limit):
     name
         Full name of the number that is trimmed.
     lowest, highest
-        Ends in the unit of the number.
+        Least and largest number that can be set, in its unit.
     deviations
         Standard deviations of the trim that are kept free. Soft springs need more than the first order says,
         so that 2 leave room for about 93 % of them.
