@@ -26,6 +26,8 @@ _DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 _work: Callable[[int], Any] | None = None
 _alone = False
+_asked_for: int | None = None
+"""Processes that somebody asked for, in place of one for each core and at most :data:`_MOST_PROCESSES`."""
 _mapper: Mapper | None = None
 
 
@@ -47,9 +49,9 @@ def parallel_map(work: Callable[[int], T], count: int) -> Iterator[T]:
     if _mapper is not None and not _alone and not multiprocessing.current_process().daemon:
         yield from _mapper(work, count)
         return
-    cores = min(
-        _MOST_PROCESSES, count, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-    )
+    can_fork = hasattr(os, "sched_getaffinity")
+    usual = min(_MOST_PROCESSES, len(os.sched_getaffinity(0))) if can_fork else 1
+    cores = min(count, usual if _asked_for is None or not can_fork else _asked_for)
     if cores < 2 or _alone or multiprocessing.current_process().daemon:
         yield from map(work, range(count))
         return
@@ -94,6 +96,23 @@ def alone() -> Iterator[None]:
         yield
     finally:
         _alone = before
+
+
+@contextlib.contextmanager
+def at_most(processes: int | None) -> Iterator[None]:
+    """Let :func:`parallel_map` take so many processes until the end of the block; without fork it takes none.
+
+    Parameters
+    ----------
+    processes
+        At least one, which is this process; ``None`` for the usual number.
+    """
+    global _asked_for
+    before, _asked_for = _asked_for, processes
+    try:
+        yield
+    finally:
+        _asked_for = before
 
 
 @contextlib.contextmanager

@@ -17,6 +17,7 @@ from .output import DECK_HELP, examples, json_option, show_json, show_table, spr
 from .overwriting import out_option
 from .range_remarks import range_remarks, warn
 from .units import parse_number
+from .workers import workers_option
 
 if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
@@ -88,6 +89,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 @click.option("--largest-error", default=None, help='Rms error that is no miss, e.g. "1 %" of the torque.')
 @click.option("--draws", type=int, default=None, help="Draws of the tolerance, else 1000; 0: none.")
 @spring_option
+@workers_option
 @out_option("out/design", writes=_writes)
 @json_option
 @click.pass_context

@@ -19,6 +19,7 @@ from .output import deck_option, examples, json_option, measured_option, show_js
 from .overwriting import c_names, out_option
 from .range_remarks import warn
 from .units import Number
+from .workers import workers_option
 
 if TYPE_CHECKING:
     from ..discrepancy import Verdict
@@ -64,6 +65,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
               help="Of the observer.")  # fmt: skip
 @spring_option
 @measured_option
+@workers_option
 @out_option("out/diagnosis", writes=_writes)
 @json_option
 def diagnose(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any) -> None:

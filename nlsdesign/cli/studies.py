@@ -25,6 +25,7 @@ from ..written_files import listed_files
 from .named_paths import NamedPath
 from .output import examples, json_option, show_json, show_table
 from .overwriting import dry_run_option, force_option, kept, list_files
+from .workers import workers_option
 
 _SIGNATURE = "def main(out, fast=False): ..."
 
@@ -252,6 +253,7 @@ def list_studies(as_json: bool) -> None:
     default=None,
     help="Folder for the results; out/NAME by default.",
 )
+@workers_option
 @click.option("--fast", is_flag=True, help="Coarser and shorter, for a first look.")
 @force_option
 @dry_run_option

@@ -1,0 +1,36 @@
+"""``--workers``: how many processes of this machine share the long work of a command."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def workers_option(command: F) -> F:
+    """Return a command with the option ``--workers``; its results do not depend on it.
+
+    Parameters
+    ----------
+    command
+        That maps its work over processes.
+    """
+
+    @functools.wraps(command)
+    def shared(*words: Any, **given: Any) -> Any:
+        from ..processes import at_most
+
+        with at_most(given.pop("workers")):
+            return command(*words, **given)
+
+    option = click.option(
+        "--workers", type=click.IntRange(min=1), default=None, metavar="NUMBER",
+        help="Processes of this machine that share the work, by default one for each core, at most four; the "
+        "result is the same.",
+    )  # fmt: skip
+    result: F = option(shared)
+    return result
