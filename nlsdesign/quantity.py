@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from .errors import UnitError, ValueRangeError, nearest, visible
-from .unit_slips import misspelt_unit
+from .unit_slips import NOT_SI, misspelt_unit
 
 NOT_STATED = "not stated"
 _CHANGED = f"{NOT_STATED}; changed from"
@@ -82,7 +82,7 @@ def _atom(token: str, unit: str) -> tuple[float, tuple[int, ...]]:
     if token in _ATOMS:
         return _ATOMS[token]
     head, tail = token[:1], token[1:]
-    if head in _PREFIXES and tail in _PREFIXED:
+    if head in _PREFIXES and tail in _PREFIXED and token not in NOT_SI:
         factor, exponents = _ATOMS[tail]
         return _PREFIXES[head] * factor, exponents
     slip = misspelt_unit(token, unit, unit.strip().translate(_TO_ASCII).replace(" ", ""))

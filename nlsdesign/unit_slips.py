@@ -6,7 +6,7 @@ import re
 
 from .errors import UnitError
 
-_NOT_SI = {
+NOT_SI = {
     "psi": "6.895 kPa for one psi", "bar": "100 kPa for one bar", "atm": "101.325 kPa for one atm",
     "lbf": "4.448 N for one lbf", "lb": "0.4536 kg for one lb", "lbs": "0.4536 kg for one lb",
     "oz": "28.35 g for one oz (a force: 0.278 N)", "ozf": "0.278 N for one ozf", "kgf": "9.807 N for one kgf",
@@ -16,7 +16,10 @@ _NOT_SI = {
     "degC": "temperatures in K: 20 degrees Celsius are 293.15 K", "hr": "'h'", "turn": "'rev'",
     "turns": "'rev'", "hp": "745.7 W for one hp", "percent": "'%'", "ohm": "'Ohm'",
     "L": "1000 cm³ for one litre", "l": "1000 cm³ for one litre", "t": "1000 kg for one tonne",
+    "Grad": "'deg'", "grad": "'deg'", "gon": "0.9 deg for one gon", "U": "'rev', or 'rpm' for U/min",
+    "qmm": "'mm^2'", "qcm": "'cm^2'", "qm": "'m^2'",
 }  # fmt: skip
+"""What to write for a symbol that is none of ours; ``Grad`` is no giga-radian."""
 _RUN_TOGETHER = re.compile(r"^(?P<head>[GMkcmµun]?(?:N|Pa|g|V|A|W|J|Ohm))(?P<tail>mm|cm|ms|m|s|h|rad)$")
 
 
@@ -37,9 +40,9 @@ def misspelt_unit(token: str, unit: str, plain: str) -> UnitError | None:
     >>> print(misspelt_unit("kgcm", "kgcm²", "kgcm2"))
     unit 'kgcm²': 'kgcm' stands for a product, which needs its sign -> write 'kg*cm^2'
     """
-    if token in _NOT_SI:
+    if token in NOT_SI:
         return UnitError(
-            f"unit '{unit}'", f"'{token}' is not a unit of the SI", next_step=f"write {_NOT_SI[token]}"
+            f"unit '{unit}'", f"'{token}' is not a unit of the SI", next_step=f"write {NOT_SI[token]}"
         )
     match = _RUN_TOGETHER.match(token)
     if match is None:

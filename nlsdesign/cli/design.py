@@ -179,7 +179,10 @@ def _as_text(given: dict[str, Any]) -> str:
                 next_step='give --maximum "5 N·m" --angle "53 deg"',
             )
         for name, unit in (("maximum", "N*m"), ("angle", "deg")):
-            parse_number(given[name], unit)
+            try:
+                parse_number(given[name], unit)
+            except NlsError as error:
+                raise error.at(f"--{name}") from None
         targets.append(
             f'ExponentialTorque = {{maximum = "{given["maximum"]}", angle = "{given["angle"]}", '
             f"shape = {given['shape']}}}"

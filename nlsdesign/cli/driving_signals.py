@@ -110,7 +110,9 @@ def size_in(text: str, unit: str) -> float:
     """
     try:
         number, given = split_number(text)
-    except UnitError:
+    except UnitError as error:
+        if error.next_step:
+            raise
         raise UnitError(f"'{text}'", "is no number", next_step=f"write for instance {FORMS}") from None
     if not same_dimension(given or unit, unit):
         shown = typeset_unit(unit) or "a plain number"

@@ -54,7 +54,8 @@ def _value(text: str, declared: Quantity) -> Quantity:
     try:
         number, unit = split_number(text)
     except UnitError as error:
-        raise UnitError(error.thing, error.rule, next_step=f"write for instance '{declared}'") from None
+        step = error.next_step or f"write for instance '{declared}'"
+        raise UnitError(error.thing, error.rule, next_step=step) from None
     if not unit and parse_unit(declared.unit).factor != 1.0:
         # The deck shows it in this unit and the model computes in another: either could be meant.
         raise UnitError(

@@ -111,7 +111,8 @@ def parse_number(text: str, unit: str) -> Quantity:
     try:
         number, given = split_number(text)
     except UnitError as error:
-        raise UnitError(error.thing, error.rule, next_step=f"write '{with_unit('1', unit)}'") from None
+        step = error.next_step or f"write '{with_unit('1', unit)}'"
+        raise UnitError(error.thing, error.rule, next_step=step) from None
     if not given and unit != "1":
         raise UnitError(f"'{text}'", "has no unit", next_step=f"write '{with_unit(text.strip(), unit)}'")
     if not same_dimension(given or "1", unit) and unit == "1":

@@ -219,9 +219,8 @@ def _split(name: str, text: str) -> tuple[float, str]:
     try:
         return split_number(text)
     except UnitError as error:
-        raise UnitError(
-            f"axis {name} = '{text}'", error.rule, next_step="write for instance '20 mm'"
-        ) from None
+        step = error.next_step or "write for instance '20 mm'"
+        raise UnitError(f"axis {name} = '{text}'", error.rule, next_step=step) from None
 
 
 def _number(name: str, given: Given, unit: str) -> float:

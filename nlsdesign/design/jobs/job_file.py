@@ -343,7 +343,7 @@ def _number(text: str, place: str) -> Quantity:
     try:
         number, unit = split_number(text)
     except UnitError as error:
-        step = "write for instance '20 mm'"
+        step = error.next_step or "write for instance '20 mm'"
         raise UnitError(f"{place} = '{text}'", error.rule, next_step=step) from None
     return _placed(lambda: quantity(number, unit or "1", source="asked for in the design file"), place)
 
