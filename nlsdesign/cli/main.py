@@ -1,4 +1,4 @@
-"""The program: status 0 for done, 1 for a finding, 2 for bad input, 70 for a fault, 130 if interrupted."""
+"""The program: status 0 for done, 1 a finding, 2 bad input, 70 a fault, 130 interrupted, 141 nobody reads on."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ from .serve import serve
 from .simulate import simulate
 from .studies import study
 from .sweep import sweep
+from .unexpected import BROKEN_PIPE
 
 
 @click.group(
@@ -90,11 +91,18 @@ def _with_nearest(error: click.ClickException) -> click.ClickException:
 
 def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
+    output = sys.stdout
     try:
         # Without its standalone mode click returns the exit status of a command instead of ending the run.
         status = program(standalone_mode=False, complete_var=COMPLETE)
         if isinstance(status, int) and status:
             sys.exit(status)
+    except SystemExit:
+        if sys.stdout is not output:
+            # Whoever read the output has seen enough: click puts another one in its place and leaves with 1,
+            # which would be a finding.
+            sys.exit(BROKEN_PIPE)
+        raise
     except click.exceptions.Exit as exit_:
         sys.exit(exit_.exit_code)
     except click.ClickException as error:
