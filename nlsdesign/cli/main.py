@@ -1,4 +1,4 @@
-"""The program: status 0 for done, 1 a finding, 2 bad input, 70 a fault, 130 interrupted, 141 nobody reads on."""
+"""The program: status 0 done, 1 a finding, 2 bad input, 70 a fault, 130 interrupted, 141 output closed."""
 
 from __future__ import annotations
 

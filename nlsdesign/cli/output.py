@@ -34,11 +34,16 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
     """
     on_terminal, width = sys.stdout.isatty(), line_width()
     lines = table_lines(columns, rows, width=width)
-    bold = head_count(columns, rows, width=width) if on_terminal and not os.environ.get("NO_COLOR") else 0
+    bold = head_count(columns, rows, width=width) if on_terminal and _bold() else 0
     if title:
         click.echo("\n".join(textwrap.wrap(title, width)))
     for number, line in enumerate(lines):
         click.echo(click.style(line, bold=True) if number < bold else line)
+
+
+def _bold() -> bool:
+    """Tell whether a terminal shows heads in bold: it can, and nobody asked for plain text."""
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 def line_width() -> int:

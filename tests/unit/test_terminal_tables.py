@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from nlsdesign.cli.output import show_table
 from nlsdesign.cli.terminal_tables import head_count, table_lines
 
 WORDS = ("rms", "condition", "N·m", "spring.rubber.relaxing", "0.25", "assumed:", "two", "at", "42", "±", "5")
@@ -72,7 +73,7 @@ def test_control_characters_do_not_reach_the_terminal() -> None:
 def on_a_terminal(root: Path, columns: int, **environment: str) -> str:
     """Run ``nlsdesign deck list`` on a terminal of that width and return what it shows."""
     ours, its = pty.openpty()
-    given = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": str(columns), **environment}
+    given = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": str(columns), "TERM": "xterm", **environment}
     call = [sys.executable, "-m", "nlsdesign", "deck", "list"]
     done = subprocess.run(call, stdout=its, stderr=its, env=given, timeout=120, check=False)
     os.close(its)
@@ -111,3 +112,20 @@ def test_what_is_piped_has_no_escapes_and_is_wide(root: Path) -> None:
     )
     assert json.loads(done.stdout)
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("given", "bold"),
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False), ({"NO_COLOR": ""}, True)],
+)
+def test_heads_are_bold_where_a_terminal_can_and_nobody_minds(
+    given: dict[str, str], bold: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setattr("click.echo", print)  # click itself takes the marks out of what is no terminal
+    show_table("", ("name",), [("value",)])
+    assert ("\x1b[1mname" in capsys.readouterr().out) is bold
