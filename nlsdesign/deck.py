@@ -277,6 +277,8 @@ def load_deck(name: str | Path) -> Deck:
             inside = path / "model.toml"
             if is_there(inside):
                 raise DeckError(f"deck '{name}'", "is a folder", next_step=f"name the deck in it: {inside}")
+            if is_there(path) and path.is_dir():
+                raise _is_folder(path)
             if is_there(path) and path.is_file():
                 raise DeckError(
                     f"deck '{name}'", "is a file whose name does not end in .toml",
@@ -288,6 +290,15 @@ def load_deck(name: str | Path) -> Deck:
         raise DeckError(str(path), "no such file", did_you_mean=nearest(path.stem, deck_names()),
                         next_step="give a .toml file or the name of a deck")  # fmt: skip
     return read_deck(text_of(path, DeckError), path)
+
+
+def _is_folder(path: Path) -> DeckError:
+    """Return the error on a folder in place of a deck, with the decks that may stand in it."""
+    inside = sorted(path.glob("*.toml"))
+    named = f"name the deck in it: {inside[0]}" if len(inside) == 1 else "name a .toml file"
+    if len(inside) > 1:
+        named += f" in it, for instance {inside[0]}"
+    return DeckError(f"deck '{path}'", "is a folder", next_step=named)
 
 
 def read_deck(text: str, path: Path) -> Deck:

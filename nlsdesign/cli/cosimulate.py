@@ -205,7 +205,8 @@ def _show(
     for to, delay in run.delays.items():
         wire = as_wire(wires[to])
         rows.append((to, wire.source, str(wire.gain), f"{1e3 * delay:g} ms"))
-    show_table("Wires", ("input", "reads", "gain", "delay"), rows)
+    if rows:
+        show_table("Wires", ("input", "reads", "gain", "delay"), rows)
     signals = []
     for n in listed:
         v = run[n]

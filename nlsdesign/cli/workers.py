@@ -32,5 +32,5 @@ def workers_option(command: F) -> F:
         help="Processes of this machine that share the work, by default one for each core, at most four; the "
         "result is the same.",
     )  # fmt: skip
-    result: F = option(shared)
+    result: F = option(shared)  # type: ignore[assignment]
     return result

@@ -80,6 +80,13 @@ def test_a_folder_for_a_deck_names_the_deck_in_it(run: Run) -> None:
     status, _, err = run("deck", "show", "d1")
     assert status == 2
     assert f"name the deck in it: {Path('d1/model.toml')}" in err
+    Path("Prüfstand").mkdir()
+    status, _, err = run("deck", "show", "Prüfstand")
+    assert (status, "is a folder -> name a .toml file" in err) == (2, True)
+    Path("Prüfstand/knie.toml").touch()
+    assert f"name the deck in it: {Path('Prüfstand/knie.toml')}" in run("deck", "show", "Prüfstand")[2]
+    Path("Prüfstand/hüfte.toml").touch()
+    assert f"in it, for instance {Path('Prüfstand/hüfte.toml')}" in run("deck", "show", "Prüfstand")[2]
 
 
 def test_a_study_that_does_not_run_leaves_no_empty_folder(run: Run) -> None:
