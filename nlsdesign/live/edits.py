@@ -306,7 +306,8 @@ class ChooseMaterial(LiveEdit):
         changed = question.machine.assembly
         for piece in pieces:
             changed = with_rubber(changed, material(self.material), piece=piece.name)
-        return kept_names(replace(question, machine=ChosenMachine(changed, self.material)))
+        machine = ChosenMachine(changed, self.material, question.machine.designed)
+        return kept_names(replace(question, machine=machine))
 
 
 @dataclass(frozen=True)
@@ -372,12 +373,12 @@ def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
 
 
 def _with_cam_of(machine: ChosenMachine, shown: AngleView) -> ChosenMachine:
-    """Return the machine with the cam of a design."""
+    """Return the machine with the cam of a design, and the contour that it was fitted to."""
     cam = machine.cam
     finished = shown.machine.quantities()
     names = [name for name in finished if name.startswith(f"{cam.name}.")]
     changed = machine.assembly.with_values({name: finished[name] for name in names})
-    return replace(machine, assembly=changed)
+    return replace(machine, assembly=changed, designed=shown.contour)
 
 
 def edit_from(message: Mapping[str, Any]) -> LiveEdit:

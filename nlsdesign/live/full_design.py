@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
-from ..design import CamDesign, DesignSettings, Limit, Target, design_cam
+from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_cam
 from ..errors import ConvergenceError, InfeasibleError
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
@@ -46,6 +46,7 @@ def whole_design(
     target: Target,
     free: tuple[str, ...],
     keep: tuple[Limit, ...],
+    contour: Contour | None = None,
 ) -> FullDesign:
     """Return the whole design.
 
@@ -55,6 +56,8 @@ def whole_design(
         Called with what is done now.
     actuator, target, free, keep
         As for :func:`~nlsdesign.design.design_cam`; the limits are all that hold.
+    contour
+        To which the cam was fitted, where it was designed and is held.
     """
     done = 0
 
@@ -66,8 +69,9 @@ def whole_design(
 
     stage(f"solves from {STARTS} starts")
     settings = DesignSettings(
-        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress
-    )
+        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress,
+        contour=contour,
+    )  # fmt: skip
     try:
         return FullDesign(
             "solved", design_cam(actuator, target=target, free=free, keep=keep, settings=settings)

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..components.assembly.named_parts import Assembly
-from ..design import Limit, NumberRange, TabulatedTorque, safe_limits
+from ..design import Contour, Limit, NumberRange, TabulatedTorque, safe_limits
+from ..design.statics.declared_cam import with_contour
 from ..design.statics.smooth_cables import with_smooth_cables
 from ..errors import ValueRangeError, brief, unknown_name
 from ..model import FlatModel, flatten
@@ -76,10 +77,13 @@ class ChosenMachine:
         As declared.
     material
         Rubber of the library; empty for that of the deck.
+    designed
+        Contour to which its cam was fitted, where it was designed here.
     """
 
     assembly: Assembly
     material: str = ""
+    designed: Contour | None = None
 
     @cached_property
     def model(self) -> FlatModel:
@@ -90,6 +94,11 @@ class ChosenMachine:
     def cam(self) -> CamNames:
         """Names around its cam."""
         return series_cam(self.model)
+
+    @property
+    def cam_part(self) -> object:
+        """The cam, with the contour that it was designed with where there is one."""
+        return with_contour(self.assembly[self.cam.name], self.designed)
 
     @cached_property
     def sizes(self) -> tuple[str, ...]:
@@ -187,6 +196,11 @@ class LiveQuestion:
         limits = [each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind)]
         ranges = [NumberRange(name, *self.ranges[name]) for name in self.free if name in self.ranges]
         return (*limits, *ranges)
+
+    @property
+    def held_contour(self) -> Contour | None:
+        """Contour that was designed here and is held; ``None`` where it is free, or that of a deck."""
+        return None if self.contour in self.free else self.machine.designed
 
     def keeps(self, kind: LimitKind) -> bool:
         """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.

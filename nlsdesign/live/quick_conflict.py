@@ -62,7 +62,7 @@ class SoftenedProgram:
             return QuickOutcome("not solved", f"the solver stopped with '{status}'")
         gives = point[len(point) - count :]
         if float(gives @ price) <= _KEPT * count:
-            return QuickOutcome("solved", "", QuickPoint(point[:-count]))
+            return QuickOutcome("solved", "", QuickPoint(point[:-count]), room=gives)
         sizes = [row.expression.shape[0] for row in rows.problem.structure]
         sizes += [bound.expression.shape[0] for bound in rows.bounds]
         groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])

@@ -67,8 +67,11 @@ class DesignedNumbers:
         }
         if self.shaped:
             anchor = None if self.question.cam.anchor_distance is None else self.contour.anchor_distance
+            # The search reaches the last angle to a few parts in a thousand million; the cam ends at it.
+            angles = self.contour.angles
+            ends = np.linspace(0.0, self.question.target.last_angle - angles[-1], len(angles))
             fit = cam_from_profile(
-                self.contour.angles, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
+                angles + ends, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
                 anchor_distance=anchor,
             )  # fmt: skip
             changes |= {f"{cam}.{field}": given for field, given in fit.changes().items()}
@@ -106,8 +109,7 @@ class QuickDesign:
         anchor = self.question.cam.anchor_distance
         rows = self._numbers
         if self.program.rows.problem.contour is None:
-            cam = self.question.machine.assembly[self.question.cam.name]
-            return contour_of_cam(cam, last_angle=self.question.target.last_angle)
+            return contour_of_cam(self.question.machine.cam_part, last_angle=self.question.target.last_angle)
         return contour_from_curvature(
             rows["direction"],
             rows["radius_of_curvature"],
@@ -242,7 +244,7 @@ class QuickSolver:
                 self._contradicted = program
                 return None, kept
             if kept.point is not None:
-                outcome = program.from_point(question, kept.point)
+                outcome = program.from_point(question, kept.point, kept.room)
         if outcome.state != "solved":
             outcome = program.from_starts(question)
         if outcome.state != "solved" or outcome.point is None:

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 
 ALLOWED = 0.01
 """Rms error over the largest torque above which a design misses its target."""
+_BROKEN = 5e-4
+"""Share of a bound by which a value lies beyond it that counts as broken, as the page draws it."""
 _SI = {"mm": "m", "mm^2": "m^2", "MPa": "Pa", "mN*m": "N*m"}
 _MOST_CHECKED = 161
 """Angles at which the torque of a finished assembly is shown."""
@@ -179,7 +181,7 @@ def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str
     names = [name for name, each in question.limit_values.items() if not question.keeps(each.kind)]
     words = [f"the contour is held, so {', '.join(names)} is shown and not kept"] if names else []
     for each in unkept(question, margins):
-        if each.margin < -1e-3 * abs(each.bound):
+        if each.margin < -_BROKEN * abs(each.bound):
             value, bound = (1e3 * number for number in (each.value, each.bound))
             side = "at most" if each.upper else "at least"
             broken = f"{each.of} {value:.4g} mm, {side} {bound:.4g} mm is asked for"

@@ -60,7 +60,8 @@ class SettleDesign(LiveTask):
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         """Return the whole design."""
-        return whole_design, (question.actuator, question.target, question.free, question.keep)
+        asked = (question.actuator, question.target, question.free, question.keep)
+        return whole_design, (*asked, question.held_contour)
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ class SolvedSearch:
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
         """Contour, and the declared cam made for it; none where the contour was given."""
-        return _contour(self.actuator, self.search.problem, self.best)
+        return _contour(self.search.question.cam, self.search.problem, self.best)
 
     @cached_property
     def changes(self) -> dict[str, Quantity]:
@@ -351,8 +351,8 @@ def _designed(old: Quantity, value: float, source: str) -> Quantity:
     return replace(old.with_value(rounded, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
 
 
-def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
-    design, cam = problem.design, actuator[problem.law.cam.name]
+def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
+    design = problem.design
     if problem.contour is None:
         return contour_of_cam(cam), None
     anchor = design.cam.anchor_distance
