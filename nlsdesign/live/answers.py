@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantity import parse_unit, with_unit
+
 Floats = NDArray[np.float64]
 
 
@@ -61,6 +63,16 @@ class LimitMargin:
     shown_unit: str
     upper: bool
     active: bool
+
+    def shown(self, value: float) -> str:
+        """Return a number in the unit of the limit as text.
+
+        Parameters
+        ----------
+        value
+            In SI.
+        """
+        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
 
 
 @dataclass(frozen=True)

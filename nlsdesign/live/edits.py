@@ -15,6 +15,7 @@ from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS
+from .limit_words import in_words
 from .question import ChosenMachine, LiveQuestion, TargetPoint, finite_in
 
 _LONGEST_NAME = 200
@@ -130,12 +131,14 @@ class ChangeLimit(LiveEdit):
         if self.limit not in LIMIT_KINDS:
             raise unknown_name("limit", self.limit, LIMIT_KINDS)
         kind = LIMIT_KINDS[self.limit]
-        value = finite_in(self.limit, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
+        value = finite_in(kind.title, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
         try:
             kind.limit(value)
         except ValueRangeError as error:
             # Its advice is for somebody who writes Python, and may have meant another unit.
-            raise ValueRangeError(error.thing, error.rule, next_step="give a number in that range") from error
+            raise ValueRangeError(
+                f"{kind.title} = {kind.shown(value)}", error.rule, next_step="give a number in that range"
+            ) from error
         return replace(question, limits={**question.limits, self.limit: value})
 
 
@@ -166,7 +169,7 @@ class DropLimit(LiveEdit):
         """
         if self.limit not in question.limits:
             raise ValueRangeError(
-                f"limit '{self.limit:.80}'", "was not set here, so it cannot be dropped",
+                f"limit '{in_words(self.limit[:80])}'", "was not set here, so it cannot be dropped",
                 next_step="a limit that follows from the deck can be changed to another number",
             )  # fmt: skip
         rest = {name: value for name, value in question.limits.items() if name != self.limit}

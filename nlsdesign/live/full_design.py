@@ -10,6 +10,7 @@ from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_c
 from ..errors import ConvergenceError, InfeasibleError
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
+from .limit_words import in_words
 from .question import LiveQuestion
 from .quick_design import QuickDesign
 from .views import not_kept, unkept, view_of
@@ -98,10 +99,12 @@ def full_answer(
     solved
         Its design; ``None`` where it had none of its own.
     """
+    limits = question.limit_values
     if full.design is None and solved is None:
-        return replace(quick, state=full.state, source="full", message=full.message)
+        return replace(quick, state=full.state, source="full", message=in_words(full.message, limits))
     if full.design is None:
-        sentence = f"the whole design came to no answer: {full.message}; shown is the quick answer, unchecked"
+        reason = in_words(full.message, limits)
+        sentence = f"the whole design came to no answer: {reason}; shown is the quick answer, unchecked"
         return replace(quick, source="full", message=sentence)
     view = view_of(question, quick.revision, full.design)
     missed = full.design.miss
@@ -117,9 +120,8 @@ def full_answer(
         view = replace(view, margins=(*view.margins, *unkept(question, quick.design.margins)))
     sentences += not_kept(question, view.margins)
     sentences += full.design.remarks
-    return replace(
-        quick, state="solved", source="full", message="; ".join(sentences), design=view, conflicts=()
-    )
+    message = in_words("; ".join(sentences), limits)
+    return replace(quick, state="solved", source="full", message=message, design=view, conflicts=())
 
 
 def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> list[str]:

@@ -72,6 +72,25 @@ class LiveDesign:
         self._history.ask(edit.applied(self.question, self.shown), drag, last=last)
         return self.answer
 
+    def open(self, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:
+        """Go on with another question; what was computed of the designs before is forgotten.
+
+        Parameters
+        ----------
+        question
+            For instance of a saved design.
+        values
+            Numbers in SI of a design to begin beside; empty without one.
+
+        Raises
+        ------
+        NlsError
+            If the question cannot be asked; nothing has changed then.
+        """
+        self._history.open(question, values)
+        self.work.forget()
+        return self.answer
+
     def undo(self) -> LiveAnswer:
         """Take the last edit back; the design is that of before, to the last digit."""
         self._history.undo()

@@ -212,6 +212,16 @@ class LiveQuestion:
         """
         return self.contour in self.free or not kind.of_shape
 
+    def keeps_named(self, limit: str) -> bool:
+        """Tell the same of a limit by its name; ranges of free numbers are always kept.
+
+        Parameters
+        ----------
+        limit
+            Name of its class.
+        """
+        return limit not in LIMIT_KINDS or self.keeps(LIMIT_KINDS[limit])
+
     @cached_property
     def numbers(self) -> dict[str, NumberState]:
         """The single numbers that may be given or freed, by name."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
-from .limit_kinds import LIMIT_KINDS
+from .limit_words import shown_value
 from .question import LiveQuestion
 
 Floats = NDArray[np.float64]
@@ -165,7 +165,7 @@ def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[Limi
     margins
         To all of its limits.
     """
-    return tuple(each for each in margins if not question.keeps(LIMIT_KINDS[each.limit]))
+    return tuple(each for each in margins if not question.keeps_named(each.limit))
 
 
 def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
@@ -178,12 +178,14 @@ def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str
     margins
         Of the design, to all limits.
     """
-    names = [name for name, each in question.limit_values.items() if not question.keeps(each.kind)]
-    words = [f"the contour is held, so {', '.join(names)} is shown and not kept"] if names else []
+    limits = [each for each in question.limit_values.values() if not question.keeps(each.kind)]
+    titles = " and ".join(f"{each.kind.title} ({each.kind.shown(each.value)})" for each in limits)
+    rule = "is shown and not kept" if len(limits) == 1 else "are shown and not kept"
+    words = [f"the contour is held, so {titles} {rule}"] if limits else []
+    whose = "the cam as it is fitted" if question.held_contour is None else "the contour that is held"
     for each in unkept(question, margins):
         if each.margin < -_BROKEN * abs(each.bound):
-            value, bound = (1e3 * number for number in (each.value, each.bound))
+            value, bound = (shown_value(each, number) for number in (each.value, each.bound))
             side = "at most" if each.upper else "at least"
-            broken = f"{each.of} {value:.4g} mm, {side} {bound:.4g} mm is asked for"
-            words.append(f"{each.limit} is BROKEN by the cam as it is fitted: {broken}")
+            words.append(f"BROKEN by {whose}: {each.of} {value}, {side} {bound} is asked for")
     return words

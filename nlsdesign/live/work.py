@@ -209,6 +209,12 @@ class LiveWork:
         for each in self._running.values():
             each.cancel()
 
+    def forget(self) -> None:
+        """End all work and forget what came of it."""
+        self.close()
+        self._running.clear()
+        self._designs.clear()
+
     def loop_at(self, angle: float, shown: AngleView) -> Lazy:
         """Return the torque loop at one angle, where it was asked for and computed for this design.
 

@@ -5,7 +5,7 @@ import { Connection, download, upload } from "./connection.js";
 import { PointTable, Rows } from "./controls.js";
 import { announce, byId, make, text } from "./elements.js";
 import { MechanismPicture } from "./mechanism.js";
-import { AtAngle, Panels } from "./panels.js";
+import { AtAngle, Panels, sitsOn } from "./panels.js";
 import { Questions } from "./questions.js";
 import { TargetEditor, torqueRange } from "./target_editor.js";
 import { interpolated } from "./chart.js";
@@ -165,6 +165,9 @@ function showAnswer() {
   }
   const card = byId("gallery");
   if (document.activeElement !== card) card.value = cards.some((each) => each.name === controls.title) ? controls.title : "";
+  const earlier = answer.stale ? (design ? "Deck, drawings, C and FMU are those of the last good design, of an earlier question: the question of now has no design." : "") : "";
+  text(byId("files-earlier"), earlier);
+  byId("files-earlier").hidden = earlier === "";
   showState();
   fade();
   cursor();
@@ -227,12 +230,6 @@ function showKinds() {
   select.replaceChildren(...left.map((each) => make("option", { value: each.name }, `${each.upper ? "largest" : "least"} ${each.words}`)));
 }
 
-// Names of limits as people call them.
-function wordsOf(names) {
-  const words = new Map((answer?.controls.limits ?? []).map((each) => [each[0], each[1]]));
-  return names.map((name) => words.get(name) ?? name).join(", ");
-}
-
 function numberRow([name, value, unit, , free, , , source]) {
   const chosen = answer.design?.numbers.find((each) => each.name === name);
   return { name, path: `${name} (${source})`, label: name, value: free && chosen ? chosen.value : value, unit, free,
@@ -243,7 +240,7 @@ function showNumbers(design) {
   const rows = [
     ["torque error, rms", `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`],
     ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
-    ["limits it sits on", wordsOf(design.active) || "none"],
+    ["limits it sits on", sitsOn(design) || "none"],
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
     ...(answer.controls.can_undo ? [["answered in", `${plain(1e3 * answer.seconds, 2)} ms`]] : []),
   ];
@@ -257,16 +254,16 @@ function showState() {
     return;
   }
   if (!answer) return;
-  const { design, conflicts } = answer;
+  const { design } = answer;
   const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.");
   const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
   const checking = full?.state === "computing" && full.revision === answer.revision ? `The check runs: ${full.message}. ` : "";
   const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
   const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
-  const sits = design?.active.length ? `It sits on: ${wordsOf(design.active)}. ` : "No limit binds. ";
+  const sits = design && sitsOn(design) ? `It sits on: ${sitsOn(design)}. ` : "No limit binds. ";
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
-  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${wordsOf(conflicts)}. ` : ""}${message} `];
+  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits: ${message} `];
   else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
   else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
   else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
@@ -391,7 +388,10 @@ byId("open").addEventListener("change", async (event) => {
   const wrong = await upload("/api/open", file);
   byId("notice").hidden = true;
   if (wrong) refuse({ reason: wrong });
-  else angle = null;
+  else {
+    angle = null;
+    announce(`${file.name} is opened. Undo brings back the design before.`);
+  }
 });
 
 document.addEventListener("keydown", (event) => {

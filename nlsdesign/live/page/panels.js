@@ -64,8 +64,7 @@ export class Panels {
       const share = broken ? 1 : Number.isFinite(used) ? Math.min(1.15, Math.max(0, used)) / 1.15 : 0;
       row.classList.toggle("active", each.active);
       nameText(row.children[0], each.of);
-      row.children[0].title = each.limit;
-      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, unit(each), 3)}${broken ? " · BROKEN" : each.active ? " · active" : ""}`);
+      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${bounded(each)}${broken ? " · BROKEN" : each.active ? " · active" : ""}`);
       row.children[2].firstChild.setAttribute("width", (300 * share).toFixed(1));
       row.children[2].firstChild.setAttribute("class", broken ? "broken" : each.active ? "sits" : "free");
     });
@@ -74,6 +73,15 @@ export class Panels {
   cursor(angle) {
     for (const { chart } of this.charts) chart.cursor(angle);
   }
+}
+
+// Limits that a design sits on, in words with their numbers.
+export function sitsOn(design) {
+  return design.margins.filter((each) => each.active).map((each) => `${each.of} ${bounded(each)}`).join(", ");
+}
+
+function bounded(margin) {
+  return `${margin.upper ? "≤" : "≥"} ${withUnit(margin.bound, unit(margin), 3)}`;
 }
 
 function unit(margin) {
@@ -125,9 +133,8 @@ export class AtAngle {
     }
     this.state(this.poles, at.poles, (groups) => groups.map((each) => `${each.words}: ${poleWords(each)}`).join("; "));
     if (at.poles.value) this.poles.chart.show(at.poles.value.map((each, k) => ({ name: each.mode, x: each.real, y: each.imaginary, points: true, tone: TONES[k % 4] })));
-    this.state(this.loop, at.loop, (loop) => `${loop.stable ? "Stable" : "UNSTABLE"} ${at.loop.message}: ${loop.words}.`);
+    this.loopState();
     const loop = at.loop.value;
-    this.run.hidden = at.loop.state === "done" || at.loop.state === "computing";
     if (loop) {
       this.loop.magnitude.show([{ name: "", x: loop.frequencies, y: loop.magnitude, tone: "blue" }]);
       this.loop.phase.show([{ name: "", x: loop.frequencies, y: loop.phase, tone: "blue" }]);
@@ -135,12 +142,27 @@ export class AtAngle {
   }
 
   showLoopWork(work) {
-    if (work.state === "computing") text(this.loop.state, `computing: ${work.message}, for ${Math.round(work.seconds)} s`);
-    if (work.state === "computing") this.run.hidden = true;
-    if (work.state === "failed" || work.state === "cancelled") {
-      text(this.loop.state, work.state === "cancelled" ? "stopped" : `${work.state}: ${work.message}`);
-      this.run.hidden = false;
-    }
+    this.work = work;
+    this.loopState();
+  }
+
+  // One text for the loop, from what is known at the angle and from the work that runs.
+  loopState() {
+    const lazy = this.at?.loop, work = this.work, card = this.loop;
+    const done = lazy?.state === "done" && lazy.value !== null;
+    const running = work?.state === "computing", ofNow = lazy?.state === "computing" || work?.old === false;
+    card.shown ||= done;
+    const old = card.shown && !done;
+    card.place.classList.toggle("stale", old);
+    card.place.setAttribute("aria-busy", String(running && !done));
+    this.run.hidden = done || (running && ofNow);
+    const seen = old ? " The curve is greyed: it is of an earlier design." : "";
+    let words = old ? `Not computed for this design.${seen}` : "not computed yet";
+    if (done) words = `${lazy.value.stable ? "Stable" : "UNSTABLE"} ${lazy.message}: ${lazy.value.words}.`;
+    else if (running) words = `computing${ofNow ? "" : " of an earlier design"}: ${work.message}, for ${Math.round(work.seconds)} s.${seen}`;
+    else if (work?.state === "failed" && ofNow) words = `failed: ${work.message}.${seen}`;
+    else if (work?.state === "cancelled" && ofNow) words = `Stopped.${seen}`;
+    text(card.state, words);
   }
 
   // Each has a state of its own and says what it holds for.
