@@ -157,6 +157,10 @@ class DesignView:
         Points of the lip in the frame of the cam, shape (n, 2), in m.
     rubber_volume
         In m³.
+    strain_end
+        Strain to which the rubber may be believed; infinite without rubber.
+    beyond
+        In words where it is stretched further, how far, and what to change.
     """
 
     revision: int
@@ -171,6 +175,8 @@ class DesignView:
     numbers: tuple[ShownNumber, ...]
     contour: Floats
     rubber_volume: float
+    strain_end: float = math.inf
+    beyond: tuple[str, ...] = ()
 
     def column(self, name: str) -> LiveColumn:
         """Return one column.

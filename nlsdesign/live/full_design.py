@@ -108,7 +108,7 @@ def full_answer(
         return replace(quick, source="full", message=sentence)
     view = view_of(question, quick.revision, full.design)
     missed = full.design.miss
-    sentences = [] if missed is None else [f"misses its target: {missed.words}"]
+    sentences = [*view.beyond, *([] if missed is None else [f"misses its target: {missed.words}"])]
     if missed is not None and missed.advice:
         sentences.append(f"what would help: {', or '.join(missed.advice)}")
     if solved is not None and quick.design is not None:

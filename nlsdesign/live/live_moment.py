@@ -157,9 +157,8 @@ def _answered(
     message = outcome.words
     if solved is not None:
         shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.numbers.machine)
-        message = "; ".join(
-            [*([] if shown.view.met else [missed(question, shown)]), *not_kept(question, shown.view.margins)]
-        )
+        sentences = [*shown.view.beyond, *([] if shown.view.met else [missed(question, shown)])]
+        message = "; ".join([*sentences, *not_kept(question, shown.view.margins)])
     controls = controls_of(question, can_undo=before is not None, can_redo=False)
     answer = LiveAnswer(
         revision=revision, state=outcome.state, message=message, source="quick",

@@ -19,6 +19,7 @@ from ..model import FlatModel, flatten
 from ..model.roles import series_cam
 from ..model.structure import CamNames
 from .limit_kinds import LIMIT_KINDS, LimitKind
+from .stretch import StrainEnd, strain_ends
 
 FEWEST_POINTS, MOST_POINTS = 2, 50
 """Points of a target with the first one at angle zero, which has no torque."""
@@ -108,6 +109,11 @@ class ChosenMachine:
         names = [cam.pretension, *rubber, *([] if cam.anchor_distance is None else [cam.anchor_distance])]
         known = self.assembly.quantities()
         return tuple(name for name in dict.fromkeys(names) if name in known)
+
+    @cached_property
+    def strain_ends(self) -> dict[str, StrainEnd]:
+        """How far each piece of rubber may be stretched, by its path."""
+        return strain_ends(self.model)
 
     @cached_property
     def default_limits(self) -> dict[str, float]:

@@ -12,7 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..design import CamDesign, Contour, LimitState, cam_from_profile, contour_from_curvature, contour_of_cam
+from ..design import (
+    CamDesign,
+    Contour,
+    LimitState,
+    MaximumCableTension,
+    MaximumStrain,
+    MaximumStress,
+    cam_from_profile,
+    contour_from_curvature,
+    contour_of_cam,
+)
 from ..design.optimisation.result import DesignCurves
 from ..model.derived_deck import derived
 from ..quantity import Quantity
@@ -21,6 +31,7 @@ from .question import LiveQuestion
 from .quick_program import QuickProgram
 from .quick_rows import structure_of
 from .quick_search import QuickOutcome, QuickPoint
+from .stretch import smallest, stretched_beyond
 from .views import ALLOWED, curve_columns, margins_of, shown_numbers
 
 Floats = NDArray[np.float64]
@@ -153,10 +164,11 @@ class QuickDesign:
         )  # fmt: skip
         states = self._limits(rows)
         rms, largest = float(np.sqrt(max(rows["mean_square"][0], 0.0))), self.question.target_size
+        columns, ends = curve_columns(curves, rows["wanted"]), self.question.machine.strain_ends
         return DesignView(
             revision=revision,
             checked=False,
-            columns=curve_columns(curves, rows["wanted"]),
+            columns=columns,
             rms_error=rms,
             largest_error=float(np.max(np.abs(rows["torque"] - rows["wanted"]))),
             relative_error=rms / largest,
@@ -166,6 +178,8 @@ class QuickDesign:
             numbers=shown_numbers(self.question, self.values),
             contour=self.contour.points,
             rubber_volume=float(rows["volume"][0]),
+            strain_end=smallest(ends),
+            beyond=stretched_beyond(ends, columns),
         )
 
     def _limits(self, rows: dict[str, Floats]) -> list[LimitState]:
@@ -248,7 +262,8 @@ class QuickSolver:
         if outcome.state != "solved":
             outcome = program.from_starts(question)
         if outcome.state != "solved" or outcome.point is None:
-            return None, replace(outcome, state="not solved", words=f"not solved yet: {outcome.words}")
+            words = f"not solved yet: {outcome.words}{_unlimited(question)}"
+            return None, replace(outcome, state="not solved", words=words)
         return QuickDesign(program, question, outcome.point, outcome.cost), outcome
 
     def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
@@ -319,6 +334,18 @@ class _Beginning:
     def unknowns(self) -> Floats:
         """All unknowns of the program."""
         return self.program.rows.completed(self.question, self.values)
+
+
+def _unlimited(question: LiveQuestion) -> str:
+    """Return what to do where nothing limits how far a search may stretch the rubber."""
+    limited = {MaximumStrain.__name__, MaximumStress.__name__, MaximumCableTension.__name__}
+    pretension = question.cam.pretension
+    if limited & set(question.limit_values) or pretension not in question.free:
+        return ""
+    return (
+        f". Nothing limits how far the search stretches the rubber, and {pretension} is free: it may run to "
+        f"where the law of the rubber has no value. Add a largest strain, or hold {pretension}"
+    )
 
 
 def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:

@@ -12,6 +12,7 @@ from ..design.optimisation.result import DesignCurves
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
 from .limit_words import shown_value
 from .question import LiveQuestion
+from .stretch import smallest, stretched_beyond
 
 Floats = NDArray[np.float64]
 
@@ -152,6 +153,8 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
         numbers=shown_numbers(question, values),
         contour=design.contour.points,
         rubber_volume=design.rubber_volume,
+        strain_end=smallest(question.machine.strain_ends),
+        beyond=stretched_beyond(question.machine.strain_ends, columns),
     )
 
 

@@ -213,7 +213,9 @@ function startOf(limit) {
   const kind = kinds.find((each) => each.name === limit);
   const rows = (answer.design?.columns ?? []).filter((each) => ends[limit]?.test(each.name)).flatMap((each) => each.values).filter((value) => value !== null && value > 0);
   if (rows.length === 0) return 1;
-  const value = kind.upper ? Math.max(...rows) * 1.01 : Math.min(...rows) * 0.99;
+  // A strain that no rubber bears is no place to begin at.
+  const end = limit === "MaximumStrain" ? answer.design.strain_end ?? Infinity : Infinity;
+  const value = Math.min(end, kind.upper ? Math.max(...rows) * 1.01 : Math.min(...rows) * 0.99);
   return Number(value.toPrecision(3));
 }
 
@@ -264,7 +266,8 @@ function showState() {
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
   if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits: ${message} `];
-  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
+  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /, "")} `];
+  else if (design?.beyond.length) [name, kind, words] = ["beyond its rubber", "failed", `${design.checked ? "" : "Quick answer: "}${message} `];
   else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
   else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
   else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer: ${message || missed} `];

@@ -40,6 +40,7 @@ export class Panels {
       for (const bound of new Set(bounds.map((each) => each.bound))) {
         series.push({ name: bounds[0].upper ? "largest allowed" : "least allowed", x: [angles[0], angles[angles.length - 1]], y: [bound, bound], tone: "orange", dash: "dashed", flat: true });
       }
+      if (limit === "MaximumStrain" && design.beyond.length) series.push({ name: "end of what is stated of the rubber", x: [angles[0], angles[angles.length - 1]], y: [design.strain_end, design.strain_end], tone: "vermillion", dash: "dotted", flat: true });
       const shown = capped ? series.map((s) => s.y.map((v) => (v === null ? null : Math.min(v, cap(series))))) : series.map((s) => s.y);
       const wanted = { x: [angles[0], angles[angles.length - 1]], y: range(shown, { zero }) };
       if (frozen && this.drawn) {
