@@ -7,7 +7,7 @@ import typing
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
@@ -24,6 +24,9 @@ _LONGEST_NAME = 200
 @dataclass(frozen=True)
 class LiveEdit(ABC):
     """Base of the edits; numbers are in SI."""
+
+    begins_anew: ClassVar[bool] = False
+    """Whether the question has nothing to do with the one before, so that no design is begun beside its."""
 
     @abstractmethod
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
@@ -322,6 +325,8 @@ class ChooseDeck(LiveEdit):
     name
         Of the deck or template.
     """
+
+    begins_anew: ClassVar[bool] = True
 
     name: str
 

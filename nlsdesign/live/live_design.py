@@ -69,7 +69,11 @@ class LiveDesign:
         NlsError
             If the edit cannot be done; nothing has changed then.
         """
-        self._history.ask(edit.applied(self.question, self.shown), drag, last=last)
+        question = edit.applied(self.question, self.shown)
+        if edit.begins_anew:
+            self._history.open(question, {})
+        else:
+            self._history.ask(question, drag, last=last)
         return self.answer
 
     def open(self, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:

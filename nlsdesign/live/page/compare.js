@@ -28,7 +28,7 @@ export class Compare {
       const given = design.numbers.find((each) => each.name === name);
       return given ? `${withUnit(given.value, given.unit)}${given.free ? " (free)" : ""}` : "–";
     };
-    const heads = columns.map((each) => make("th", { scope: "col", class: "numeric" }, each.name, " ",
+    const heads = columns.map((each) => make("th", { scope: "col", class: "numeric", "aria-label": each.name }, each.name, " ",
       each === now ? null : make("button", { type: "button", "aria-label": `Forget ${each.name}`, onclick: () => this.ask({ what: "keep", forget: true, name: each.name }) }, "×")));
     byId("compare-table").replaceChildren(
       make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "design"), ...heads)),

@@ -44,8 +44,13 @@ class NumberRow {
     const locked = given.free === true;
     this.field.disabled = locked;
     this.slider.disabled = locked;
+    // A name that is broken after its dots is not read as one word.
+    this.field.setAttribute("aria-label", `${given.label} in ${unitOf(given.unit) || "1"}`);
     this.slider.setAttribute("aria-label", `${given.label}, slider`);
-    if (this.box) this.box.checked = locked;
+    if (this.box) {
+      this.box.checked = locked;
+      this.box.setAttribute("aria-label", `free: the design chooses it: ${given.label}`);
+    }
     if (this.drop) {
       this.drop.hidden = given.droppable !== true;
       this.drop.setAttribute("aria-label", `Drop the limit: ${given.label}`);

@@ -123,9 +123,9 @@ function afterPaint(then) {
 }
 
 function refuse(message) {
+  // An alert, which a screen reader says by itself.
   text(byId("notice"), message.reason);
   byId("notice").hidden = false;
-  announce(message.reason);
   if (answer) requestAnimationFrame(showAnswer);
 }
 
@@ -171,7 +171,18 @@ function showAnswer() {
   showState();
   fade();
   cursor();
-  editor.say(design ? `rms error ${withUnit(design.rms_error, "N*m", 3)}` : "no design", byId("state-name").textContent);
+  const error = design ? `rms error ${withUnit(design.rms_error, "N*m", 3)}` : "no design";
+  // A check follows a quick answer, so that it is worth a word only to a hand on the keys.
+  if (answer.source === "full" || answer.state !== "solved") announceState();
+  else editor.say(error, byId("state-name").textContent);
+}
+
+// The state is said once when the hand rests, not with each answer of a drag.
+let stated = "";
+function announceState() {
+  const words = `${byId("state-name").textContent}. ${byId("state-words").textContent}`;
+  if (words !== stated) announce(words);
+  stated = words;
 }
 
 // What is compared with kept designs; actuator and rubber are those of the question, not of an earlier one.
@@ -203,7 +214,7 @@ function limitRow([name, words, value, si, shown, upper, byDefault]) {
   const unit = shown === "%" ? "%" : si;
   const margin = answer.design?.margins.find((each) => each.limit === name);
   const from = byDefault ? "from the deck" : "set here";
-  return { name, path: name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
+  return { name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
     margin: margin ? `${from}; ${margin.active ? "the design sits on it" : `now ${withUnit(margin.value, unit, 3)}`}` : from };
 }
 

@@ -113,7 +113,7 @@ export class AtAngle {
     this.poles = card("Poles of the plant", "poles");
     this.poles.chart = new Chart(inner(this.poles.place), { title: "", x: { name: "real part, logarithmic,", unit: "1/s" }, y: { name: "imaginary part, log.,", unit: "rad/s" }, height: 200, symlog: true });
     this.loop = card("Torque loop", "loop");
-    this.run = make("button", { type: "button", onclick: () => ask({ what: "work", name: "TorqueLoop" }) }, "Compute");
+    this.run = make("button", { type: "button", "aria-label": "Compute the torque loop", onclick: () => ask({ what: "work", name: "TorqueLoop" }) }, "Compute");
     this.loop.place.firstChild.append(this.run);
     this.loop.magnitude = new Chart(inner(this.loop.place), { title: "Magnitude", x: { name: "frequency", unit: "Hz" }, y: { name: "magnitude", unit: "dB" }, height: 150, log: true });
     this.loop.phase = new Chart(inner(this.loop.place), { title: "Phase", x: { name: "frequency", unit: "Hz" }, y: { name: "phase in °", unit: "" }, height: 130, log: true });
@@ -133,6 +133,7 @@ export class AtAngle {
       this.seen.list.replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
     }
     this.state(this.poles, at.poles, (groups) => groups.map((each) => `${each.words}: ${poleWords(each)}`).join("; "));
+    if (at.poles.value) this.poles.chart.alternative = `Poles of the plant: ${at.poles.value.map((each) => `${each.mode}: ${poleWords(each)}`).join("; ")}`;
     if (at.poles.value) this.poles.chart.show(at.poles.value.map((each, k) => ({ name: each.mode, x: each.real, y: each.imaginary, points: true, tone: TONES[k % 4] })));
     this.loopState();
     const loop = at.loop.value;
@@ -159,7 +160,7 @@ export class AtAngle {
     this.run.hidden = done || (running && ofNow);
     const seen = old ? " The curve is greyed: it is of an earlier design." : "";
     let words = old ? `Not computed for this design.${seen}` : "not computed yet";
-    if (done) words = `${lazy.value.stable ? "Stable" : "UNSTABLE"} ${lazy.message}: ${lazy.value.words}.`;
+    if (done) words = `${lazy.value.stable ? "Stable" : "UNSTABLE"} ${lazy.message}${bandwidth(lazy.value)}: ${lazy.value.words}.`;
     else if (running) words = `computing${ofNow ? "" : " of an earlier design"}: ${work.message}, for ${Math.round(work.seconds)} s.${seen}`;
     else if (work?.state === "failed" && ofNow) words = `failed: ${work.message}.${seen}`;
     else if (work?.state === "cancelled" && ofNow) words = `Stopped.${seen}`;
@@ -175,6 +176,12 @@ export class AtAngle {
     const said = { computing: `computing ${lazy.message}`, failed: `failed: ${lazy.message}`, cancelled: "stopped", "asked for later": "not computed yet" };
     text(card.state, done ? words(lazy.value) : said[lazy.state] ?? lazy.state);
   }
+}
+
+// Where the response falls by 3 dB for the first time.
+function bandwidth({ frequencies, magnitude, stable }) {
+  const k = magnitude.findIndex((value) => value < -3);
+  return stable && k > 0 ? `, −3 dB at ${plain(frequencies[k], 2)} Hz` : "";
 }
 
 // Pairs once, as a person writes them.
