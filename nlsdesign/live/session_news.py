@@ -150,9 +150,9 @@ class SessionNews:
 
     def settle_soon(self) -> None:
         """Begin the whole design once the hand rests; one that runs is of no use any more."""
-        if self.live.answer.source == "quick":
-            self._settle_at = time.monotonic() + _REST
-            self.live.work.cancel(SettleDesign.__name__)
+        quick = self.live.answer.source == "quick"
+        self._settle_at = time.monotonic() + _REST if quick else None
+        self.live.work.cancel(SettleDesign.__name__)
 
     def pause(self) -> None:
         """Do what may wait while a hand moves: what holds at the angle, the whole design, news of work."""

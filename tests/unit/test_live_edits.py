@@ -86,9 +86,9 @@ def test_points_move_between_their_neighbours_only(question: LiveQuestion) -> No
         (MovePoint(2, -math.radians(5.0), 0.2), ["angle of point 3 = -5 °", "[0, 359.8] °"]),
         (MovePoint(2, 0.7, 0.2), ["points 3 and 4 of the target", "0.057°"]),
         (MovePoint(0, 0.0, 0.1), ["point 1 of the target", "2 to 6"]),
-        (ChangeLimit("MaximumStrain", -0.05), ["MaximumStrain = -5 %"]),
-        (ChangeLimit("MaximumStress", -2e6), ["MaximumStress = -2 MPa"]),
-        (ChangeLimit("MinimumRadiusOfCurvature", -3e-3), ["MinimumRadiusOfCurvature = -3 mm"]),
+        (ChangeLimit("MaximumStrain", -0.05), ["largest strain of the rubber = -5 %"]),
+        (ChangeLimit("MaximumStress", -2e6), ["largest nominal stress of the rubber = -2 MPa"]),
+        (ChangeLimit("MinimumRadiusOfCurvature", -3e-3), ["least radius of curvature = -3 mm"]),
         (SetNumber("spring.rubber.area", -5e-6), ["spring.rubber.area = -5 mm²", "[0.01, 1e+04] mm²"]),
     ],
 )
@@ -118,6 +118,8 @@ def test_a_limit_that_a_held_contour_breaks_is_named_with_both_numbers(question:
     words = "; ".join(not_kept(held, (force, shape)))
     assert "is shown and not kept" in words
     assert "BROKEN by the cam as it is fitted: radius of curvature -1.9 mm, at least 6 mm" in words
+    assert "least radius of curvature (6 mm) is shown and not kept" in words
+    assert "MinimumRadius" not in words
     kept = replace(shape, value=7e-3, margin=1e-3)
     assert "BROKEN" not in "; ".join(not_kept(held, (kept,)))
     assert not_kept(question, (shape,)) == []

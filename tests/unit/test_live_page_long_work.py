@@ -117,7 +117,7 @@ def test_the_loop_at_the_angle_follows_the_slider_and_goes_with_its_design(tab: 
     tab.until(f"{state}.startsWith('Stable at ') && {state} !== {words!r}")
     assert settled(tab, curve, line)
     move(tab, 3, 10)
-    tab.until(f"{state} === 'not computed yet'")
+    tab.until(f"{state}.startsWith('Not computed for this design. The curve is greyed')")
     assert tab.evaluate(f"{LOOP}.classList.contains('stale')")
     assert not tab.evaluate(f"{LOOP}.querySelector('button').hidden")
 
