@@ -171,9 +171,6 @@ def test_a_contradiction_is_said_once_in_words_and_files_say_whose_they_are(tab:
     tab.until(f"{note}.hidden && {ANSWERED}")
 
 
-# --- and who does ---------------------------------------------------------------------------------
-
-
 def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back(tab: Tab) -> None:
     point = POINT.format(3)
     before, curve = (
@@ -331,9 +328,19 @@ def test_a_number_that_is_none_is_answered_beside_its_field(tab: Tab) -> None:
     tab.until("document.getElementById('notice').hidden")
 
 
+COUNT = """(() => {
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (words) {
+    sessionStorage.setItem("asked", JSON.parse(words).number);
+    return send.call(this, words);
+  };
+})()"""
+
+
 def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab: Tab) -> None:
     session, point = session_of(tab), POINT.format(4)
     before = tab.evaluate(point)
+    tab.evaluate(COUNT)
     x, y = tab.evaluate(HANDLE.format(4))
     tab.mouse("Pressed", x, y)
     tab.mouse("Moved", x, y - 9)
@@ -344,8 +351,12 @@ def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab:
     assert settled(tab, point, before)
     assert session_of(tab) == session
     tab.until(ANSWERED)
+    asked = tab.evaluate("Number(sessionStorage.getItem('asked'))")
+    tab.evaluate(COUNT)
     tab.press("z", control=True)
     tab.until(f"{point} === {before!r}")
+    # Answers to the page before its reload must not count as later ones.
+    assert tab.evaluate("Number(sessionStorage.getItem('asked'))") > asked > 0
     assert tab.messages == []
 
 
