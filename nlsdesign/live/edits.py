@@ -16,7 +16,15 @@ from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS
 from .limit_words import in_words
-from .question import ChosenMachine, LiveQuestion, TargetPoint, finite_in
+from .question import (
+    LARGEST_ANGLE,
+    LARGEST_TORQUE,
+    LEAST_STEP,
+    ChosenMachine,
+    LiveQuestion,
+    TargetPoint,
+    finite_in,
+)
 
 _LONGEST_NAME = 200
 
@@ -104,6 +112,41 @@ class RemovePoint(LiveEdit):
         """Return the question with one point less."""
         index = _index(self.index, len(question.points))
         return question.with_points(question.points[:index] + question.points[index + 1 :])
+
+
+@dataclass(frozen=True)
+class ScaleTarget(LiveEdit):
+    """Scale the whole target, so that its last point has another angle and torque and its form stays.
+
+    Parameters
+    ----------
+    angle, torque
+        Of the last point, in rad and N·m.
+    """
+
+    angle: float
+    torque: float
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with all points scaled.
+
+        Raises
+        ------
+        ValueRangeError
+            If the last point has no torque to scale, or a number is out of range.
+        """
+        last = question.points[-1]
+        if not last.torque > 0.0:
+            raise ValueRangeError(
+                "target", "ends without torque, so that nothing can be scaled to one",
+                next_step="give its last point a torque",
+            )  # fmt: skip
+        least = len(question.points) * LEAST_STEP
+        angle = finite_in("last angle", self.angle, lowest=least, highest=LARGEST_ANGLE, unit="rad")
+        torque = finite_in("last torque", self.torque, lowest=1e-6, highest=LARGEST_TORQUE, unit="N*m")
+        across, up = angle / last.angle, torque / last.torque
+        scaled = [TargetPoint(across * each.angle, up * each.torque) for each in question.points[:-1]]
+        return question.with_points((*scaled, TargetPoint(angle, torque)))
 
 
 @dataclass(frozen=True)

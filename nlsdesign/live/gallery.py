@@ -30,7 +30,7 @@ _POINTS = 6
 """Of the target with which an actuator begins."""
 _LEAST_STRAIN = 1e-3
 _ROOM = 2.0
-"""Assumed: how much further than its own cam does a design may stretch rubber of which nothing is declared."""
+"""Assumed: how much further than its own cam a design may stretch rubber of which nothing is declared."""
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ const edit = (fields, { drag = null, last = true, begin } = {}) => ask({ what: "
 const act = {
   move: (k, at, torque, last, begin) => edit({ edit: "MovePoint", index: k, angle: at, torque }, { drag: `point ${k}`, last, begin }),
   add: (at, torque) => edit({ edit: "AddPoint", angle: at, torque: Math.max(0, torque) }),
+  scale: (at, torque) => edit({ edit: "ScaleTarget", angle: at, torque }),
   remove: (k) => (k > 0 ? edit({ edit: "RemovePoint", index: k }) : announce("The first point stays.")),
 };
 
