@@ -18,6 +18,7 @@ from .views import not_kept, unkept, view_of
 STARTS = 8
 _DEARER = 1e-3
 """Relative difference of costs, and cost, from which two solutions are different optima."""
+_WEIGHED = " (torque error, rubber and smoothness together)"
 _DIFFERS = 1e-3
 """Difference of two rms errors relative to the largest torque from which it is stated."""
 
@@ -130,12 +131,13 @@ def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> l
     was, there = f"{1e3 * quick.rms_error:.3g} mN·m rms", f"{1e3 * design.predicted_rms:.3g} mN·m rms"
     if solved.cost > cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
-            f"the quick answer was a worse local optimum: {was} against {there} now, both before the finish"
+            f"the quick answer was a worse local optimum{_WEIGHED}: {was} against {there} now, both "
+            "before the finish"
         )
     elif cost > solved.cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
-            f"the quick answer was a better local optimum that none of {STARTS} starts reaches: {was} "
-            f"against {there} now; undo and redo bring it back"
+            f"the quick answer was a better local optimum{_WEIGHED} that none of {STARTS} starts reaches: "
+            f"{was} against {there} now; undo and redo bring it back"
         )
     if abs(design.rms - quick.rms_error) > _DIFFERS * largest:
         sentences.append(

@@ -15,7 +15,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
 from nlsdesign.design.optimisation.result import Miss
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.errors import NlsError, ValueRangeError
 from nlsdesign.live import (
     AddPoint,
     ChangeLimit,
@@ -246,7 +246,15 @@ def test_a_contour_that_was_just_designed_has_the_same_numbers_free_and_held(tem
     """The cam that is fitted to it ripples, down to a radius of -1.9 mm; what is cut is the contour."""
     free = template.answer.design
     held = template.apply(HoldNumber(template.question.contour))
+    texts, designed = template.saved(), template.question.machine.designed
     template.undo()
+    again = reopened(texts)[0].held_contour
+    assert designed is not None
+    assert again is not None
+    np.testing.assert_array_equal(again.radii_of_curvature, designed.radii_of_curvature)
+    for begin in (texts.begin.replace("lever_arms = [0.0,", "lever_arms = ["), texts.begin + "slopes = []\n"):
+        with pytest.raises(NlsError, match=r"live\.toml"):
+            reopened(replace(texts, begin=begin))
     assert held.state == "solved"
     assert "BROKEN" not in held.message
     assert free is not None
@@ -361,7 +369,7 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert missed.lower().count("misses") == 1
     assert "; what would help: free rubber.area (to 2 mm^2), or another" in missed
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
-    assert "worse local optimum: 0.0175 mN·m rms against 0.0175 mN·m rms now" in worse.message
+    assert "a worse local optimum (torque error, rubber and smoothness together): 0.0175" in worse.message
     template._history.settle(full)
     assert template.answer.source == "full"
     assert template.at(0.3).revision == template.answer.revision

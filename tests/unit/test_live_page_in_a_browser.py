@@ -163,7 +163,7 @@ def test_a_contradiction_is_said_once_in_words_and_files_say_whose_they_are(tab:
     tab.until(f"{STATE} === 'infeasible'")
     words = tab.evaluate("document.getElementById('state-words').textContent")
     assert words.count("contradict") + words.count("cannot be kept") == 1
-    assert words.startswith("No design keeps all limits: largest nominal stress of the rubber (0.002 MPa)")
+    assert words.startswith("No design keeps all limits. Largest nominal stress of the rubber (0.002 MPa)")
     assert not tab.evaluate(f"{note}.hidden")
     assert "those of the last good design" in tab.evaluate(f"{note}.textContent")
     assert tab.evaluate(CLASSES) == []

@@ -164,7 +164,7 @@ export class PointTable {
     this.lastAngle = field("Scale the whole curve: last angle in degrees");
     this.lastTorque = field("Scale the whole curve: last torque in newton metres");
     this.scale = make("form", { class: "point scale", onsubmit: (event) => { event.preventDefault(); this.scaled(); } },
-      make("span", { "aria-hidden": "true" }, "to"), this.lastAngle, this.lastTorque, make("button", { type: "submit", "aria-label": "Scale the whole curve", title: "Scale the whole curve to this last angle and torque" }, "Scale"));
+      make("span", { class: "caption", "aria-hidden": "true" }, "scale the whole curve to"), make("span"), this.lastAngle, this.lastTorque, make("button", { type: "submit", "aria-label": "Scale the whole curve", title: "Scale the whole curve to this last angle and torque" }, "Scale"));
   }
 
   show(points) {

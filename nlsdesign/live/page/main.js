@@ -269,7 +269,7 @@ function showState() {
   }
   if (!answer) return;
   const { design } = answer;
-  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.");
+  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.").replace(/^./, (first) => first.toUpperCase());
   const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
   const checking = full?.state === "computing" && full.revision === answer.revision ? `The check runs: ${full.message}. ` : "";
   const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
@@ -277,8 +277,8 @@ function showState() {
   const sits = design && sitsOn(design) ? `It sits on: ${sitsOn(design)}. ` : "No limit binds. ";
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
-  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits: ${message} `];
-  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /, "")} `];
+  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits. ${message} `];
+  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /i, "").replace(/^./, (first) => first.toUpperCase())} `];
   else if (design?.beyond.length) [name, kind, words] = ["beyond its rubber", "failed", `${design.checked ? "" : "Quick answer: "}${message} `];
   else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
   else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
