@@ -147,7 +147,7 @@ def _contour_of(begin: dict[str, Any], machine: ChosenMachine) -> Contour | None
         return None
     try:
         rows = [np.array(table[name], dtype=float) for name in _ROWS]
-        contour = Contour(*rows, float(table["anchor_distance"]))
+        contour = Contour(rows[0], rows[1], rows[2], rows[3], float(table["anchor_distance"]))
         fitted = contour_of_cam(machine.assembly[machine.cam.name])
         sound = len({row.shape for row in rows}) == 1 and 4 <= rows[0].size <= _MOST_ROWS
         sound = sound and bool(np.all(np.isfinite(rows)) and np.all(np.diff(rows[0]) > 0.0))
