@@ -32,8 +32,8 @@ def in_words(sentence: str, limits: Mapping[str, LimitNumber] = _NO_LIMITS) -> s
         That hold, by name.
     """
 
-    def read(found: re.Match[str]) -> str:
-        name = found.group()
+    def read(match: re.Match[str]) -> str:
+        name = match.group()
         if name not in LIMIT_KINDS:
             return _OTHERS[name]
         kind = LIMIT_KINDS[name]
@@ -78,7 +78,7 @@ def holding(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]
     margins
         To all of its limits.
     """
-    words = [shown_bound(each) for each in margins if each.active and question.keeps_named(each.limit)]
+    words = [shown_bound(each) for each in margins if each.active and question.keeps(each.limit)]
     if question.contour not in question.free:
         words.append("the contour, which is held")
     return words

@@ -76,25 +76,6 @@ class LiveDesign:
             self._history.ask(question, drag, last=last)
         return self.answer
 
-    def open(self, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:
-        """Go on with another question; what was computed of the designs before is forgotten.
-
-        Parameters
-        ----------
-        question
-            For instance of a saved design.
-        values
-            Numbers in SI of a design to begin beside; empty without one.
-
-        Raises
-        ------
-        NlsError
-            If the question cannot be asked; nothing has changed then.
-        """
-        self._history.open(question, values)
-        self.work.forget()
-        return self.answer
-
     def undo(self) -> LiveAnswer:
         """Take the last edit back; the design is that of before, to the last digit."""
         self._history.undo()
@@ -170,3 +151,25 @@ class LiveDesign:
     def saved(self) -> SavedDesign:
         """Return deck, design file and where the search stands, as text."""
         return saved(self.question, self._history.now.values)
+
+
+def open_question(live: LiveDesign, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:
+    """Go on with another question, one step that can be undone; what was computed before is forgotten.
+
+    Parameters
+    ----------
+    live
+        The design.
+    question
+        For instance of a saved design.
+    values
+        Numbers in SI of a design to begin beside; empty without one.
+
+    Raises
+    ------
+    NlsError
+        If the question cannot be asked; nothing has changed then.
+    """
+    live._history.open(question, values)
+    live.work.forget()
+    return live.answer

@@ -199,7 +199,9 @@ class LiveQuestion:
 
         Without limits on the shape of a contour that is held: nothing that is free changes them.
         """
-        limits = [each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind)]
+        limits = [
+            each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind.name)
+        ]
         ranges = [NumberRange(name, *self.ranges[name]) for name in self.free if name in self.ranges]
         return (*limits, *ranges)
 
@@ -208,25 +210,16 @@ class LiveQuestion:
         """Contour that was designed here and is held; ``None`` where it is free, or that of a deck."""
         return None if self.contour in self.free else self.machine.designed
 
-    def keeps(self, kind: LimitKind) -> bool:
+    def keeps(self, limit: str) -> bool:
         """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.
 
         Parameters
         ----------
-        kind
-            Of the limit.
-        """
-        return self.contour in self.free or not kind.of_shape
-
-    def keeps_named(self, limit: str) -> bool:
-        """Tell the same of a limit by its name; ranges of free numbers are always kept.
-
-        Parameters
-        ----------
         limit
-            Name of its class.
+            Name of its class; ranges of free numbers are always kept.
         """
-        return limit not in LIMIT_KINDS or self.keeps(LIMIT_KINDS[limit])
+        kind = LIMIT_KINDS.get(limit)
+        return kind is None or self.contour in self.free or not kind.of_shape
 
     @cached_property
     def numbers(self) -> dict[str, NumberState]:

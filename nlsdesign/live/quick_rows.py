@@ -65,7 +65,7 @@ class QuickRows:
         watched: list[Bound] = []
         for each in question.limit_values.values():
             bounds = each.kind.limit(each.value).bounds(design)
-            (kept if question.keeps(each.kind) else watched).extend(bounds)
+            (kept if question.keeps(each.kind.name) else watched).extend(bounds)
         self.bounds: tuple[Bound, ...] = tuple(kept)
         self.shown_bounds: tuple[Bound, ...] = (*kept, *watched)
         self.cost = sum((goal.cost(design) for goal in GOALS), start=ca.SX(0))

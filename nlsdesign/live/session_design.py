@@ -15,7 +15,7 @@ from .exports import ExportDesign
 from .gallery import gallery_question, question_of_deck
 from .inbox import Inbox
 from .limit_words import in_words
-from .live_design import LiveDesign
+from .live_design import LiveDesign, open_question
 from .outbox import Outbox
 from .page_questions import PageQuestions
 from .question import LiveQuestion
@@ -136,7 +136,7 @@ class SessionDesign:
             except UnicodeDecodeError:
                 raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
             question = question_of_deck(text, "deck.toml")
-        self._news.live.open(question, values)
+        open_question(self._news.live, question, values)
         self._refuse_file("another design was opened meanwhile")
         self._begin(self._news.live)
         self._news.everything(None)

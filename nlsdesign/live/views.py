@@ -168,7 +168,7 @@ def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[Limi
     margins
         To all of its limits.
     """
-    return tuple(each for each in margins if not question.keeps_named(each.limit))
+    return tuple(each for each in margins if not question.keeps(each.limit))
 
 
 def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
@@ -181,7 +181,7 @@ def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str
     margins
         Of the design, to all limits.
     """
-    limits = [each for each in question.limit_values.values() if not question.keeps(each.kind)]
+    limits = [each for each in question.limit_values.values() if not question.keeps(each.kind.name)]
     titles = " and ".join(f"{each.kind.title} ({each.kind.shown(each.value)})" for each in limits)
     rule = "is shown and not kept" if len(limits) == 1 else "are shown and not kept"
     words = [f"the contour is held, so {titles} {rule}"] if limits else []
