@@ -122,11 +122,12 @@ class SolvedSearch:
     def lost_travel(self) -> float:
         """Cable in m that the declared cam takes up less than the contour that it was fitted to.
 
-        It sets in, or changes sides, over an angle, and stays behind by that from there on. A pretension that
-        is free makes up for it.
+        One that begins with a lever arm sets in over an angle, and stays behind by that from there on. A
+        pretension that is free makes up for it.
         """
         contour, cam = self.contour_fit[0], self.search.question.cam
-        if not self.cam_changes and not isinstance(cam, DesignedCam):
+        designed = self.cam_changes or isinstance(cam, DesignedCam)
+        if not designed or contour.lever_arms[0] <= 0.0:
             return 0.0
         model = flatten(with_smooth_cables(self.actuator.with_values(self.cam_changes)))
         law = cam_function(model, self.search.problem.law.cam.drive)

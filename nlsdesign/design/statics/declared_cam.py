@@ -454,7 +454,7 @@ def _jumps(wanted: Floats) -> bool:
 def _solved(basis: Floats, wanted: Floats, used: NDArray[np.bool_]) -> Floats:
     # Within the onset of a jump no angle is used, and the control values that act there alone are free: they
     # go on as their neighbours do.
-    smooth = _LOOSE * np.diff(np.eye(basis.shape[1]), n=3, axis=0)
+    smooth = _LOOSE * np.diff(np.eye(basis.shape[1]), n=3, axis=0)[: 0 if used.all() else None]
     rows = np.vstack([basis[used], smooth])
     values, *_ = np.linalg.lstsq(rows, np.concatenate([wanted[used], np.zeros(len(smooth))]), rcond=None)
     return np.asarray(values, dtype=float)
