@@ -96,6 +96,24 @@ def test_the_cloud_shows_its_quantiles_grows_old_with_an_edit_and_can_be_stopped
     assert not tab.evaluate("document.getElementById('tolerance-run').disabled")
 
 
+def test_advice_of_a_check_is_done_by_its_button(tab: Tab) -> None:
+    tab.evaluate(
+        """(() => {
+          const gallery = document.getElementById("gallery");
+          gallery.value = "one_sided_cable_drive";
+          gallery.dispatchEvent(new Event("change"));
+        })()"""
+    )
+    free = "document.querySelector('#remarks button')"
+    tab.until(f"{free}?.textContent === 'Free spring.cable.rope.rubber.rest_length'", seconds=120)
+    tab.evaluate(f"{free}.click()")
+    tab.until(f"{CHECKED} && document.getElementById('remarks').children.length === 0", seconds=120)
+    for _ in range(2):
+        tab.press("z", control=True)
+        resting(tab)
+    tab.until("document.getElementById('gallery').value === 'cam-actuator'")
+
+
 LOOP = "document.querySelector('#linear-row > .card:nth-child(3)')"
 
 

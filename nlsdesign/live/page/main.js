@@ -164,8 +164,8 @@ function showAnswer() {
     slider(design.columns[0].values);
     if (!frozen) compare.show(null, present());
   }
-  const card = byId("gallery");
-  if (document.activeElement !== card) card.value = cards.some((each) => each.name === controls.title) ? controls.title : "";
+  showTitle();
+  showAdvice();
   const earlier = answer.stale ? (design ? "Deck, drawings, C and FMU are those of the last good design, of an earlier question: the question of now has no design." : "") : "";
   text(byId("files-earlier"), earlier);
   byId("files-earlier").hidden = earlier === "";
@@ -184,6 +184,24 @@ function announceState() {
   const words = `${byId("state-name").textContent}. ${byId("state-words").textContent}`;
   if (words !== stated) announce(words);
   stated = words;
+}
+
+// The actuator of the gallery, or the name of a deck of one's own.
+function showTitle() {
+  const card = byId("gallery"), { title } = answer.controls;
+  const known = cards.some((each) => each.name === title);
+  if (cards.length) text(card.options[0], known ? "own deck" : `own deck: ${title}`);
+  if (document.activeElement !== card) card.value = known ? title : "";
+}
+
+// A number that would help when it is freed is freed by a button.
+function showAdvice() {
+  const held = new Set(answer.controls.numbers.filter((each) => !each[4]).map((each) => each[0]));
+  const named = [...answer.message.matchAll(/free ([\w.]+?)(?= |,|;|$)/g)].map((each) => each[1]).filter((name) => held.has(name));
+  const code = named.join(" "), place = byId("remarks");
+  if (place.dataset.code === code) return;
+  place.dataset.code = code;
+  place.replaceChildren(...[...new Set(named)].map((name) => make("button", { type: "button", onclick: () => edit({ edit: "FreeNumber", name }) }, `Free ${name}`)));
 }
 
 // What is compared with kept designs; actuator and rubber are those of the question, not of an earlier one.
@@ -269,7 +287,7 @@ function showState() {
   }
   if (!answer) return;
   const { design } = answer;
-  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.").replace(/^./, (first) => first.toUpperCase());
+  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.").replace(/^[a-z](?=[a-z]* )/, (first) => first.toUpperCase());
   const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
   const checking = full?.state === "computing" && full.revision === answer.revision ? `The check runs: ${full.message}. ` : "";
   const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
@@ -278,7 +296,7 @@ function showState() {
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
   if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits. ${message} `];
-  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /i, "").replace(/^./, (first) => first.toUpperCase())} `];
+  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /i, "").replace(/^[a-z](?=[a-z]* )/, (first) => first.toUpperCase())} `];
   else if (design?.beyond.length) [name, kind, words] = ["beyond its rubber", "failed", `${design.checked ? "" : "Quick answer: "}${message} `];
   else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
   else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
@@ -363,7 +381,7 @@ function showGallery(message) {
     make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.reason ? `${each.name} (${each.reason})` : each.name)));
   select.replaceChildren(make("option", { value: "", disabled: true }, "own deck"), group("deck", "decks"), group("template", "templates"));
   select.disabled = false;
-  if (answer) select.value = cards.some((each) => each.name === answer.controls.title) ? answer.controls.title : "";
+  if (answer) showTitle();
   material.replaceChildren(make("option", { value: "" }, "that of the deck"), ...materials.map(({ name, reason }) =>
     make("option", { value: name, disabled: reason !== "" }, reason ? `${name} (${reason})` : name)));
   if (answer) material.value = answer.controls.material;
