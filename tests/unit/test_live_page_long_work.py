@@ -274,7 +274,7 @@ def test_files_are_saved_and_a_saved_design_is_opened_again(tab: Tab, tmp_path: 
     click(tab, "keep")
     tab.until("document.querySelectorAll('#compare-table thead th').length === 3")
     tab.choose("open", files["design"])
-    tab.until(f"{POINT.format(3)} !== {other!r} && document.getElementById('undo').disabled")
+    tab.until(f"{POINT.format(3)} !== {other!r}")
     assert tab.evaluate(POINT.format(2)) == point
     tab.until(CHECKED, seconds=120)
     assert tab.evaluate("document.querySelector('#numbers dd').textContent") == error
@@ -285,6 +285,11 @@ def test_files_are_saved_and_a_saved_design_is_opened_again(tab: Tab, tmp_path: 
     tab.evaluate("document.querySelector('#compare-table thead button').click()")
     tab.choose("open", files["deck"])
     tab.until("document.getElementById('notice').hidden && document.getElementById('gallery').value === ''")
+    assert tab.evaluate("document.getElementById('gallery').options[0].textContent").startswith("own deck: ")
+    for expected in (None, other):
+        click(tab, "undo")
+        resting(tab)
+        assert expected is None or tab.evaluate(POINT.format(3)) == expected, "to open is a step back"
 
 
 # --- side by side ---------------------------------------------------------------------------------

@@ -19,9 +19,14 @@ let kinds = [];
 let angle = null;
 let full = null;
 let shownNumber = 0;
+let computing = false;
 
 const connection = { send: (message) => live?.send(message) ?? false };
-const questions = new Questions((message) => connection.send(message), (busy) => { document.body.dataset.busy = String(busy); });
+const questions = new Questions((message) => connection.send(message), (busy) => {
+  document.body.dataset.busy = String(busy);
+  // What was answered may have been no design: then the one that is shown is that of now after all.
+  if (!busy && computing) { computing = false; showState(); fade(); }
+});
 window.addEventListener("pagehide", () => questions.flush());
 const ask = (message, begin) => { const number = questions.ask(message, begin); later(); return number; };
 const edit = (fields, { drag = null, last = true, begin } = {}) => ask({ what: "edit", edit: fields, drag, last, angle }, begin);
@@ -316,7 +321,7 @@ function later() {
   if (waiting) return;
   waiting = setTimeout(() => {
     waiting = 0;
-    if (questions.busy && !document.body.classList.contains("lost")) { showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
+    if (questions.busy && !document.body.classList.contains("lost")) { computing = true; showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
   }, 250);
 }
 
