@@ -96,6 +96,14 @@ def test_the_cloud_shows_its_quantiles_grows_old_with_an_edit_and_can_be_stopped
     assert not tab.evaluate("document.getElementById('tolerance-run').disabled")
 
 
+def test_a_curve_that_leaves_its_picture_does_not_run_along_the_edge(tab: Tab) -> None:
+    path = """import("/page/chart.js").then(({ Chart }) => Chart.prototype.path.call(
+      { px: (v) => v, py: (v) => -v, clipped: (v) => Math.min(10, Math.max(0, -v)), height: 10 },
+      { x: [0, 1, 2, 3, 4], y: [-5, 5, 6, 7, -5] },
+    ))"""
+    assert tab.evaluate(path) == "M0.0 5.0L1.0 0.0M2.0 0.0M3.0 0.0L4.0 5.0"
+
+
 def test_advice_of_a_check_is_done_by_its_button(tab: Tab) -> None:
     tab.evaluate(
         """(() => {

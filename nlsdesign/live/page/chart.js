@@ -111,9 +111,13 @@ export class Chart {
   }
 
   path({ x, y }) {
-    let d = "", pen = "M";
+    let d = "", pen = "M", outside = false;
     for (let k = 0; k < x.length; k += 1) {
       if (y[k] === null || !Number.isFinite(y[k])) { pen = "M"; continue; }
+      // A line along the edge would read as values that are there.
+      const beyond = this.py(y[k]) < 0 || this.py(y[k]) > this.height;
+      if (beyond && outside) pen = "M";
+      outside = beyond;
       d += `${pen}${this.px(x[k]).toFixed(1)} ${this.clipped(y[k]).toFixed(1)}`;
       pen = "L";
     }
