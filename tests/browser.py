@@ -122,6 +122,26 @@ class Tab:
             time.sleep(0.02)
         return value
 
+    def accessible(self) -> list[tuple[str, str]]:
+        """Return role and name of all that a screen reader is given."""
+        self.ask("Accessibility.enable")
+        nodes = self.ask("Accessibility.getFullAXTree")["nodes"]
+        kept = [each for each in nodes if not each["ignored"] and "role" in each]
+        return [(each["role"]["value"], each.get("name", {}).get("value", "")) for each in kept]
+
+    def listen(self) -> None:
+        """Keep in ``window.heard`` what a screen reader says from now on by itself."""
+        self.evaluate(
+            """(() => {
+              window.heard = [];
+              const said = "[aria-live]:not([aria-live=off]), [role=status], [role=alert], output";
+              for (const place of document.querySelectorAll(said)) new MutationObserver(() => {
+                const words = place.textContent;
+                if (words && words !== window.heard.at(-1)) window.heard.push(words);
+              }).observe(place, { childList: true, characterData: true, subtree: true });
+            })()"""
+        )
+
     def press(self, key: str, *, shift: bool = False, control: bool = False) -> None:
         """Press a key and let it go."""
         codes = {"Tab": 9, "Delete": 46, "Insert": 45, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39,

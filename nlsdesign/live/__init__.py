@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         LiveEdit,
         MovePoint,
         RemovePoint,
+        ScaleTarget,
         SetNumber,
         edit_from,
     )
@@ -72,6 +73,7 @@ __all__ = [
     "MovePoint",
     "RemovePoint",
     "SavedDesign",
+    "ScaleTarget",
     "SetNumber",
     "SettleDesign",
     "Snapshot",

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantity import parse_unit, with_unit
+
 Floats = NDArray[np.float64]
 
 
@@ -61,6 +63,16 @@ class LimitMargin:
     shown_unit: str
     upper: bool
     active: bool
+
+    def shown(self, value: float) -> str:
+        """Return a number in the unit of the limit as text.
+
+        Parameters
+        ----------
+        value
+            In SI.
+        """
+        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
 
 
 @dataclass(frozen=True)
@@ -145,6 +157,10 @@ class DesignView:
         Points of the lip in the frame of the cam, shape (n, 2), in m.
     rubber_volume
         In m³.
+    strain_end
+        Strain to which the rubber may be believed; infinite without rubber.
+    beyond
+        In words where it is stretched further, how far, and what to change.
     """
 
     revision: int
@@ -159,6 +175,8 @@ class DesignView:
     numbers: tuple[ShownNumber, ...]
     contour: Floats
     rubber_volume: float
+    strain_end: float = math.inf
+    beyond: tuple[str, ...] = ()
 
     def column(self, name: str) -> LiveColumn:
         """Return one column.

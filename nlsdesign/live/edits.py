@@ -7,7 +7,7 @@ import typing
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from ..components.assembly.other_rubber import with_rubber
 from ..components.materials.library import material
@@ -15,7 +15,16 @@ from ..errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .limit_kinds import LIMIT_KINDS
-from .question import ChosenMachine, LiveQuestion, TargetPoint, finite_in
+from .limit_words import in_words
+from .question import (
+    LARGEST_ANGLE,
+    LARGEST_TORQUE,
+    LEAST_STEP,
+    ChosenMachine,
+    LiveQuestion,
+    TargetPoint,
+    finite_in,
+)
 
 _LONGEST_NAME = 200
 
@@ -23,6 +32,9 @@ _LONGEST_NAME = 200
 @dataclass(frozen=True)
 class LiveEdit(ABC):
     """Base of the edits; numbers are in SI."""
+
+    begins_anew: ClassVar[bool] = False
+    """Whether the question has nothing to do with the one before, so that no design is begun beside its."""
 
     @abstractmethod
     def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
@@ -103,6 +115,41 @@ class RemovePoint(LiveEdit):
 
 
 @dataclass(frozen=True)
+class ScaleTarget(LiveEdit):
+    """Scale the whole target, so that its last point has another angle and torque and its form stays.
+
+    Parameters
+    ----------
+    angle, torque
+        Of the last point, in rad and N·m.
+    """
+
+    angle: float
+    torque: float
+
+    def applied(self, question: LiveQuestion, shown: AngleView | None = None) -> LiveQuestion:
+        """Return the question with all points scaled.
+
+        Raises
+        ------
+        ValueRangeError
+            If the last point has no torque to scale, or a number is out of range.
+        """
+        last = question.points[-1]
+        if not last.torque > 0.0:
+            raise ValueRangeError(
+                "target", "ends without torque, so that nothing can be scaled to one",
+                next_step="give its last point a torque",
+            )  # fmt: skip
+        least = len(question.points) * LEAST_STEP
+        angle = finite_in("last angle", self.angle, lowest=least, highest=LARGEST_ANGLE, unit="rad")
+        torque = finite_in("last torque", self.torque, lowest=1e-6, highest=LARGEST_TORQUE, unit="N*m")
+        across, up = angle / last.angle, torque / last.torque
+        scaled = [TargetPoint(across * each.angle, up * each.torque) for each in question.points[:-1]]
+        return question.with_points((*scaled, TargetPoint(angle, torque)))
+
+
+@dataclass(frozen=True)
 class ChangeLimit(LiveEdit):
     """Set a limit, or change one that follows from the deck.
 
@@ -130,12 +177,14 @@ class ChangeLimit(LiveEdit):
         if self.limit not in LIMIT_KINDS:
             raise unknown_name("limit", self.limit, LIMIT_KINDS)
         kind = LIMIT_KINDS[self.limit]
-        value = finite_in(self.limit, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
+        value = finite_in(kind.title, self.value, lowest=0.0, highest=1e12, unit=kind.read_unit)
         try:
             kind.limit(value)
         except ValueRangeError as error:
             # Its advice is for somebody who writes Python, and may have meant another unit.
-            raise ValueRangeError(error.thing, error.rule, next_step="give a number in that range") from error
+            raise ValueRangeError(
+                f"{kind.title} = {kind.shown(value)}", error.rule, next_step="give a number in that range"
+            ) from error
         return replace(question, limits={**question.limits, self.limit: value})
 
 
@@ -166,7 +215,7 @@ class DropLimit(LiveEdit):
         """
         if self.limit not in question.limits:
             raise ValueRangeError(
-                f"limit '{self.limit:.80}'", "was not set here, so it cannot be dropped",
+                f"limit '{in_words(self.limit[:80])}'", "was not set here, so it cannot be dropped",
                 next_step="a limit that follows from the deck can be changed to another number",
             )  # fmt: skip
         rest = {name: value for name, value in question.limits.items() if name != self.limit}
@@ -306,7 +355,8 @@ class ChooseMaterial(LiveEdit):
         changed = question.machine.assembly
         for piece in pieces:
             changed = with_rubber(changed, material(self.material), piece=piece.name)
-        return kept_names(replace(question, machine=ChosenMachine(changed, self.material)))
+        machine = ChosenMachine(changed, self.material, question.machine.designed)
+        return kept_names(replace(question, machine=machine))
 
 
 @dataclass(frozen=True)
@@ -318,6 +368,8 @@ class ChooseDeck(LiveEdit):
     name
         Of the deck or template.
     """
+
+    begins_anew: ClassVar[bool] = True
 
     name: str
 
@@ -372,12 +424,12 @@ def without_free(question: LiveQuestion, name: str) -> LiveQuestion:
 
 
 def _with_cam_of(machine: ChosenMachine, shown: AngleView) -> ChosenMachine:
-    """Return the machine with the cam of a design."""
+    """Return the machine with the cam of a design, and the contour that it was fitted to."""
     cam = machine.cam
     finished = shown.machine.quantities()
     names = [name for name in finished if name.startswith(f"{cam.name}.")]
     changed = machine.assembly.with_values({name: finished[name] for name in names})
-    return replace(machine, assembly=changed)
+    return replace(machine, assembly=changed, designed=shown.contour)
 
 
 def edit_from(message: Mapping[str, Any]) -> LiveEdit:

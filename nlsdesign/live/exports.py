@@ -6,7 +6,7 @@ import io
 import tempfile
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,9 +53,12 @@ class ExportDesign(LiveTask):
     ----------
     what
         ``"deck"``, ``"svg"``, ``"dxf"``, ``"c"`` or ``"fmu"``.
+    note
+        What the head of the file says; empty for nothing.
     """
 
     what: str
+    note: str = ""
 
     def call(
         self, question: LiveQuestion, shown: AngleView | None
@@ -73,10 +76,12 @@ class ExportDesign(LiveTask):
             raise unknown_name("export", self.what[:80], EXPORTS)
         if shown is None:
             raise ValueRangeError("export", "there is no design yet", next_step="widen a limit first")
-        return EXPORTS[self.what], (shown.machine, shown.contour)
+        return EXPORTS[self.what], (shown.machine, shown.contour, self.note)
 
 
-def exported_deck(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
+def exported_deck(
+    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
+) -> ExportedDesign:
     """Return the machine as a deck.
 
     Parameters
@@ -87,38 +92,47 @@ def exported_deck(stage: Callable[[str], None], machine: Assembly, contour: Cont
         Changed.
     contour
         Of its cam.
+    note
+        What the head of the file says; empty for nothing.
     """
-    return ExportedDesign(f"{machine.name}.toml", "application/toml", deck_text(machine).encode())
+    text = f"# {note}\n{deck_text(machine)}" if note else deck_text(machine)
+    return ExportedDesign(f"{machine.name}.toml", "application/toml", text.encode())
 
 
-def exported_svg(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
+def exported_svg(
+    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
+) -> ExportedDesign:
     """Return the drawing of the cam as SVG.
 
     Parameters
     ----------
-    stage, machine, contour
+    stage, machine, contour, note
         As for :func:`exported_deck`.
     """
-    return _drawing(machine, contour, "svg", "image/svg+xml")
+    return _drawing(machine, contour, "svg", note)
 
 
-def exported_dxf(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
+def exported_dxf(
+    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
+) -> ExportedDesign:
     """Return the drawing of the cam as DXF.
 
     Parameters
     ----------
-    stage, machine, contour
+    stage, machine, contour, note
         As for :func:`exported_deck`.
     """
-    return _drawing(machine, contour, "dxf", "image/vnd.dxf")
+    return _drawing(machine, contour, "dxf", note)
 
 
-def exported_c(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
+def exported_c(
+    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
+) -> ExportedDesign:
     """Return cascade observer and PID controller as C, in an archive.
 
     Parameters
     ----------
-    stage, machine, contour
+    stage, machine, contour, note
         As for :func:`exported_deck`.
 
     Raises
@@ -138,16 +152,19 @@ def exported_c(stage: Callable[[str], None], machine: Assembly, contour: Contour
     stage("writes C")
     with tempfile.TemporaryDirectory() as folder:
         files = export_c(both, folder, name="observer_and_controller")
-        content = _archive([files.header, files.source, files.selftest])
+        head = f"/* {note} */\n" if note else ""
+        content = _archive([files.header, files.source, files.selftest], head)
     return ExportedDesign("observer_and_controller.zip", "application/zip", content)
 
 
-def exported_fmu(stage: Callable[[str], None], machine: Assembly, contour: Contour) -> ExportedDesign:
+def exported_fmu(
+    stage: Callable[[str], None], machine: Assembly, contour: Contour, note: str = ""
+) -> ExportedDesign:
     """Return the plant as an FMU for co-simulation.
 
     Parameters
     ----------
-    stage, machine, contour
+    stage, machine, contour, note
         As for :func:`exported_deck`.
 
     Raises
@@ -159,7 +176,10 @@ def exported_fmu(stage: Callable[[str], None], machine: Assembly, contour: Conto
 
     stage("compiles the plant")
     with tempfile.TemporaryDirectory() as folder:
-        file = export_fmu(flatten(machine), Path(folder) / "plant.fmu")
+        plant = flatten(machine)
+        if note:
+            plant = replace(plant, description=f"{note}. {plant.description}")
+        file = export_fmu(plant, Path(folder) / "plant.fmu")
         return ExportedDesign("plant.fmu", "application/zip", file.read_bytes())
 
 
@@ -173,7 +193,10 @@ EXPORTS: dict[str, Callable[..., ExportedDesign]] = {
 """What a design can be saved as."""
 
 
-def _drawing(machine: Assembly, contour: Contour, ending: str, media_type: str) -> ExportedDesign:
+_MEDIA = {"svg": "image/svg+xml", "dxf": "image/vnd.dxf"}
+
+
+def _drawing(machine: Assembly, contour: Contour, ending: str, note: str) -> ExportedDesign:
     names = series_cam(flatten(machine))
     machined = None
     if names.cable is not None:
@@ -181,16 +204,17 @@ def _drawing(machine: Assembly, contour: Contour, ending: str, media_type: str) 
         half = diameter.with_value(diameter.number / 2.0, f"half of {names.cable.diameter}")
         kind = MachinedOneSidedCam if contour.anchor_distance == float("inf") else MachinedTwoSidedCam
         machined = kind(cable_radius=half)
-    note = "" if machined else "the cable is not declared: this is the curve of its centre line"
+    centre = "" if machined else "the cable is not declared: this is the curve of its centre line"
+    note = "; ".join(filter(None, (note, centre)))
     with tempfile.TemporaryDirectory() as folder:
         files = write_drawings(Path(folder), contour, machined=machined, note=note, formats=(ending,))
         content = next(file for file in files if file.suffix == f".{ending}").read_bytes()
-    return ExportedDesign(f"cam.{ending}", media_type, content)
+    return ExportedDesign(f"cam.{ending}", _MEDIA[ending], content)
 
 
-def _archive(files: list[Path]) -> bytes:
+def _archive(files: list[Path], head: str) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for file in files:
-            archive.writestr(zipfile.ZipInfo(file.name, _OLD), file.read_bytes())
+            archive.writestr(zipfile.ZipInfo(file.name, _OLD), head.encode() + file.read_bytes())
     return buffer.getvalue()

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ..components.assembly.named_parts import Assembly
-from ..design import CamDesign, DesignSettings, Limit, Target, design_cam
+from ..design import CamDesign, Contour, DesignSettings, Limit, Target, design_cam
 from ..errors import ConvergenceError, InfeasibleError
 from ..prefixes import prefixed
 from .answers import DesignView, LiveAnswer
 from .at_angle import AngleView
+from .limit_words import in_words
 from .question import LiveQuestion
 from .quick_design import QuickDesign
 from .views import not_kept, unkept, view_of
@@ -18,6 +19,7 @@ from .views import not_kept, unkept, view_of
 STARTS = 8
 _DEARER = 1e-3
 """Relative difference of costs, and cost, from which two solutions are different optima."""
+_WEIGHED = " (torque error, rubber and smoothness together)"
 _DIFFERS = 1e-3
 """Difference of two rms errors relative to the largest torque from which it is stated."""
 
@@ -47,6 +49,7 @@ def whole_design(
     target: Target,
     free: tuple[str, ...],
     keep: tuple[Limit, ...],
+    contour: Contour | None = None,
 ) -> FullDesign:
     """Return the whole design.
 
@@ -56,6 +59,8 @@ def whole_design(
         Called with what is done now.
     actuator, target, free, keep
         As for :func:`~nlsdesign.design.design_cam`; the limits are all that hold.
+    contour
+        To which the cam was fitted, where it was designed and is held.
     """
     done = 0
 
@@ -67,8 +72,9 @@ def whole_design(
 
     stage(f"solves from {STARTS} starts")
     settings = DesignSettings(
-        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress
-    )
+        starts=STARTS, defaults=(), look_for_size_ranges=False, draws=0, progress=progress,
+        contour=contour,
+    )  # fmt: skip
     try:
         return FullDesign(
             "solved", design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
@@ -95,14 +101,16 @@ def full_answer(
     solved
         Its design; ``None`` where it had none of its own.
     """
+    limits = question.limit_values
     if full.design is None and solved is None:
-        return replace(quick, state=full.state, source="full", message=full.message)
+        return replace(quick, state=full.state, source="full", message=in_words(full.message, limits))
     if full.design is None:
-        sentence = f"the whole design came to no answer: {full.message}; shown is the quick answer, unchecked"
+        reason = in_words(full.message, limits)
+        sentence = f"the whole design came to no answer: {reason}; shown is the quick answer, unchecked"
         return replace(quick, source="full", message=sentence)
     view = view_of(question, quick.revision, full.design)
     missed = full.design.miss
-    sentences = [] if missed is None else [f"misses its target: {missed.words}"]
+    sentences = [*view.beyond, *([] if missed is None else [f"misses its target: {missed.words}"])]
     if missed is not None and missed.advice:
         sentences.append(f"what would help: {', or '.join(missed.advice)}")
     if solved is not None and quick.design is not None:
@@ -114,9 +122,8 @@ def full_answer(
         view = replace(view, margins=(*view.margins, *unkept(question, quick.design.margins)))
     sentences += not_kept(question, view.margins)
     sentences += full.design.remarks
-    return replace(
-        quick, state="solved", source="full", message="; ".join(sentences), design=view, conflicts=()
-    )
+    message = in_words("; ".join(sentences), limits)
+    return replace(quick, state="solved", source="full", message=message, design=view, conflicts=())
 
 
 def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> list[str]:
@@ -125,12 +132,13 @@ def _differences(design: CamDesign, solved: QuickDesign, quick: DesignView) -> l
     was, there = (f"{prefixed(each)} rms" for each in (quick.rms_error, design.predicted_rms))
     if solved.cost > cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
-            f"the quick answer was a worse local optimum: {was} against {there} now, both before the finish"
+            f"the quick answer was a worse local optimum{_WEIGHED}: {was} against {there} now, both "
+            "before the finish"
         )
     elif cost > solved.cost * (1.0 + _DEARER) + _DEARER:
         sentences.append(
-            f"the quick answer was a better local optimum that none of {STARTS} starts reaches: {was} "
-            f"against {there} now; undo and redo bring it back"
+            f"the quick answer was a better local optimum{_WEIGHED} that none of {STARTS} starts reaches: "
+            f"{was} against {there} now; undo and redo bring it back"
         )
     if abs(design.rms - quick.rms_error) > _DIFFERS * largest:
         sentences.append(

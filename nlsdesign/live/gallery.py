@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..components.assembly.deck_template import load_template
 from ..components.assembly.deck_writer import declare
 from ..components.assembly.named_parts import Assembly
 from ..deck import Deck, deck_names, load_deck, read_deck, template_names
-from ..design import contour_of_cam
+from ..design import MaximumStrain, MaximumStress, contour_of_cam
 from ..design.statics.declared_cam import declared_cam
 from ..design.statics.equilibrium import equilibrium_torque
 from ..errors import NlsError, ValueRangeError, unknown_name
 from ..model import flatten
 from ..model.roles import series_cam
 from .question import ChosenMachine, LiveQuestion, TargetPoint
+from .stretch import BREAKS, declared_strain
+
+Floats = NDArray[np.float64]
 
 MOST_DECK_BYTES = 400_000
 """Largest deck that is read."""
 _POINTS = 6
 """Of the target with which an actuator begins."""
+_LEAST_STRAIN = 1e-3
+_ROOM = 2.0
+"""Assumed: how much further than its own cam a design may stretch rubber of which nothing is declared."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +113,8 @@ def question_of_deck(text: str, name: str) -> LiveQuestion:
 def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     """Return the question with which an actuator begins.
 
-    The target is its own torque curve, contour and pretension are free.
+    The target is its own torque curve, contour and pretension are free. Rubber of which no strength is
+    declared begins with a limit of its own: twice the strain of its own cam.
 
     Parameters
     ----------
@@ -131,8 +140,25 @@ def question_of(actuator: Assembly, title: str) -> LiveQuestion:
     points = tuple(
         TargetPoint(float(f"{a:.4g}"), float(f"{t:.4g}")) for a, t in zip(angles, torques, strict=True)
     )
-    question = replace(blank, points=points, free=(blank.contour, cam.pretension))
+    question = replace(
+        blank, points=points, free=(blank.contour, cam.pretension), limits=_stretch(blank.machine, angles)
+    )
     return question.with_points(points)
+
+
+def _stretch(machine: ChosenMachine, angles: Floats) -> dict[str, float]:
+    """Return the limit on the strain of rubber of which no strength is declared: by what its own cam does.
+
+    Without any, a design may stretch it without end, to where its law has no value any more.
+    """
+    if {MaximumStrain.__name__, MaximumStress.__name__} & set(machine.default_limits):
+        return {}
+    strain = declared_strain(machine.model, angles)
+    if strain is None or not _LEAST_STRAIN < strain < BREAKS:
+        return {}
+    allowed = min(_ROOM * strain, BREAKS)
+    size = 10.0 ** (math.floor(math.log10(allowed)) - 1)
+    return {MaximumStrain.__name__: float(f"{size * math.ceil(allowed / size):.3g}")}
 
 
 def _deck(name: str) -> Deck:

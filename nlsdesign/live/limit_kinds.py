@@ -15,6 +15,7 @@ from ..design.optimisation.limits import (
     PositiveStiffness,
 )
 from ..errors import ValueRangeError
+from ..quantity import parse_unit, with_unit
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,23 @@ class LimitKind:
         return self.kind.__name__
 
     @property
+    def title(self) -> str:
+        """What it limits, and to which side."""
+        return f"{'largest' if self.upper else 'least'} {self.words}"
+
+    def shown(self, value: float) -> str:
+        """Return a number in the unit in which people read it.
+
+        Parameters
+        ----------
+        value
+            In SI.
+        """
+        if self.shown_unit == "%":
+            return f"{100.0 * value:.4g} %"
+        return with_unit(f"{value / parse_unit(self.shown_unit).factor:.4g}", self.shown_unit)
+
+    @property
     def read_unit(self) -> str:
         """SI unit, or "%" for a ratio that is read in per cent."""
         return self.shown_unit if self.shown_unit == "%" else self.unit
@@ -69,7 +87,7 @@ class LimitKind:
             If the number is out of the range of this limit, or not finite.
         """
         if not abs(value) < float("inf"):
-            raise ValueRangeError(f"{self.name}: {self.field} = {value:g}", "is no finite number")
+            raise ValueRangeError(f"{self.title} = {value:g}", "is no finite number")
         return self.kind(**{self.field: value})
 
     def value_of(self, limit: Limit) -> float:

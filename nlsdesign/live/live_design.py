@@ -69,7 +69,11 @@ class LiveDesign:
         NlsError
             If the edit cannot be done; nothing has changed then.
         """
-        self._history.ask(edit.applied(self.question, self.shown), drag, last=last)
+        question = edit.applied(self.question, self.shown)
+        if edit.begins_anew:
+            self._history.open(question, {})
+        else:
+            self._history.ask(question, drag, last=last)
         return self.answer
 
     def undo(self) -> LiveAnswer:
@@ -147,3 +151,25 @@ class LiveDesign:
     def saved(self) -> SavedDesign:
         """Return deck, design file and where the search stands, as text."""
         return saved(self.question, self._history.now.values)
+
+
+def open_question(live: LiveDesign, question: LiveQuestion, values: dict[str, float]) -> LiveAnswer:
+    """Go on with another question, one step that can be undone; what was computed before is forgotten.
+
+    Parameters
+    ----------
+    live
+        The design.
+    question
+        For instance of a saved design.
+    values
+        Numbers in SI of a design to begin beside; empty without one.
+
+    Raises
+    ------
+    NlsError
+        If the question cannot be asked; nothing has changed then.
+    """
+    live._history.open(question, values)
+    live.work.forget()
+    return live.answer

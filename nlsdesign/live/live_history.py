@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .full_design import FullDesign
-from .live_moment import LiveMoment, first_moment, next_moment, settled_moment
+from .live_moment import LiveMoment, first_moment, next_moment, opened_moment, settled_moment
 from .question import LiveQuestion
 from .quick_design import QuickSolver
 
@@ -45,6 +45,20 @@ class LiveHistory:
         if drag is None or drag != self._grip:
             self.past = [*self.past, self.now][-MOST_UNDO:]
         self._grip, self.future = None if last else drag, []
+        self._go_to(moment)
+
+    def open(self, question: LiveQuestion, values: dict[str, float]) -> None:
+        """Make another question with its answer the present moment, one step by itself.
+
+        Parameters
+        ----------
+        question
+            That has nothing to do with the one before.
+        values
+            Numbers in SI of a design to begin beside; empty without one.
+        """
+        moment = opened_moment(self._solver, question, self.now, values)
+        self.past, self.future, self._grip = [*self.past, self.now][-MOST_UNDO:], [], None
         self._go_to(moment)
 
     def undo(self) -> None:

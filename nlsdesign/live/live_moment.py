@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from .answers import LiveAnswer
 from .at_angle import AngleView
 from .full_design import FullDesign, angle_view_of, full_answer
+from .limit_words import holding
 from .question import LiveQuestion
 from .quick_design import DesignedNumbers, QuickDesign, QuickSolver
 from .views import controls_of, not_kept
@@ -85,7 +86,7 @@ def first_moment(solver: QuickSolver, question: LiveQuestion, values: dict[str, 
     values
         Numbers in SI of a design to begin beside, by name; empty without one.
     """
-    return _answered(solver, question, None, values)
+    return _answered(solver, question, None, None, values)
 
 
 def next_moment(solver: QuickSolver, question: LiveQuestion, before: LiveMoment) -> LiveMoment:
@@ -100,7 +101,26 @@ def next_moment(solver: QuickSolver, question: LiveQuestion, before: LiveMoment)
     before
         The present moment.
     """
-    return _answered(solver, question, before, before.values)
+    return _answered(solver, question, before, before.solved, before.values)
+
+
+def opened_moment(
+    solver: QuickSolver, question: LiveQuestion, before: LiveMoment, values: dict[str, float]
+) -> LiveMoment:
+    """Return the moment of a question that was opened, answered as if nothing had been before.
+
+    Parameters
+    ----------
+    solver
+        Of the session.
+    question
+        Any.
+    before
+        The present moment, whose revision it follows.
+    values
+        Numbers in SI of a design to begin beside, by name; empty without one.
+    """
+    return _answered(solver, question, before, None, values)
 
 
 def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) -> LiveMoment:
@@ -127,18 +147,18 @@ def settled_moment(solver: QuickSolver, moment: LiveMoment, full: FullDesign) ->
 
 
 def _answered(
-    solver: QuickSolver, question: LiveQuestion, before: LiveMoment | None, values: dict[str, float]
-) -> LiveMoment:
+    solver: QuickSolver, question: LiveQuestion, before: LiveMoment | None, beside: QuickDesign | None,
+    values: dict[str, float],
+) -> LiveMoment:  # fmt: skip
     began = time.perf_counter()
     revision = before.answer.revision + 1 if before else 1
-    solved, outcome = solver.answer(question, before.solved if before else None, values)
+    solved, outcome = solver.answer(question, beside, values)
     shown = before.shown if before else None
     message = outcome.words
     if solved is not None:
         shown = AngleView(solved.view(revision), solved.contour, question.cam, solved.numbers.machine)
-        message = "; ".join(
-            [*([] if shown.view.met else [missed(shown)]), *not_kept(question, shown.view.margins)]
-        )
+        sentences = [*shown.view.beyond, *([] if shown.view.met else [missed(question, shown)])]
+        message = "; ".join([*sentences, *not_kept(question, shown.view.margins)])
     controls = controls_of(question, can_undo=before is not None, can_redo=False)
     answer = LiveAnswer(
         revision=revision, state=outcome.state, message=message, source="quick",
@@ -149,15 +169,18 @@ def _answered(
     return LiveMoment(question, answer, solved or last, solved.numbers if solved else numbers, shown)
 
 
-def missed(shown: AngleView) -> str:
+def missed(question: LiveQuestion, shown: AngleView) -> str:
     """Return how far a design misses its target, and which limits hold it.
 
     Parameters
     ----------
+    question
+        That was asked.
     shown
         The design.
     """
     view = shown.view
-    held = f"held by {', '.join(view.active)}" if view.active else "no limit holds it"
+    holders = holding(question, view.margins)
+    held = f"held by {', '.join(holders)}" if holders else "no limit holds it"
     share = f"{100.0 * view.relative_error:.3g} %"
     return f"misses its target: {share} rms of the largest torque, 1 % allowed; {held}"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import NlsError
 from .answers import AngleAnswer, DesignView, LiveAnswer, Mechanism, to_json
 from .at_angle import AngleView
+from .limit_words import in_words
 
 _DIGITS = 7
 _MOST_POINTS = 140
@@ -79,7 +80,7 @@ def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, An
         mechanism = shown.mechanism(angle)
     except NlsError as error:
         # A contour of no radius has no outline; its torque is an answer all the same.
-        return {"angle": angle, "mechanism": None, "reason": str(error)}
+        return {"angle": angle, "mechanism": None, "reason": in_words(str(error))}
     return {"angle": angle, "mechanism": _lines(mechanism), "reason": ""}
 
 

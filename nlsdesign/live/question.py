@@ -11,13 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..components.assembly.named_parts import Assembly
-from ..design import Limit, NumberRange, TabulatedTorque, safe_limits
+from ..design import Contour, Limit, NumberRange, TabulatedTorque, safe_limits
+from ..design.statics.declared_cam import with_contour
 from ..design.statics.smooth_cables import with_smooth_cables
 from ..errors import ValueRangeError, brief, unknown_name
 from ..model import FlatModel, flatten
 from ..model.roles import series_cam
 from ..model.structure import CamNames
 from .limit_kinds import LIMIT_KINDS, LimitKind
+from .stretch import StrainEnd, strain_ends
 
 FEWEST_POINTS, MOST_POINTS = 2, 50
 """Points of a target with the first one at angle zero, which has no torque."""
@@ -76,10 +78,13 @@ class ChosenMachine:
         As declared.
     material
         Rubber of the library; empty for that of the deck.
+    designed
+        Contour to which its cam was fitted, where it was designed here.
     """
 
     assembly: Assembly
     material: str = ""
+    designed: Contour | None = None
 
     @cached_property
     def model(self) -> FlatModel:
@@ -91,6 +96,11 @@ class ChosenMachine:
         """Names around its cam."""
         return series_cam(self.model)
 
+    @property
+    def cam_part(self) -> object:
+        """The cam, with the contour that it was designed with where there is one."""
+        return with_contour(self.assembly[self.cam.name], self.designed)
+
     @cached_property
     def sizes(self) -> tuple[str, ...]:
         """Names of the single numbers that may be given or freed: pretension, rubber, anchor."""
@@ -99,6 +109,11 @@ class ChosenMachine:
         names = [cam.pretension, *rubber, *([] if cam.anchor_distance is None else [cam.anchor_distance])]
         known = self.assembly.quantities()
         return tuple(name for name in dict.fromkeys(names) if name in known)
+
+    @cached_property
+    def strain_ends(self) -> dict[str, StrainEnd]:
+        """How far each piece of rubber may be stretched, by its path."""
+        return strain_ends(self.model)
 
     @cached_property
     def default_limits(self) -> dict[str, float]:
@@ -184,19 +199,27 @@ class LiveQuestion:
 
         Without limits on the shape of a contour that is held: nothing that is free changes them.
         """
-        limits = [each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind)]
+        limits = [
+            each.kind.limit(each.value) for each in self.limit_values.values() if self.keeps(each.kind.name)
+        ]
         ranges = [NumberRange(name, *self.ranges[name]) for name in self.free if name in self.ranges]
         return (*limits, *ranges)
 
-    def keeps(self, kind: LimitKind) -> bool:
+    @property
+    def held_contour(self) -> Contour | None:
+        """Contour that was designed here and is held; ``None`` where it is free, or that of a deck."""
+        return None if self.contour in self.free else self.machine.designed
+
+    def keeps(self, limit: str) -> bool:
         """Tell whether a limit is kept, and not only shown: whether anything that is free can change it.
 
         Parameters
         ----------
-        kind
-            Of the limit.
+        limit
+            Name of its class; ranges of free numbers are always kept.
         """
-        return self.contour in self.free or not kind.of_shape
+        kind = LIMIT_KINDS.get(limit)
+        return kind is None or self.contour in self.free or not kind.of_shape
 
     @cached_property
     def numbers(self) -> dict[str, NumberState]:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from .limit_kinds import LIMIT_KINDS
 from .question import LiveQuestion
 from .quick_rows import QuickRows
 from .quick_search import MOST_ITERATIONS, SOLVED, QuickOutcome, QuickPoint, interior_point
@@ -62,7 +63,7 @@ class SoftenedProgram:
             return QuickOutcome("not solved", f"the solver stopped with '{status}'")
         gives = point[len(point) - count :]
         if float(gives @ price) <= _KEPT * count:
-            return QuickOutcome("solved", "", QuickPoint(point[:-count]))
+            return QuickOutcome("solved", "", QuickPoint(point[:-count]), room=gives)
         sizes = [row.expression.shape[0] for row in rows.problem.structure]
         sizes += [bound.expression.shape[0] for bound in rows.bounds]
         groups = np.split(np.abs(np.array(answer["lam_g"]).ravel()), np.cumsum(sizes)[:-1])
@@ -94,14 +95,16 @@ class SoftenedProgram:
 
     def _words(self, question: LiveQuestion, involved: Sequence[int], gives: Floats) -> str:
         bounds = self._rows.bounds
-        names = list(dict.fromkeys(bounds[i].limit for i in involved))
-        rule = "contradict each other" if len(names) > 1 else "cannot be kept with what is free"
-        values = self._rows.values_of(question)
+        kinds = [LIMIT_KINDS[name] for name in dict.fromkeys(bounds[i].limit for i in involved)]
+        rule = "contradict each other" if len(kinds) > 1 else "cannot be kept with what is free"
+        limits, values = question.limit_values, self._rows.values_of(question)
         needed = []
         for i in involved:
             bound, give = bounds[i], float(gives[i] * self._rows.scales[i])
             if gives[i] > _KEPT:
                 moved = values[i] + give if bound.upper else values[i] - give
-                needed.append(f"{bound.limit} {bound.shown(values[i])} to about {bound.shown(moved)}")
-        words = f"limits {', '.join(names)} {rule}"
+                kind = LIMIT_KINDS[bound.limit]
+                needed.append(f"{kind.title} from {kind.shown(values[i])} to about {kind.shown(moved)}")
+        names = [f"{kind.title} ({kind.shown(limits[kind.name].value)})" for kind in kinds]
+        words = f"{' and '.join(names)} {rule}"
         return words + (f"; it would be enough to move {' and '.join(needed)}" if needed else "")

@@ -12,7 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..components.assembly.named_parts import Assembly
-from ..design import CamDesign, Contour, LimitState, cam_from_profile, contour_from_curvature, contour_of_cam
+from ..design import (
+    CamDesign,
+    Contour,
+    LimitState,
+    MaximumCableTension,
+    MaximumStrain,
+    MaximumStress,
+    cam_from_profile,
+    contour_from_curvature,
+    contour_of_cam,
+)
 from ..design.optimisation.result import DesignCurves
 from ..model.derived_deck import derived
 from ..quantity import Quantity
@@ -21,6 +31,7 @@ from .question import LiveQuestion
 from .quick_program import QuickProgram
 from .quick_rows import structure_of
 from .quick_search import QuickOutcome, QuickPoint
+from .stretch import smallest, stretched_beyond
 from .views import ALLOWED, curve_columns, margins_of, shown_numbers
 
 Floats = NDArray[np.float64]
@@ -67,8 +78,11 @@ class DesignedNumbers:
         }
         if self.shaped:
             anchor = None if self.question.cam.anchor_distance is None else self.contour.anchor_distance
+            # The search reaches the last angle to a few parts in a thousand million; the cam ends at it.
+            angles = self.contour.angles
+            ends = np.linspace(0.0, self.question.target.last_angle - angles[-1], len(angles))
             fit = cam_from_profile(
-                self.contour.angles, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
+                angles + ends, self.contour.lever_arms, like=machine[cam], count=_CONTROL_VALUES,
                 anchor_distance=anchor,
             )  # fmt: skip
             changes |= {f"{cam}.{field}": given for field, given in fit.changes().items()}
@@ -106,8 +120,7 @@ class QuickDesign:
         anchor = self.question.cam.anchor_distance
         rows = self._numbers
         if self.program.rows.problem.contour is None:
-            cam = self.question.machine.assembly[self.question.cam.name]
-            return contour_of_cam(cam, last_angle=self.question.target.last_angle)
+            return contour_of_cam(self.question.machine.cam_part, last_angle=self.question.target.last_angle)
         return contour_from_curvature(
             rows["direction"],
             rows["radius_of_curvature"],
@@ -151,10 +164,11 @@ class QuickDesign:
         )  # fmt: skip
         states = self._limits(rows)
         rms, largest = float(np.sqrt(max(rows["mean_square"][0], 0.0))), self.question.target_size
+        columns, ends = curve_columns(curves, rows["wanted"]), self.question.machine.strain_ends
         return DesignView(
             revision=revision,
             checked=False,
-            columns=curve_columns(curves, rows["wanted"]),
+            columns=columns,
             rms_error=rms,
             largest_error=float(np.max(np.abs(rows["torque"] - rows["wanted"]))),
             relative_error=rms / largest,
@@ -164,6 +178,8 @@ class QuickDesign:
             numbers=shown_numbers(self.question, self.values),
             contour=self.contour.points,
             rubber_volume=float(rows["volume"][0]),
+            strain_end=smallest(ends),
+            beyond=stretched_beyond(ends, columns),
         )
 
     def _limits(self, rows: dict[str, Floats]) -> list[LimitState]:
@@ -242,11 +258,12 @@ class QuickSolver:
                 self._contradicted = program
                 return None, kept
             if kept.point is not None:
-                outcome = program.from_point(question, kept.point)
+                outcome = program.from_point(question, kept.point, kept.room)
         if outcome.state != "solved":
             outcome = program.from_starts(question)
         if outcome.state != "solved" or outcome.point is None:
-            return None, replace(outcome, state="not solved", words=f"not solved yet: {outcome.words}")
+            words = f"not solved yet: {outcome.words}{_unlimited(question)}"
+            return None, replace(outcome, state="not solved", words=words)
         return QuickDesign(program, question, outcome.point, outcome.cost), outcome
 
     def beside_design(self, question: LiveQuestion, design: CamDesign) -> QuickDesign | None:
@@ -317,6 +334,18 @@ class _Beginning:
     def unknowns(self) -> Floats:
         """All unknowns of the program."""
         return self.program.rows.completed(self.question, self.values)
+
+
+def _unlimited(question: LiveQuestion) -> str:
+    """Return what to do where nothing limits how far a search may stretch the rubber."""
+    limited = {MaximumStrain.__name__, MaximumStress.__name__, MaximumCableTension.__name__}
+    pretension = question.cam.pretension
+    if limited & set(question.limit_values) or pretension not in question.free:
+        return ""
+    return (
+        f". Nothing limits how far the search stretches the rubber, and {pretension} is free: it may run to "
+        f"where the law of the rubber has no value. Add a largest strain, or hold {pretension}"
+    )
 
 
 def values_of_design(program: QuickProgram, design: CamDesign) -> dict[str, float]:

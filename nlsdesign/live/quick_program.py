@@ -109,8 +109,8 @@ class QuickProgram:
         """
         return self._solved(self._warm, question, last)
 
-    def from_point(self, question: LiveQuestion, point: QuickPoint) -> QuickOutcome:
-        """Return the solution from unknowns that keep all limits.
+    def from_point(self, question: LiveQuestion, point: QuickPoint, room: Floats | float) -> QuickOutcome:
+        """Return the solution from unknowns that keep all limits, as far as they do there.
 
         Parameters
         ----------
@@ -118,8 +118,10 @@ class QuickProgram:
             Of this structure.
         point
             Of this program.
+        room
+            What each limit gave there, of the size that counts as kept.
         """
-        return self._solved(self._cold, question, point)
+        return self._solved(self._cold, question, point, room)
 
     def from_values(self, question: LiveQuestion, values: Mapping[str, float]) -> QuickOutcome:
         """Return the solution from scaled values of another program or design.
@@ -134,9 +136,11 @@ class QuickProgram:
         point = QuickPoint(self.rows.completed(question, values))
         return self._solved(self._again, question, point)
 
-    def _solved(self, solver: ca.Function, question: LiveQuestion, begin: QuickPoint) -> QuickOutcome:
+    def _solved(
+        self, solver: ca.Function, question: LiveQuestion, begin: QuickPoint, room: Floats | float = 0.0
+    ) -> QuickOutcome:
         low, high = self.rows.ranges_of(question)
-        rows_low, rows_high = self.rows.limits_of(question)
+        rows_low, rows_high = self.rows.limits_of(question, room)
         given: dict[str, Any] = {"x0": np.clip(begin.unknowns, low, high)}
         if len(begin.of_rows) == len(rows_low):
             given |= {"lam_x0": begin.of_bounds, "lam_g0": begin.of_rows}

@@ -53,7 +53,7 @@ class QuickRows:
         knots = has_corners(elastic_law(machine.model, cam.drive).function)
         self.problem = design_problem(
             machine.model,
-            machine.assembly[cam.name],
+            machine.cam_part,
             target=cast(Target, self.target),
             free=[*contour, *sizes],
             spring=cam.drive,
@@ -65,7 +65,7 @@ class QuickRows:
         watched: list[Bound] = []
         for each in question.limit_values.values():
             bounds = each.kind.limit(each.value).bounds(design)
-            (kept if question.keeps(each.kind) else watched).extend(bounds)
+            (kept if question.keeps(each.kind.name) else watched).extend(bounds)
         self.bounds: tuple[Bound, ...] = tuple(kept)
         self.shown_bounds: tuple[Bound, ...] = (*kept, *watched)
         self.cost = sum((goal.cost(design) for goal in GOALS), start=ca.SX(0))
@@ -104,18 +104,22 @@ class QuickRows:
         ratio = question.target_size * question.target.last_angle / self._size
         return 1.0 / _RESCALED < ratio < _RESCALED
 
-    def limits_of(self, question: LiveQuestion) -> tuple[Floats, Floats]:
+    def limits_of(self, question: LiveQuestion, room: Floats | float = 0.0) -> tuple[Floats, Floats]:
         """Return the bounds of the rows.
 
         Parameters
         ----------
         question
             Of this structure.
+        room
+            By which each kept limit is wider, relative to its scale; the same for all, or one for each.
         """
         low = [np.full(row.expression.shape[0], row.lower) for row in self.problem.structure]
         high = [np.full(row.expression.shape[0], row.upper) for row in self.problem.structure]
-        for bound, value, scale in zip(self.bounds, self.values_of(question), self.scales, strict=False):
-            size, at = bound.expression.shape[0], value / scale
+        rooms = np.broadcast_to(room, len(self.bounds))
+        values = zip(self.bounds, self.values_of(question), self.scales, rooms, strict=False)
+        for bound, value, scale, give in values:
+            size, at = bound.expression.shape[0], value / scale + (give if bound.upper else -give)
             low.append(np.full(size, -np.inf if bound.upper else at))
             high.append(np.full(size, at if bound.upper else np.inf))
         return np.concatenate(low), np.concatenate(high)

@@ -55,6 +55,9 @@ class QuickOutcome:
         Sum of the goals.
     conflicts
         Names of the limits that contradict each other.
+    room
+        What each row of a limit gave where all limits count as kept: rounding leaves a limit that binds at a
+        held contour beyond its number by some parts in a thousand million.
     """
 
     state: str
@@ -62,6 +65,7 @@ class QuickOutcome:
     point: QuickPoint | None = None
     cost: float = math.inf
     conflicts: tuple[str, ...] = ()
+    room: Floats | float = 0.0
 
 
 def interior_point(name: str, program: dict[str, Any], *, iterations: int, **options: Any) -> ca.Function:

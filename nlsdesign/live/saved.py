@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..components.assembly.deck_writer import deck_text, declare
 from ..deck import read_deck
-from ..design import NumberRange, TabulatedTorque, job_of
+from ..design import Contour, NumberRange, TabulatedTorque, contour_of_cam, job_of
 from ..design.curves.numbers import plain
 from ..errors import DeckError, ValueRangeError
 from .gallery import MOST_DECK_BYTES
@@ -20,6 +22,10 @@ from .question import ChosenMachine, LiveQuestion, TargetPoint
 
 _DECK, _JOB, _BEGIN = "deck.toml", "design.toml", "live.toml"
 _MOST_VALUES = 200
+_ROWS = ("directions", "lever_arms", "slopes", "radii_of_curvature")
+_MOST_ROWS = 2000
+_ONSET, _SAME = 0.1, 1e-3
+"""Share of the contour that is not compared, and difference of lever arms relative to the largest."""
 _HEAD = "# Asked on the live page. `nlsdesign design --deck deck.toml --task design.toml` designs it anew."
 
 
@@ -72,6 +78,7 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
         "",
         "[values]",
         *(f"{json.dumps(name)} = {float(value)!r}" for name, value in values.items()),
+        *_contour_lines(question.machine.designed),
     ]
     return SavedDesign(deck_text(question.actuator), "\n".join(lines) + "\n", "\n".join(begin) + "\n")
 
@@ -112,6 +119,7 @@ def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
     )
     limits, ranges = _limits_of(job.keep)
     machine = ChosenMachine(actuator, str(begin.get("material", ""))[:100])
+    machine = replace(machine, designed=_contour_of(begin, machine))
     question = LiveQuestion(str(begin.get("title", actuator.name))[:100], machine, points, limits, (), ranges)
     given = [each for each in begin.get("points", []) if isinstance(each, list) and len(each) == 2]
     if len(given) == 2 and len(points) == 3:
@@ -121,6 +129,41 @@ def reopened(texts: SavedDesign) -> tuple[LiveQuestion, dict[str, float]]:
         if name != question.contour:
             question.number(name)
     return replace(question, free=free).with_points(question.points), _values(begin)
+
+
+def _contour_lines(contour: Contour | None) -> list[str]:
+    """Return the contour that was designed: that of the cam in the deck, fitted to it, ripples."""
+    if contour is None:
+        return []
+    rows = {name: json.dumps([float(v) for v in getattr(contour, name)]) for name in _ROWS}
+    end = f"anchor_distance = {float(contour.anchor_distance)!r}"
+    return ["", "[contour]", end, *(f"{name} = {row}" for name, row in rows.items())]
+
+
+def _contour_of(begin: dict[str, Any], machine: ChosenMachine) -> Contour | None:
+    """Return the contour to which the cam was fitted, where the text holds it and it is that."""
+    table = begin.get("contour")
+    if table is None:
+        return None
+    try:
+        rows = [np.array(table[name], dtype=float) for name in _ROWS]
+        contour = Contour(rows[0], rows[1], rows[2], rows[3], float(table["anchor_distance"]))
+        fitted = contour_of_cam(machine.assembly[machine.cam.name])
+        sound = len({row.shape for row in rows}) == 1 and 4 <= rows[0].size <= _MOST_ROWS
+        sound = sound and bool(np.all(np.isfinite(rows)) and np.all(np.diff(rows[0]) > 0.0))
+        # Near angle zero the cam sets in or changes sides, and is no contour there.
+        behind = fitted.angles > _ONSET * fitted.angles[-1]
+        arms = np.interp(fitted.angles, contour.angles, contour.lever_arms)[behind]
+        apart = float(np.max(np.abs(arms - fitted.lever_arms[behind]))) if sound else math.inf
+        same = apart <= _SAME * float(np.max(fitted.lever_arms))
+    except (KeyError, TypeError, ValueError):
+        same = False
+    if not same:
+        raise ValueRangeError(
+            f"{_BEGIN}: [contour]", "is not the contour to which the cam of deck.toml was fitted",
+            next_step="leave it out, or save the design again",
+        )  # fmt: skip
+    return contour
 
 
 def _limits_of(keep: tuple[Any, ...]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:

@@ -14,7 +14,8 @@ from .background import warm_up
 from .exports import ExportDesign
 from .gallery import gallery_question, question_of_deck
 from .inbox import Inbox
-from .live_design import LiveDesign
+from .limit_words import in_words
+from .live_design import LiveDesign, open_question
 from .outbox import Outbox
 from .page_questions import PageQuestions
 from .question import LiveQuestion
@@ -24,6 +25,9 @@ from .uploads import plain_letters
 
 FIRST = "cam-actuator"
 """With which a page begins that names no actuator."""
+_EARLIER = "Last good design, of an earlier question: the question of now has no design ({})"
+_BEFORE = "last_good_"
+"""Begin of the name of a file of an earlier design."""
 _TICK = 0.1
 """Seconds between two looks at work that runs."""
 _NEWS = 0.5
@@ -47,6 +51,7 @@ class SessionDesign:
         self._outbox = outbox
         self._records = Path(folder) / "records"
         self._file_for: int | None = None
+        self._file_note = ""
         warm_up()
         try:
             self._begin(LiveDesign(_question(deck)))
@@ -92,7 +97,7 @@ class SessionDesign:
         try:
             answer = self._served(asked)
         except NlsError as error:
-            answer = {"refused": str(error)}
+            answer = {"refused": in_words(str(error))}
         except Exception as error:
             answer = {"refused": f"a fault of the program: {type(error).__name__}: {error}"}
         if answer is not None:
@@ -105,27 +110,35 @@ class SessionDesign:
             return {}
         if asked["kind"] == "design":
             return _file("design.zip", archived(self._news.live.saved()))
-        if self._file_for is not None:
-            self._outbox.server({"number": self._file_for, "refused": "another file was asked for meanwhile"})
-        self._file_for = None
-        self._news.live.start(ExportDesign(str(asked["kind"])))
+        self._refuse_file("another file was asked for meanwhile")
+        answer = self._news.live.answer
+        self._file_note = _EARLIER.format(answer.state) if answer.stale else ""
+        self._news.live.start(ExportDesign(str(asked["kind"]), self._file_note))
         self._file_for = asked["number"]
         return None
 
+    def _refuse_file(self, reason: str) -> None:
+        if self._file_for is not None:
+            self._outbox.server({"number": self._file_for, "refused": reason})
+        self._file_for = None
+
     def _opened(self, content: bytes) -> None:
-        """Begin anew from a saved design or a deck; what is open stays where it cannot be read."""
+        """Go on from a saved design or a deck, one step that can be undone.
+
+        What is open stays as it is where the file cannot be read.
+        """
+        values: dict[str, float] = {}
         if content.startswith(b"PK"):
             question, values = reopened(unarchived(content))
-            live = LiveDesign(question, values)
         else:
             try:
                 text = content.decode("utf-8")
             except UnicodeDecodeError:
                 raise NlsError("deck", "is no text in UTF-8", next_step="open a deck (TOML)") from None
-            live = LiveDesign(question_of_deck(text, "deck.toml"))
-        self._news.live.work.close()
-        live.snapshots.update(self._news.live.snapshots)
-        self._begin(live)
+            question = question_of_deck(text, "deck.toml")
+        open_question(self._news.live, question, values)
+        self._refuse_file("another design was opened meanwhile")
+        self._begin(self._news.live)
         self._news.everything(None)
 
     def _send_file(self) -> None:
@@ -134,7 +147,8 @@ class SessionDesign:
         if self._file_for is None or state is None or state.state == "computing":
             return
         made = state.value
-        answer = _file(made.name, made.content) if made is not None else {"refused": state.message}
+        name = "" if made is None else f"{_BEFORE if self._file_note else ''}{made.name}"
+        answer = _file(name, made.content) if made is not None else {"refused": in_words(state.message)}
         self._outbox.server({"number": self._file_for, **answer})
         self._file_for = None
 

@@ -13,6 +13,7 @@ from ..errors import NlsError
 from .answers import LiveAnswer, to_json
 from .gallery import gallery_cards
 from .limit_kinds import LIMIT_KINDS
+from .limit_words import in_words
 from .live_design import LiveDesign
 from .outbox import Outbox
 from .page_data import angle_data, answer_data, design_data, mechanism_data
@@ -144,13 +145,14 @@ class SessionNews:
         number
             Of the question.
         """
-        self._outbox.page({"what": "refused", "number": number, "reason": reason})
+        words = in_words(reason, self.live.question.limit_values)
+        self._outbox.page({"what": "refused", "number": number, "reason": words})
 
     def settle_soon(self) -> None:
         """Begin the whole design once the hand rests; one that runs is of no use any more."""
-        if self.live.answer.source == "quick":
-            self._settle_at = time.monotonic() + _REST
-            self.live.work.cancel(SettleDesign.__name__)
+        quick = self.live.answer.source == "quick"
+        self._settle_at = time.monotonic() + _REST if quick else None
+        self.live.work.cancel(SettleDesign.__name__)
 
     def pause(self) -> None:
         """Do what may wait while a hand moves: what holds at the angle, the whole design, news of work."""

@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from ..design import CamDesign, LimitState
 from ..design.optimisation.result import DesignCurves
 from .answers import DesignView, LimitMargin, LiveColumn, LiveControls, ShownNumber
-from .limit_kinds import LIMIT_KINDS
+from .limit_words import shown_value
 from .question import LiveQuestion
+from .stretch import smallest, stretched_beyond
 
 Floats = NDArray[np.float64]
 
 ALLOWED = 0.01
 """Rms error over the largest torque above which a design misses its target."""
+_BROKEN = 5e-4
+"""Share of a bound by which a value lies beyond it that counts as broken, as the page draws it."""
 _SI = {"mm": "m", "mm^2": "m^2", "MPa": "Pa", "mN*m": "N*m"}
 _MOST_CHECKED = 161
 """Angles at which the torque of a finished assembly is shown."""
@@ -150,6 +153,8 @@ def view_of(question: LiveQuestion, revision: int, design: CamDesign) -> DesignV
         numbers=shown_numbers(question, values),
         contour=design.contour.points,
         rubber_volume=design.rubber_volume,
+        strain_end=smallest(question.machine.strain_ends),
+        beyond=stretched_beyond(question.machine.strain_ends, columns),
     )
 
 
@@ -163,7 +168,7 @@ def unkept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> tuple[Limi
     margins
         To all of its limits.
     """
-    return tuple(each for each in margins if not question.keeps(LIMIT_KINDS[each.limit]))
+    return tuple(each for each in margins if not question.keeps(each.limit))
 
 
 def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str]:
@@ -176,12 +181,14 @@ def not_kept(question: LiveQuestion, margins: Iterable[LimitMargin]) -> list[str
     margins
         Of the design, to all limits.
     """
-    names = [name for name, each in question.limit_values.items() if not question.keeps(each.kind)]
-    words = [f"the contour is held, so {', '.join(names)} is shown and not kept"] if names else []
+    limits = [each for each in question.limit_values.values() if not question.keeps(each.kind.name)]
+    titles = " and ".join(f"{each.kind.title} ({each.kind.shown(each.value)})" for each in limits)
+    rule = "is shown and not kept" if len(limits) == 1 else "are shown and not kept"
+    words = [f"the contour is held, so {titles} {rule}"] if limits else []
+    whose = "the cam as it is fitted" if question.held_contour is None else "the contour that is held"
     for each in unkept(question, margins):
-        if each.margin < -1e-3 * abs(each.bound):
-            value, bound = (1e3 * number for number in (each.value, each.bound))
+        if each.margin < -_BROKEN * abs(each.bound):
+            value, bound = (shown_value(each, number) for number in (each.value, each.bound))
             side = "at most" if each.upper else "at least"
-            broken = f"{each.of} {value:.4g} mm, {side} {bound:.4g} mm is asked for"
-            words.append(f"{each.limit} is BROKEN by the cam as it is fitted: {broken}")
+            words.append(f"BROKEN by {whose}: {each.of} {value}, {side} {bound} is asked for")
     return words

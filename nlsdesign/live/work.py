@@ -60,7 +60,8 @@ class SettleDesign(LiveTask):
         self, question: LiveQuestion, shown: AngleView | None
     ) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         """Return the whole design."""
-        return whole_design, (question.actuator, question.target, question.free, question.keep)
+        asked = (question.actuator, question.target, question.free, question.keep)
+        return whole_design, (*asked, question.held_contour)
 
 
 @dataclass(frozen=True)
@@ -207,6 +208,12 @@ class LiveWork:
         """End all work."""
         for each in self._running.values():
             each.cancel()
+
+    def forget(self) -> None:
+        """End all work and forget what came of it."""
+        self.close()
+        self._running.clear()
+        self._designs.clear()
 
     def loop_at(self, angle: float, shown: AngleView) -> Lazy:
         """Return the torque loop at one angle, where it was asked for and computed for this design.

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import make_interp_spline
 
+from nlsdesign.components import OneSidedCam
 from nlsdesign.design import (
     Contour,
     cam_from_profile,
@@ -148,6 +149,21 @@ def test_declared_cam_and_contour_are_each_other_s_inverse() -> None:
     old, new = (np.array(item.lever_arm.values)[3:] for item in (cam, fit.cam))
     assert new == pytest.approx(old, abs=2e-6)
     assert fit.cam.anchor_distance == cam.anchor_distance
+
+
+def test_a_cam_whose_lever_arm_jumps_has_the_contour_that_it_was_fitted_to() -> None:
+    """Within its onset no angle decides the control values; they go on as the contour does behind it."""
+    cam = OneSidedCam(lever_arm=(8e-3,) * 6, last_angle=np.radians(60.0),
+                      onset=np.radians(2.0))  # fmt: skip
+    wanted = contour_from_curvature(
+        np.linspace(0.0, np.radians(60.0), 41), np.full(41, 6e-3), first_slope=3e-3,
+        first_lever_arm=13e-3, anchor_distance=np.inf,
+    )  # fmt: skip
+    fit = cam_from_profile(wanted.angles, wanted.lever_arms, like=cam, count=64)
+    made = contour_of_cam(fit.cam)
+    assert fit.cam.lever_arm.values[0] == pytest.approx(13e-3, rel=0.02)
+    np.testing.assert_allclose(made.lever_arms[0], 13e-3, rtol=1e-4)
+    np.testing.assert_allclose(made.radii_of_curvature, 6e-3, rtol=0.02)
 
 
 def test_what_is_no_contour_is_refused() -> None:

@@ -15,7 +15,7 @@ from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.deck import load_deck
 from nlsdesign.design import CamDesign, DesignSettings, design_cam
 from nlsdesign.design.optimisation.result import Miss
-from nlsdesign.errors import ValueRangeError
+from nlsdesign.errors import NlsError, ValueRangeError
 from nlsdesign.live import (
     AddPoint,
     ChangeLimit,
@@ -198,7 +198,9 @@ def test_limits_that_contradict_each_other_are_named_and_the_last_design_stays(t
     assert set(answer.conflicts) == {"MaximumCamRadius", "MinimumRadiusOfCurvature"}
     assert "contradict each other" in answer.message
     # A disc as small as the cable bends, 2.25 mm, is the smallest cam there is.
-    assert answer.message.endswith("MinimumRadiusOfCurvature 2.25 mm to about 2 mm")
+    assert answer.message.count("contradict") == 1
+    assert "largest cam radius (2 mm) and least radius of curvature (2.25 mm) contradict" in answer.message
+    assert answer.message.endswith("least radius of curvature from 2.25 mm to about 2 mm")
     back = template.apply(DropLimit("MaximumCamRadius"))
     assert back.state == "solved"
     assert not back.stale
@@ -221,20 +223,72 @@ def test_another_rubber_and_a_held_contour(template: LiveDesign) -> None:
     np.testing.assert_allclose(held.design.contour[-1], contour[-1], atol=1e-4)
     tight = template.apply(ChangeLimit("MinimumRadiusOfCurvature", 6e-3))
     question = template.question
-    full = whole_design(lambda _: None, question.actuator, question.target, question.free, question.keep)
+    full = whole_design(
+        lambda _: None, question.actuator, question.target, question.free, question.keep,
+        question.held_contour,
+    )  # fmt: skip
     checked = full_answer(full, question, tight, None)
     for answer in (tight, checked):
         assert answer.design is not None
         margin = {each.limit: each for each in answer.design.margins}["MinimumRadiusOfCurvature"]
         assert margin.value < margin.bound == 6e-3
-        assert "MinimumRadiusOfCurvature is BROKEN" in answer.message
+        assert "BROKEN by the contour that is held: radius of curvature 2.25 mm" in answer.message
         assert "at least 6 mm is asked for" in answer.message
     here = template.at(0.3)
-    assert here.mechanism is None, "a hollow contour has no outline for this picture"
+    assert here.mechanism is not None
     assert (here.poles.state, here.observability.state) == ("done", "done")
     assert here.poles.revision == tight.revision
     template.undo()
     template.undo()
+
+
+def test_a_contour_that_was_just_designed_has_the_same_numbers_free_and_held(template: LiveDesign) -> None:
+    """The cam that is fitted to it ripples, down to a radius of -1.9 mm; what is cut is the contour."""
+    free = template.answer.design
+    held = template.apply(HoldNumber(template.question.contour))
+    texts, designed = template.saved(), template.question.machine.designed
+    template.undo()
+    again = reopened(texts)[0].held_contour
+    assert designed is not None
+    assert again is not None
+    np.testing.assert_array_equal(again.radii_of_curvature, designed.radii_of_curvature)
+    for begin in (texts.begin.replace("lever_arms = [0.0,", "lever_arms = ["), texts.begin + "slopes = []\n"):
+        with pytest.raises(NlsError, match=r"live\.toml"):
+            reopened(replace(texts, begin=begin))
+    assert held.state == "solved"
+    assert "BROKEN" not in held.message
+    assert free is not None
+    assert held.design is not None
+    for before, after in zip(free.margins, held.design.margins, strict=True):
+        assert (before.limit, before.active) == (after.limit, after.active)
+        assert after.value == pytest.approx(before.value, rel=1e-6)
+    for name in ("lever_arm", "radius", "radius_of_curvature", "torque"):
+        there, here = free.column(name).values, held.design.column(name).values
+        np.testing.assert_allclose(here, there, rtol=1e-6, atol=1e-6 * np.max(np.abs(there)))
+    assert held.design.rms_error == pytest.approx(free.rms_error, rel=1e-3)
+    np.testing.assert_allclose(held.design.contour[-1], free.contour[-1], rtol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("deck", ["one-sided-finger", "austin2015_figure_consistent"])
+def test_a_held_contour_of_other_decks_is_judged_as_it_was_designed(deck: str) -> None:
+    """The one whose lever arm jumps at angle zero, and the one that sits on its stress exactly."""
+    live = LiveDesign(gallery_question(deck))
+    free = live.answer.design
+    held = live.apply(HoldNumber(live.question.contour))
+    assert held.state == "solved", held.message
+    assert free is not None
+    assert held.design is not None
+    assert "BROKEN" not in held.message
+    for before, after in zip(free.margins, held.design.margins, strict=True):
+        assert after.value == pytest.approx(before.value, rel=1e-6)
+    question = live.question
+    full = whole_design(
+        lambda _: None, question.actuator, question.target, question.free, question.keep,
+        question.held_contour,
+    )  # fmt: skip
+    if full.design is not None:
+        assert "BROKEN" not in full_answer(full, question, held, live._history.now.solved).message
 
 
 def test_each_drag_is_one_step_back_also_two_of_the_same_point(template: LiveDesign) -> None:
@@ -315,7 +369,7 @@ def test_a_whole_design_says_where_the_quick_one_differs(
     assert missed.lower().count("misses") == 1
     assert "; what would help: free rubber.area (to 2 mm^2), or another" in missed
     worse = full_answer(full, question, answer, replace(solved, cost=2.0))
-    assert "worse local optimum: 0.0175 mN·m rms against 0.0175 mN·m rms now" in worse.message
+    assert "a worse local optimum (torque error, rubber and smoothness together): 0.0175" in worse.message
     template._history.settle(full)
     assert template.answer.source == "full"
     assert template.at(0.3).revision == template.answer.revision
@@ -387,7 +441,28 @@ def test_another_deck_begins_anew(template: LiveDesign) -> None:
     assert answer.controls.title == "one-sided-finger"
     assert template.shown is not None
     assert len(template.shown.mechanism(0.2).cables) == 1
+    fresh = LiveDesign(gallery_question("one-sided-finger")).answer
+    assert answer.design is not None
+    assert fresh.design is not None
+    assert answer.design.rms_error == fresh.design.rms_error, "it began beside the design of another machine"
     assert template.undo().controls.title == "cam-actuator"
+
+
+@pytest.mark.slow
+def test_rubber_without_limits_is_a_finding_or_says_what_cannot_be_solved() -> None:
+    live = LiveDesign(gallery_question("test_rig"))
+    assert live.answer.design is not None
+    assert live.answer.design.met
+    assert live.answer.design.column("spring.cable.rubber.strain").values.max() < 2.2
+    answer = live.apply(DropLimit("MaximumStrain"))
+    assert answer.design is not None
+    (finding,) = answer.design.beyond
+    assert answer.message.startswith("spring.cable.rubber is stretched to 4001 % between 0° and 56°")
+    assert answer.message.startswith(finding)
+    full = whole_design(
+        lambda _: None, live.question.actuator, live.question.target, live.question.free, live.question.keep
+    )
+    assert full_answer(full, live.question, answer, None).message.startswith(finding)
 
 
 def test_designs_are_kept_by_name_up_to_the_most(template: LiveDesign) -> None:

@@ -15,6 +15,7 @@ from nlsdesign.components import component_classes, law_of, materials
 from nlsdesign.discrepancy.effects import catalogue
 from nlsdesign.errors import ArrangementError, DeckError, NlsError
 from nlsdesign.extensions import extended_by, load_extension
+from nlsdesign.live import DropLimit, LiveDesign, question_of_deck
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -190,3 +191,22 @@ def test_a_package_beside_the_command_reaches_a_session_of_the_live_page(
 
     answer = json.loads(asyncio.run(first_words()))
     assert (answer["what"], answer["answer"]["controls"]["title"]) == ("answer", "jointed")
+
+
+def test_a_live_design_of_a_law_that_ends_begins_within_a_strain(lab: Path) -> None:
+    """Gent's law has no value beyond a stretch, and the deck declares no strength that would keep it away."""
+    text = (lab / DECK).read_text(encoding="utf-8")
+    with extended_by(load_extension("rubber_lab")):
+        question = question_of_deck(text, "jointed.toml")
+    assert dict(question.limits) == {"MaximumStrain": 0.75}
+
+
+@pytest.mark.slow
+def test_a_live_design_of_a_law_that_ends_is_solved_and_says_what_it_needs(lab: Path) -> None:
+    text = (lab / DECK).read_text(encoding="utf-8")
+    with extended_by(load_extension("rubber_lab")):
+        live = LiveDesign(question_of_deck(text, "jointed.toml"))
+        assert live.answer.state == "solved", live.answer.message
+        answer = live.apply(DropLimit("MaximumStrain"))
+    assert answer.state == "not solved"
+    assert answer.message.endswith("Add a largest strain, or hold spring.pretension")

@@ -25,6 +25,7 @@ from nlsdesign.live import (
     MovePoint,
     RemovePoint,
     SavedDesign,
+    ScaleTarget,
     SetNumber,
     edit_from,
     gallery_cards,
@@ -86,9 +87,9 @@ def test_points_move_between_their_neighbours_only(question: LiveQuestion) -> No
         (MovePoint(2, -math.radians(5.0), 0.2), ["angle of point 3 = -5 °", "[0, 359.8] °"]),
         (MovePoint(2, 0.7, 0.2), ["points 3 and 4 of the target", "0.057°"]),
         (MovePoint(0, 0.0, 0.1), ["point 1 of the target", "2 to 6"]),
-        (ChangeLimit("MaximumStrain", -0.05), ["MaximumStrain = -5 %"]),
-        (ChangeLimit("MaximumStress", -2e6), ["MaximumStress = -2 MPa"]),
-        (ChangeLimit("MinimumRadiusOfCurvature", -3e-3), ["MinimumRadiusOfCurvature = -3 mm"]),
+        (ChangeLimit("MaximumStrain", -0.05), ["largest strain of the rubber = -5 %"]),
+        (ChangeLimit("MaximumStress", -2e6), ["largest nominal stress of the rubber = -2 MPa"]),
+        (ChangeLimit("MinimumRadiusOfCurvature", -3e-3), ["least radius of curvature = -3 mm"]),
         (SetNumber("spring.rubber.area", -5e-6), ["spring.rubber.area = -5 mm²", "[0.01, 1e+04] mm²"]),
     ],
 )
@@ -99,6 +100,22 @@ def test_a_refusal_counts_points_and_names_units_as_the_page_does(
         edit.applied(question)
     assert all(each in str(refused.value) for each in words), str(refused.value)
     assert "SI" not in str(refused.value)
+
+
+def test_a_whole_curve_is_scaled_to_its_last_point_and_keeps_its_form(question: LiveQuestion) -> None:
+    """A curve of 60° is not brought to 40° point by point: each stays between its neighbours."""
+    scaled = ScaleTarget(math.radians(40.0), 0.8).applied(question)
+    assert scaled.points[-1] == (math.radians(40.0), 0.8)
+    last = question.points[-1]
+    for before, after in zip(question.points, scaled.points, strict=True):
+        assert after.angle / math.radians(40.0) == pytest.approx(before.angle / last.angle, rel=1e-12)
+        assert after.torque / 0.8 == pytest.approx(before.torque / last.torque, rel=1e-12)
+    for angle, torque in ((0.0, 0.8), (1e-3, 0.8), (7.0, 0.8), (0.7, 0.0), (0.7, math.nan), (0.7, 1e9)):
+        with pytest.raises(ValueRangeError):
+            ScaleTarget(angle, torque).applied(question)
+    flat = question.with_points((*question.points[:-1], last._replace(torque=0.0)))
+    with pytest.raises(ValueRangeError, match="ends without torque"):
+        ScaleTarget(0.7, 0.8).applied(flat)
 
 
 def test_a_refused_limit_gives_no_advice_for_python(question: LiveQuestion) -> None:
@@ -118,6 +135,8 @@ def test_a_limit_that_a_held_contour_breaks_is_named_with_both_numbers(question:
     words = "; ".join(not_kept(held, (force, shape)))
     assert "is shown and not kept" in words
     assert "BROKEN by the cam as it is fitted: radius of curvature -1.9 mm, at least 6 mm" in words
+    assert "least radius of curvature (6 mm) is shown and not kept" in words
+    assert "MinimumRadius" not in words
     kept = replace(shape, value=7e-3, margin=1e-3)
     assert "BROKEN" not in "; ".join(not_kept(held, (kept,)))
     assert not_kept(question, (shape,)) == []
@@ -227,6 +246,7 @@ def test_every_edit_is_read_from_its_message() -> None:
         MovePoint(1, 0.1, 0.2),
         AddPoint(0.1, 0.2),
         RemovePoint(1),
+        ScaleTarget(0.7, 0.8),
         ChangeLimit("MaximumStrain", 1.0),
         DropLimit("MaximumStrain"),
         SetNumber("a.b", 1.0),

@@ -90,6 +90,87 @@ def test_the_page_shows_a_design_asks_nobody_else_and_says_nothing_on_the_consol
     assert all(unit in words for unit in ("°", "N·m", "mm", "N·m/rad"))
 
 
+# --- who does not see the page ---------------------------------------------------------------------
+
+NAMED = {
+    "button",
+    "textbox",
+    "slider",
+    "combobox",
+    "checkbox",
+    "link",
+    "image",
+    "heading",
+    "DisclosureTriangle",
+}
+
+
+def test_every_control_has_a_name_of_its_own_and_every_figure_its_numbers(tab: Tab) -> None:
+    tab.evaluate("for (const each of document.querySelectorAll('details')) each.open = true")
+    poles = "document.querySelector('#linear-row svg.chart:not(.empty)')?.getAttribute('aria-label')"
+    tab.until(f"{poles}.includes('in 1/s')")
+    found = tab.accessible()
+    assert [each for each in found if each[0] in NAMED and not each[1].strip()] == []
+    controls = [each for each in found if each[0] in NAMED - {"image", "heading", "link"}]
+    assert len(controls) > 40
+    assert {each for each in controls if controls.count(each) > 1} == set()
+    assert ("textbox", "spring.rubber.rest_length in mm") in controls
+    figures = [name for role, name in found if role == "image"]
+    figures += [name for role, name in found if role == "group" and name.startswith("Torque")]
+    assert len(figures) >= 10
+    for name in figures:
+        assert sum(each.isdigit() for each in name) >= 4, name
+    (torque,) = [name for name in figures if name.startswith("Torque over angle")]
+    assert "design from 0 N·m at 0° to 0.588 N·m at 60°" in torque
+    tab.evaluate("for (const each of document.querySelectorAll('.more, .menu')) each.open = false")
+
+
+def test_a_drag_is_said_once_and_a_slide_by_its_slider_alone(tab: Tab) -> None:
+    words = "document.getElementById('state-words').textContent"
+    tab.until(f"!{STATE}.includes('quick') && !/^Quick|The check runs/.test({words})")
+    tab.evaluate("new Promise((done) => setTimeout(done, 500))")
+    tab.listen()
+    x, y = tab.evaluate(HANDLE.format(3))
+    tab.mouse("Pressed", x, y)
+    for step in range(1, 13):
+        tab.mouse("Moved", x, y - step)
+        resting(tab)
+    assert tab.evaluate("window.heard") == [], "said while the hand moves"
+    tab.mouse("Released", x, y - 12)
+    tab.until("window.heard.length > 0")
+    slide = "((e) => { e.value = e.max / 3; e.dispatchEvent(new Event('input')); })"
+    tab.evaluate(f"{slide}(document.getElementById('angle'))")
+    resting(tab)
+    tab.evaluate("new Promise((done) => setTimeout(done, 500))")
+    (heard,) = tab.evaluate("window.heard")
+    assert heard.startswith(("checked", "misses its target"))
+    tab.press("z", control=True)
+    resting(tab)
+
+
+CLASSES = """(() => {
+  const titles = [...document.querySelectorAll("[title]")].map((each) => each.title);
+  return [document.body.textContent, ...titles].join(" ").match(/M(ax|in)imum[A-Z]\\w*/g) ?? [];
+})()"""
+
+
+def test_a_contradiction_is_said_once_in_words_and_files_say_whose_they_are(tab: Tab) -> None:
+    note = "document.getElementById('files-earlier')"
+    assert tab.evaluate(f"{note}.hidden")
+    fields = "[...document.querySelectorAll('#limits input[type=text]')]"
+    field = f"{fields}.find((each) => each.ariaLabel.includes('stress'))"
+    typed(tab, field, "0.002")
+    tab.until(f"{STATE} === 'infeasible'")
+    words = tab.evaluate("document.getElementById('state-words').textContent")
+    assert words.count("contradict") + words.count("cannot be kept") == 1
+    assert words.startswith("No design keeps all limits. Largest nominal stress of the rubber (0.002 MPa)")
+    assert not tab.evaluate(f"{note}.hidden")
+    assert "those of the last good design" in tab.evaluate(f"{note}.textContent")
+    assert tab.evaluate(CLASSES) == []
+    tab.press("z", control=True)
+    tab.until(f"{note}.hidden && {ANSWERED}")
+
+
 def test_a_point_follows_the_mouse_the_design_follows_the_point_and_both_go_back(tab: Tab) -> None:
     point = POINT.format(3)
     before, curve = (
@@ -240,14 +321,26 @@ def test_a_number_that_is_none_is_answered_beside_its_field(tab: Tab) -> None:
     assert "no number" in tab.evaluate("document.querySelector('#limits .wrong').textContent")
     tab.evaluate(f"{field}.value = '-5'; {field}.dispatchEvent(new Event('change'))")
     tab.until("!document.getElementById('notice').hidden")
-    assert "MaximumCableTension" in tab.evaluate("document.getElementById('notice').textContent")
+    assert "largest tension of a cable = -5 N" in tab.evaluate(
+        "document.getElementById('notice').textContent"
+    )
     tab.evaluate(f"{field}.value = {before!r}; {field}.dispatchEvent(new Event('change')); {field}.blur()")
     tab.until("document.getElementById('notice').hidden")
+
+
+COUNT = """(() => {
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (words) {
+    sessionStorage.setItem("asked", JSON.parse(words).number);
+    return send.call(this, words);
+  };
+})()"""
 
 
 def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab: Tab) -> None:
     session, point = session_of(tab), POINT.format(4)
     before = tab.evaluate(point)
+    tab.evaluate(COUNT)
     x, y = tab.evaluate(HANDLE.format(4))
     tab.mouse("Pressed", x, y)
     tab.mouse("Moved", x, y - 9)
@@ -258,8 +351,12 @@ def test_a_page_that_is_loaded_again_in_the_middle_comes_back_to_its_design(tab:
     assert settled(tab, point, before)
     assert session_of(tab) == session
     tab.until(ANSWERED)
+    asked = tab.evaluate("Number(sessionStorage.getItem('asked'))")
+    tab.evaluate(COUNT)
     tab.press("z", control=True)
     tab.until(f"{point} === {before!r}")
+    # Answers to the page before its reload must not count as later ones.
+    assert tab.evaluate("Number(sessionStorage.getItem('asked'))") > asked > 0
     assert tab.messages == []
 
 

@@ -96,6 +96,32 @@ def test_the_cloud_shows_its_quantiles_grows_old_with_an_edit_and_can_be_stopped
     assert not tab.evaluate("document.getElementById('tolerance-run').disabled")
 
 
+def test_a_curve_that_leaves_its_picture_does_not_run_along_the_edge(tab: Tab) -> None:
+    path = """import("/page/chart.js").then(({ Chart }) => Chart.prototype.path.call(
+      { px: (v) => v, py: (v) => -v, clipped: (v) => Math.min(10, Math.max(0, -v)), height: 10 },
+      { x: [0, 1, 2, 3, 4], y: [-5, 5, 6, 7, -5] },
+    ))"""
+    assert tab.evaluate(path) == "M0.0 5.0L1.0 0.0M2.0 0.0M3.0 0.0L4.0 5.0"
+
+
+def test_advice_of_a_check_is_done_by_its_button(tab: Tab) -> None:
+    tab.evaluate(
+        """(() => {
+          const gallery = document.getElementById("gallery");
+          gallery.value = "one_sided_cable_drive";
+          gallery.dispatchEvent(new Event("change"));
+        })()"""
+    )
+    free = "document.querySelector('#remarks button')"
+    tab.until(f"{free}?.textContent === 'Free spring.cable.rope.rubber.rest_length'", seconds=120)
+    tab.evaluate(f"{free}.click()")
+    tab.until(f"{CHECKED} && document.getElementById('remarks').children.length === 0", seconds=120)
+    for _ in range(2):
+        tab.press("z", control=True)
+        resting(tab)
+    tab.until("document.getElementById('gallery').value === 'cam-actuator'")
+
+
 LOOP = "document.querySelector('#linear-row > .card:nth-child(3)')"
 
 
@@ -117,7 +143,7 @@ def test_the_loop_at_the_angle_follows_the_slider_and_goes_with_its_design(tab: 
     tab.until(f"{state}.startsWith('Stable at ') && {state} !== {words!r}")
     assert settled(tab, curve, line)
     move(tab, 3, 10)
-    tab.until(f"{state} === 'not computed yet'")
+    tab.until(f"{state}.startsWith('Not computed for this design. The curve is greyed')")
     assert tab.evaluate(f"{LOOP}.classList.contains('stale')")
     assert not tab.evaluate(f"{LOOP}.querySelector('button').hidden")
 
@@ -256,7 +282,7 @@ def test_files_are_saved_and_a_saved_design_is_opened_again(tab: Tab, tmp_path: 
     click(tab, "keep")
     tab.until("document.querySelectorAll('#compare-table thead th').length === 3")
     tab.choose("open", files["design"])
-    tab.until(f"{POINT.format(3)} !== {other!r} && document.getElementById('undo').disabled")
+    tab.until(f"{POINT.format(3)} !== {other!r}")
     assert tab.evaluate(POINT.format(2)) == point
     tab.until(CHECKED, seconds=120)
     assert tab.evaluate("document.querySelector('#numbers dd').textContent") == error
@@ -267,6 +293,11 @@ def test_files_are_saved_and_a_saved_design_is_opened_again(tab: Tab, tmp_path: 
     tab.evaluate("document.querySelector('#compare-table thead button').click()")
     tab.choose("open", files["deck"])
     tab.until("document.getElementById('notice').hidden && document.getElementById('gallery').value === ''")
+    assert tab.evaluate("document.getElementById('gallery').options[0].textContent").startswith("own deck: ")
+    for expected in (None, other):
+        click(tab, "undo")
+        resting(tab)
+        assert expected is None or tab.evaluate(POINT.format(3)) == expected, "to open is a step back"
 
 
 # --- side by side ---------------------------------------------------------------------------------

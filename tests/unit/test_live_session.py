@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
+from nlsdesign.deck import read_deck
 from nlsdesign.design import tolerance_analysis
 from nlsdesign.design.statics.equilibrium import equilibrium_torque
 from nlsdesign.errors import NlsError
@@ -103,7 +104,15 @@ def test_an_earlier_design_is_neither_kept_nor_held_against_the_target_of_now(on
     assert (answer["state"], answer["stale"]) == ("infeasible", True)
     assert "earlier design" in one.ask(what="work", name="ToleranceCloud")["reason"]
     assert "earlier question" in one.ask(what="keep", name="this one")["reason"]
+    name, content = one.file("deck")
+    assert name.startswith("last_good_")
+    head, *rest = content.decode().splitlines()
+    assert head == (
+        "# Last good design, of an earlier question: the question of now has no design (infeasible)"
+    )
+    assert nls.declare(read_deck("\n".join(rest), Path(name))) is not None
     one.ask(what="step", back=True)
+    assert not one.file("deck")[0].startswith("last_good_")
     kept = one.ask(what="keep", name="this one")["kept"]
     assert [each["name"] for each in kept] == ["this one"]
     assert one.ask(what="keep", name="this one", forget=True)["kept"] == []
@@ -262,6 +271,21 @@ def test_a_damaged_file_leaves_the_design_that_is_open(one: Session) -> None:
     assert numbers(now) == numbers(before)
 
 
+def test_opening_is_one_step_that_goes_back_and_forth(one: Session) -> None:
+    before = one.edit("MovePoint", index=2, angle=0.41, torque=0.17)["answer"]
+    text = one.file("deck")[1].decode()
+    name = next(line for line in text.splitlines() if line.startswith("name = "))
+    assert one.open(text.replace(name, 'name = "another"').encode()) == ""
+    there = shown(one)
+    assert (there["state"], there["controls"]["title"]) == ("solved", "another")
+    assert there["revision"] > before["revision"]
+    back = one.ask(what="step", back=True)["answer"]
+    assert back["controls"]["points"] == before["controls"]["points"]
+    assert numbers(back) == numbers(before)
+    again = one.ask(what="step", back=False)["answer"]
+    assert (again["controls"]["title"], numbers(again)) == ("another", numbers(there))
+
+
 @pytest.mark.slow
 def test_a_saved_design_comes_back_with_its_numbers_and_without_work_of_the_one_before(
     quiet: None, tmp_path: Path
@@ -330,6 +354,31 @@ def test_drawings_code_and_unit_of_a_design_are_sound(one: Session, tmp_path: Pa
     subprocess.run(["gcc", *words], check=True, timeout=120)
     subprocess.run([str(tmp_path / "selftest")], check=True, timeout=60)
     assert validate_fmu(str(tmp_path / "plant.fmu")) == []
+
+
+@pytest.mark.slow
+def test_every_file_of_an_earlier_design_says_so_in_its_head(one: Session, tmp_path: Path) -> None:
+    from fmpy import read_model_description
+    from fmpy.validation import validate_fmu
+
+    one.edit("ChangeLimit", limit="MaximumStress", value=2e3)
+    words = "Last good design, of an earlier question: the question of now has no design (infeasible)"
+    for kind in ("svg", "dxf"):
+        name, content = one.file(kind)
+        assert name == f"last_good_cam.{kind}"
+        assert words in content.decode()
+    name, content = one.file("c")
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for each in archive.namelist():
+            assert archive.read(each).decode().startswith(f"/* {words} */\n")
+        archive.extractall(tmp_path)
+    sources = [str(each) for each in sorted(tmp_path.glob("*.c"))]
+    subprocess.run(["gcc", "-std=c99", "-Werror", *sources, "-lm", "-o", str(tmp_path / "t")], check=True)
+    name, content = one.file("fmu")
+    (tmp_path / name).write_bytes(content)
+    assert name == "last_good_plant.fmu"
+    assert read_model_description(str(tmp_path / name)).description.startswith(words)
+    assert validate_fmu(str(tmp_path / name)) == []
 
 
 @pytest.mark.slow

@@ -17,7 +17,9 @@ from ...model import FlatModel, flatten
 from ...model.derived_deck import derived
 from ...quantity import Quantity, significant
 from ..statics.contour import Contour, contour_from_curvature
-from ..statics.declared_cam import CamFit, cam_from_profile, contour_of_cam
+from ..statics.declared_cam import CamFit, DesignedCam, cam_from_profile, contour_of_cam
+from ..statics.equilibrium import cam_function
+from ..statics.smooth_cables import with_smooth_cables
 from ..tolerance.monte_carlo import tolerance_analysis
 from ..tolerance.tolerance_result import ToleranceResult
 from .checks import torque_check
@@ -95,20 +97,42 @@ class SolvedSearch:
     @cached_property
     def contour_fit(self) -> tuple[Contour, CamFit | None]:
         """Contour, and the declared cam made for it; none where the contour was given."""
-        return _contour(self.actuator, self.search.problem, self.best)
+        return _contour(self.search.question.cam, self.search.problem, self.best)
 
     @cached_property
     def changes(self) -> dict[str, Quantity]:
         """Designed numbers by full name."""
         problem = self.search.problem
         target, values = problem.design.target, problem.named(self.best.point)
-        known = self.actuator.quantities()
+        known, pretension = self.actuator.quantities(), problem.law.cam.pretension
         source = f"designed for {type(target).__name__}, {target.largest:.6g} N·m"
+        if pretension in values:
+            most = min(b.value for b in _upper(self.search, pretension))
+            values[pretension] = min(values[pretension] + self.lost_travel, max(values[pretension], most))
         changes = {n: _designed(known[n], value, source) for n, value in values.items() if n in known}
-        fit = self.contour_fit[1]
-        if fit is not None:
-            changes |= {f"{problem.law.cam.name}.{field}": given for field, given in fit.changes().items()}
-        return changes
+        return changes | self.cam_changes
+
+    @cached_property
+    def cam_changes(self) -> dict[str, Quantity]:
+        """Those of the cam by full name; none where its contour was given."""
+        name, fit = self.search.problem.law.cam.name, self.contour_fit[1]
+        return {} if fit is None else {f"{name}.{field}": each for field, each in fit.changes().items()}
+
+    @cached_property
+    def lost_travel(self) -> float:
+        """Cable in m that the declared cam takes up less than the contour that it was fitted to.
+
+        One that begins with a lever arm sets in over an angle, and stays behind by that from there on. A
+        pretension that is free makes up for it.
+        """
+        contour, cam = self.contour_fit[0], self.search.question.cam
+        designed = self.cam_changes or isinstance(cam, DesignedCam)
+        if not designed or contour.lever_arms[0] <= 0.0:
+            return 0.0
+        model = flatten(with_smooth_cables(self.actuator.with_values(self.cam_changes)))
+        law = cam_function(model, self.search.problem.law.cam.drive)
+        taken = float(law(contour.angles[-1], model.start(model.parameters))[1])
+        return max(0.0, float(contour.taken_lengths[-1]) - taken)
 
     @cached_property
     def changed(self) -> Assembly:
@@ -246,10 +270,11 @@ def _made_otherwise(solved: SolvedSearch) -> str:
     """Say that the contour would do and the declared cam does not hold it: over its onset, or its knots."""
     cam, largest = solved.search.problem.law.cam.name, solved.search.problem.design.target.largest
     widths = [name for name in (f"{cam}.onset", f"{cam}.changeover") if name in solved.actuator.quantities()]
-    share = 100.0 * solved.predicted_rms / largest
+    share, pretension = 100.0 * solved.predicted_rms / largest, solved.search.problem.law.cam.pretension
+    freed = "" if pretension in solved.free or solved.lost_travel <= 0.0 else f", free {pretension}"
     return (
         f"the contour itself leaves {share:.2g} %; the rest is the cam, which sets in over an angle: "
-        f"make {' or '.join(widths)} smaller, or round the knots of the rubber's law"
+        f"make {' or '.join(widths)} smaller{freed}, or round the knots of the rubber's law"
     )
 
 
@@ -261,7 +286,7 @@ def _ends(solved: SolvedSearch) -> Iterator[str]:
             point[i] - variable.lower < _AT_END or variable.upper - point[i] < _AT_END
         ):
             value = solved.changes[variable.name]
-            if value.number > 0.0:
+            if problem.named(point)[variable.name] > 0.0:
                 yield f"{variable.name} = {value} is the end of its range, no limit of yours: bound it"
 
 
@@ -341,6 +366,13 @@ def _curves(problem: DesignProblem, point: Floats) -> DesignCurves:
     )
 
 
+def _upper(search: Search, name: str) -> Iterator[Bound]:
+    """Yield what bounds a number from above: its part, and the limits."""
+    variable = search.question.model.variable(name)
+    yield Bound("", name, ca.SX(0), variable.maximum, True, variable.unit, 1.0)
+    yield from (each for each in search.bounds if each.upper and each.of in (name, "pretension"))
+
+
 def _spring_of(model: FlatModel, cam: str) -> str:
     return next(each.name for each in model.springs for inside in each.cams if inside.name == cam)
 
@@ -351,8 +383,8 @@ def _designed(old: Quantity, value: float, source: str) -> Quantity:
     return replace(old.with_value(rounded, source), unit={"m": "mm", "m^2": "mm^2"}.get(old.unit, old.unit))
 
 
-def _contour(actuator: Assembly, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
-    design, cam = problem.design, actuator[problem.law.cam.name]
+def _contour(cam: object, problem: DesignProblem, best: Solution) -> tuple[Contour, CamFit | None]:
+    design = problem.design
     if problem.contour is None:
         return contour_of_cam(cam), None
     anchor = design.cam.anchor_distance

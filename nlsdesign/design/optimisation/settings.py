@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ...errors import ValueRangeError
 from ..curves.numbers import in_si
+from ..statics.contour import Contour
 from ..tolerance.monte_carlo import FEWEST_DRAWS, MOST_DRAWS
 from .limits import Limit
 
@@ -41,6 +42,9 @@ class DesignSettings:
         Number of made springs of the tolerance analysis, at least 20; zero for none.
     progress
         Called after each starting point, or after each combination of a stock.
+    contour
+        To which the cam of the assembly was fitted, where it is known: what limits on the shape of a contour
+        that is held are judged by.
 
     Raises
     ------
@@ -61,6 +65,7 @@ class DesignSettings:
     look_for_remedies: bool = True
     draws: int = 200
     progress: Callable[[], None] = _quiet
+    contour: Contour | None = None
 
     def __post_init__(self) -> None:
         in_si("largest_error", self.largest_error, "1", minimum=1e-6, maximum=1.0)

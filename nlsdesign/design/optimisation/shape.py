@@ -18,7 +18,7 @@ import numpy as np
 
 from ...model import FlatModel
 from ...symbolic import Expression
-from ..statics.declared_cam import contour_of_cam, declared_cam
+from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
 from .program import Rows
 from .variables import DesignVariable
@@ -159,12 +159,17 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
         Path of the part that holds the cam.
     """
     contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
-    _, extensions = cam_function(model, spring)(contour.angles.reshape(1, -1), model.start(model.parameters))
+    if isinstance(cam, DesignedCam):
+        # As the search saw it that designed the contour, without the change of sides of the fitted cam.
+        extensions = contour.taken_lengths
+    else:
+        law = cam_function(model, spring)(contour.angles.reshape(1, -1), model.start(model.parameters))
+        extensions = np.array(law[1]).ravel()
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
     return Shape(
         ca.SX(contour.directions), ca.SX(contour.angles), ca.SX(contour.lever_arms), ca.SX(contour.slopes),
-        ca.SX(contour.radii_of_curvature), ca.SX(extensions).T,
+        ca.SX(contour.radii_of_curvature), ca.SX(extensions),
         ca.SX(contour.slopes / (1.0 - contour.slopes / root)), (), declared_cam(cam).through_centre,
         (), ca.SX(0, 1),
     )  # fmt: skip

@@ -12,6 +12,7 @@ from ...model.derived_deck import derived
 from ...model.roles import series_cam
 from ...processes import parallel_map
 from ..curves.target import Target
+from ..statics.declared_cam import with_contour
 from ..statics.smooth_cables import with_smooth_cables
 from .conflict import feasible_point
 from .defaults import safe_limits, with_defaults
@@ -171,7 +172,7 @@ class Wanted:
         defaults = safe_limits(model, names.drive) if settings.defaults is None else settings.defaults
         question = Question(
             model=model,
-            cam=actuator[names.name],
+            cam=with_contour(actuator[names.name], settings.contour),
             drive=names.drive,
             target=self.target,
             keep=with_defaults(self.keep, defaults),

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
@@ -23,6 +23,11 @@ Made = TypeVar("Made", bound=Cam)
 _SAMPLES_PER_VALUE = 12
 _JUMP = 1e-6
 """First lever arm, relative to the largest, from which it counts as a jump."""
+_SOLVED = 1e-6
+"""Share of its end by which a designed contour may end before the angle that was asked for: what the solver
+leaves."""
+_LOOSE = 1e-6
+"""Weight of the smoothness of control values, which decides only those that no angle decides."""
 _SOURCE = "designed: fitted to a lever arm over the angle"
 
 
@@ -228,9 +233,61 @@ class _Anchored(DeclaredCam[AnchoredCam]):
         return CamFit(cam, error, ("support", "last_direction"))
 
 
-def declared_cam(
-    part: object,
-) -> DeclaredCam[TwoSidedCam] | DeclaredCam[OneSidedCam] | DeclaredCam[AnchoredCam]:
+@dataclass(frozen=True, eq=False)
+class DesignedCam:
+    """A declared cam together with the contour that it was fitted to.
+
+    The contour of the fitted cam ripples: it is the second derivative of a spline that follows the lever arm
+    of the designed contour to micrometres, through the change of sides near angle zero. What is cut is the
+    designed one.
+
+    Parameters
+    ----------
+    part
+        The declared cam.
+    designed
+        The contour.
+    """
+
+    part: Cam
+    designed: Contour
+
+
+@dataclass(frozen=True)
+class _Designed(DeclaredCam[Cam]):
+    designed: Contour
+
+    @property
+    def through_centre(self) -> bool:
+        """As of the fitted cam."""
+        return declared_cam(self.part).through_centre
+
+    @property
+    def anchor_distance(self) -> float:
+        """Distance of the anchor in m."""
+        return self.designed.anchor_distance
+
+    def contour(self, last_angle: float | None, points: int) -> Contour:
+        """Return the designed contour, at directions of equal distance."""
+        angles, at = self.designed.angles, self.designed.directions
+        end = float(angles[-1]) * (1.0 + _SOLVED)
+        last = min(_end(end, last_angle), float(angles[-1]))
+        directions = np.linspace(0.0, float(np.interp(last, angles, at)), points)
+        p, slope, rho = self.designed.lever_arms, self.designed.slopes, self.designed.radii_of_curvature
+        return Contour(
+            directions,
+            CubicHermiteSpline(at, p, slope)(directions),
+            CubicHermiteSpline(at, slope, rho - p)(directions),
+            np.interp(directions, at, rho),
+            self.designed.anchor_distance,
+        )
+
+    def fitted(self, angles: Floats, lever_arms: Floats, count: int, anchor: float | None) -> CamFit:
+        """Return a cam with that lever arm, of the kind of the declared one."""
+        return declared_cam(self.part).fitted(angles, lever_arms, count, anchor)
+
+
+def declared_cam(part: object) -> DeclaredCam[Any]:
     """Return a cam of an assembly as the design sees it.
 
     Parameters
@@ -243,6 +300,8 @@ def declared_cam(
     ArrangementError
         If it has no contour.
     """
+    if isinstance(part, DesignedCam):
+        return _Designed(part.part, part.designed)
     if isinstance(part, TwoSidedCam):
         return _TwoSided(part)
     if isinstance(part, OneSidedCam):
@@ -253,6 +312,19 @@ def declared_cam(
         f"a {type(part).__name__}", "has no contour",
         next_step="give the spring of the deck a cam of type TwoSidedCam, OneSidedCam or AnchoredCam",
     )  # fmt: skip
+
+
+def with_contour(part: object, contour: Contour | None) -> object:
+    """Return a part as what the design sees of it: with its contour where that was designed.
+
+    Parameters
+    ----------
+    part
+        Declared cam.
+    contour
+        That it was fitted to; ``None`` where that is not known.
+    """
+    return DesignedCam(part, contour) if contour is not None and isinstance(part, Cam) else part
 
 
 def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int = 241) -> Contour:
@@ -380,7 +452,11 @@ def _jumps(wanted: Floats) -> bool:
 
 
 def _solved(basis: Floats, wanted: Floats, used: NDArray[np.bool_]) -> Floats:
-    values, *_ = np.linalg.lstsq(basis[used], wanted[used], rcond=None)
+    # Within the onset of a jump no angle is used, and the control values that act there alone are free: they
+    # go on as their neighbours do.
+    smooth = _LOOSE * np.diff(np.eye(basis.shape[1]), n=3, axis=0)[: 0 if used.all() else None]
+    rows = np.vstack([basis[used], smooth])
+    values, *_ = np.linalg.lstsq(rows, np.concatenate([wanted[used], np.zeros(len(smooth))]), rcond=None)
     return np.asarray(values, dtype=float)
 
 

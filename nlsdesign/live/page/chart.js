@@ -38,10 +38,10 @@ export class Chart {
     this.dots = draw("g", { class: "dots" });
     this.svg.append(this.grid, this.lines, ...(log || symlog ? [] : [this.cursorLine]), this.dots, this.over);
     this.svg.classList.add("empty");
-    this.heading = make("h3", {}, title);
+    this.heading = title ? make("h3", {}, title) : null;
     this.key = make("ul", { class: "key" });
     this.value = make("p", { class: "now" });
-    host.append(make("div", { class: "head" }, this.heading, this.value), this.svg, this.key);
+    host.append(make("div", { class: "head" }, ...(title ? [this.heading] : []), this.value), this.svg, this.key);
     this.paths = [];
     this.series = [];
     this.limits = { x: log ? [0.1, 10] : [0, 1], y: [0, 1] };
@@ -111,9 +111,13 @@ export class Chart {
   }
 
   path({ x, y }) {
-    let d = "", pen = "M";
+    let d = "", pen = "M", outside = false;
     for (let k = 0; k < x.length; k += 1) {
       if (y[k] === null || !Number.isFinite(y[k])) { pen = "M"; continue; }
+      // A line along the edge would read as values that are there.
+      const beyond = this.py(y[k]) < 0 || this.py(y[k]) > this.height;
+      if (beyond && outside) pen = "M";
+      outside = beyond;
       d += `${pen}${this.px(x[k]).toFixed(1)} ${this.clipped(y[k]).toFixed(1)}`;
       pen = "L";
     }
@@ -173,7 +177,7 @@ export class Chart {
   cursor(at) {
     this.at = at;
     this.dots.replaceChildren();
-    if (at === null || this.log || this.symlog || this.series.length === 0) return;
+    if (at === null || this.log || this.symlog || this.series.length === 0) { this.describe(""); return; }
     set(this.cursorLine, { x1: this.px(at), x2: this.px(at), visibility: "visible" });
     const now = [];
     for (const s of this.series) {
@@ -185,8 +189,29 @@ export class Chart {
     }
     const words = now.length > 1 ? now.slice(0, 2).map(([name, number]) => `${name} ${number}`) : now.map(([, number]) => number);
     text(this.value, words.join(" · "));
-    this.svg.setAttribute("aria-label", `${this.title} over ${this.x.name}; at ${withUnit(at, this.x.unit, 3)}: ${words.join(", ") || "no number"}`);
+    this.describe(`; at ${withUnit(at, this.x.unit, 3)}: ${words.join(", ") || "no number"}`);
   }
+
+  // In words what the picture shows, once the hand rests: where each curve begins and ends, and what it reaches.
+  describe(here) {
+    clearTimeout(this.describing);
+    this.describing = setTimeout(() => {
+      const curves = this.series.filter((s) => !s.points).map((s) => `${s.name ? `${s.name} ` : ""}${course(s, this.x, this.y)}`);
+      const title = this.y.unit ? this.title : `${this.title} (${this.y.name})`;
+      const words = this.alternative ?? `${title} over ${this.x.name}: ${curves.join("; ")}${here}`;
+      if (this.svg.getAttribute("aria-label") !== words) this.svg.setAttribute("aria-label", words);
+    }, 150);
+  }
+}
+
+function course({ x, y, lower, flat }, across, up) {
+  if (flat) return withUnit(y[0], up.unit, 3);
+  if (lower) return `from ${withUnit(lower.at(-1), up.unit, 3)} to ${withUnit(y.at(-1), up.unit, 3)} at ${withUnit(x.at(-1), across.unit, 3)}`;
+  const known = x.map((at, k) => [at, y[k]]).filter(([, value]) => value !== null && Number.isFinite(value));
+  if (known.length === 0) return "no number";
+  const least = known.reduce((a, b) => (b[1] < a[1] ? b : a)), most = known.reduce((a, b) => (b[1] > a[1] ? b : a));
+  const at = ([place, value]) => `${withUnit(value, up.unit, 3)} at ${withUnit(place, across.unit, 3)}`;
+  return `from ${at(known[0])} to ${at(known.at(-1))}, least ${at(least)}, largest ${at(most)}`;
 }
 
 export function interpolated(x, y, at) {

@@ -2,6 +2,7 @@
 
 import { Chart } from "./chart.js";
 import { byId, make } from "./elements.js";
+import { sitsOn } from "./panels.js";
 import { plain, withUnit } from "./units.js";
 
 const TONES = ["vermillion", "green", "purple", "orange", "ink", "muted", "vermillion", "green"];
@@ -27,7 +28,7 @@ export class Compare {
       const given = design.numbers.find((each) => each.name === name);
       return given ? `${withUnit(given.value, given.unit)}${given.free ? " (free)" : ""}` : "–";
     };
-    const heads = columns.map((each) => make("th", { scope: "col", class: "numeric" }, each.name, " ",
+    const heads = columns.map((each) => make("th", { scope: "col", class: "numeric", "aria-label": each.name }, each.name, " ",
       each === now ? null : make("button", { type: "button", "aria-label": `Forget ${each.name}`, onclick: () => this.ask({ what: "keep", forget: true, name: each.name }) }, "×")));
     byId("compare-table").replaceChildren(
       make("thead", {}, make("tr", {}, make("th", { scope: "col" }, "design"), ...heads)),
@@ -37,7 +38,7 @@ export class Compare {
         row("answer", ({ design }) => (design.checked ? "checked" : "quick")),
         row("torque error, rms", ({ design }) => `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`),
         row("torque error, largest", ({ design }) => withUnit(design.largest_error, "N*m", 3)),
-        row("limits that it sits on", ({ design }) => design.active.join(", ") || "none"),
+        row("limits that it sits on", ({ design }) => sitsOn(design) || "none"),
         row("rubber", ({ design }) => withUnit(design.rubber_volume, "m^3", 3)),
         ...names.map((name) => row(name, ({ design }) => number(design, name)))),
     );

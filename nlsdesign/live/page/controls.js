@@ -44,8 +44,13 @@ class NumberRow {
     const locked = given.free === true;
     this.field.disabled = locked;
     this.slider.disabled = locked;
+    // A name that is broken after its dots is not read as one word.
+    this.field.setAttribute("aria-label", `${given.label} in ${unitOf(given.unit) || "1"}`);
     this.slider.setAttribute("aria-label", `${given.label}, slider`);
-    if (this.box) this.box.checked = locked;
+    if (this.box) {
+      this.box.checked = locked;
+      this.box.setAttribute("aria-label", `free: the design chooses it: ${given.label}`);
+    }
     if (this.drop) {
       this.drop.hidden = given.droppable !== true;
       this.drop.setAttribute("aria-label", `Drop the limit: ${given.label}`);
@@ -155,12 +160,20 @@ export class PointTable {
     host.append(make("div", { class: "point names", "aria-hidden": "true" }, make("span"), make("span", {}, "angle in °"), make("span", {}, "torque in N·m"), make("span")));
     this.add = make("button", { type: "button", onclick: () => this.extend() }, "Add a point");
     this.wrong = make("p", { class: "wrong", id: "points-wrong", role: "alert" });
+    const field = (what) => make("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": what, "aria-describedby": "points-wrong" });
+    this.lastAngle = field("Scale the whole curve: last angle in degrees");
+    this.lastTorque = field("Scale the whole curve: last torque in newton metres");
+    this.scale = make("form", { class: "point scale", onsubmit: (event) => { event.preventDefault(); this.scaled(); } },
+      make("span", { class: "caption", "aria-hidden": "true" }, "scale the whole curve to"), make("span"), this.lastAngle, this.lastTorque, make("button", { type: "submit", "aria-label": "Scale the whole curve", title: "Scale the whole curve to this last angle and torque" }, "Scale"));
   }
 
   show(points) {
     while (this.rows.length < points.length) this.rows.push(this.row(this.rows.length));
     while (this.rows.length > points.length) this.rows.pop().row.remove();
-    this.host.append(this.wrong, this.add);
+    this.host.append(this.wrong, this.add, this.scale);
+    const [angle, torque] = points.at(-1);
+    this.lastAngle.placeholder = editable(angle * 180 / Math.PI);
+    this.lastTorque.placeholder = editable(torque);
     points.forEach(([angle, torque], k) => {
       const { angleField, torqueField, remove } = this.rows[k];
       for (const [field, value] of [[angleField, angle * 180 / Math.PI], [torqueField, torque]]) {
@@ -193,6 +206,16 @@ export class PointTable {
     const what = [Number.isNaN(angle) ? "angle" : "", Number.isNaN(torque) ? "torque" : ""].filter(Boolean).join(" and ");
     text(this.wrong, what ? `Point ${k + 1}: the ${what} is no number. Write it like 12.5, without a unit.` : "");
     if (!what) this.act.move(k, angle, torque, true, performance.now());
+  }
+
+  // A field that is left empty stays as it is.
+  scaled() {
+    const fields = [this.lastAngle, this.lastTorque], given = fields.map((each) => (each.value.trim() === "" ? typed(each.placeholder) : typed(each.value)));
+    fields.forEach((each, k) => each.setAttribute("aria-invalid", String(Number.isNaN(given[k]))));
+    text(this.wrong, given.some(Number.isNaN) ? "Scale: this is no number. Write it like 12.5, without a unit." : "");
+    if (given.some(Number.isNaN)) return;
+    this.act.scale(given[0] * Math.PI / 180, given[1]);
+    for (const each of fields) each.value = "";
   }
 
   extend() {

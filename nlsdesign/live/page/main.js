@@ -5,7 +5,7 @@ import { Connection, download, upload } from "./connection.js";
 import { PointTable, Rows } from "./controls.js";
 import { announce, byId, make, text } from "./elements.js";
 import { MechanismPicture } from "./mechanism.js";
-import { AtAngle, Panels } from "./panels.js";
+import { AtAngle, Panels, sitsOn } from "./panels.js";
 import { Questions } from "./questions.js";
 import { TargetEditor, torqueRange } from "./target_editor.js";
 import { interpolated } from "./chart.js";
@@ -19,9 +19,14 @@ let kinds = [];
 let angle = null;
 let full = null;
 let shownNumber = 0;
+let computing = false;
 
 const connection = { send: (message) => live?.send(message) ?? false };
-const questions = new Questions((message) => connection.send(message), (busy) => { document.body.dataset.busy = String(busy); });
+const questions = new Questions((message) => connection.send(message), (busy) => {
+  document.body.dataset.busy = String(busy);
+  // What was answered may have been no design: then the one that is shown is that of now after all.
+  if (!busy && computing) { computing = false; showState(); fade(); }
+});
 window.addEventListener("pagehide", () => questions.flush());
 const ask = (message, begin) => { const number = questions.ask(message, begin); later(); return number; };
 const edit = (fields, { drag = null, last = true, begin } = {}) => ask({ what: "edit", edit: fields, drag, last, angle }, begin);
@@ -29,6 +34,7 @@ const edit = (fields, { drag = null, last = true, begin } = {}) => ask({ what: "
 const act = {
   move: (k, at, torque, last, begin) => edit({ edit: "MovePoint", index: k, angle: at, torque }, { drag: `point ${k}`, last, begin }),
   add: (at, torque) => edit({ edit: "AddPoint", angle: at, torque: Math.max(0, torque) }),
+  scale: (at, torque) => edit({ edit: "ScaleTarget", angle: at, torque }),
   remove: (k) => (k > 0 ? edit({ edit: "RemovePoint", index: k }) : announce("The first point stays.")),
 };
 
@@ -123,9 +129,9 @@ function afterPaint(then) {
 }
 
 function refuse(message) {
+  // An alert, which a screen reader says by itself.
   text(byId("notice"), message.reason);
   byId("notice").hidden = false;
-  announce(message.reason);
   if (answer) requestAnimationFrame(showAnswer);
 }
 
@@ -163,12 +169,44 @@ function showAnswer() {
     slider(design.columns[0].values);
     if (!frozen) compare.show(null, present());
   }
-  const card = byId("gallery");
-  if (document.activeElement !== card) card.value = cards.some((each) => each.name === controls.title) ? controls.title : "";
+  showTitle();
+  showAdvice();
+  const earlier = answer.stale ? (design ? "Deck, drawings, C and FMU are those of the last good design, of an earlier question: the question of now has no design." : "") : "";
+  text(byId("files-earlier"), earlier);
+  byId("files-earlier").hidden = earlier === "";
   showState();
   fade();
   cursor();
-  editor.say(design ? `rms error ${withUnit(design.rms_error, "N*m", 3)}` : "no design", byId("state-name").textContent);
+  const error = design ? `rms error ${withUnit(design.rms_error, "N*m", 3)}` : "no design";
+  // A check follows a quick answer, so that it is worth a word only to a hand on the keys.
+  if (answer.source === "full" || answer.state !== "solved") announceState();
+  else editor.say(error, byId("state-name").textContent);
+}
+
+// The state is said once when the hand rests, not with each answer of a drag.
+let stated = "";
+function announceState() {
+  const words = `${byId("state-name").textContent}. ${byId("state-words").textContent}`;
+  if (words !== stated) announce(words);
+  stated = words;
+}
+
+// The actuator of the gallery, or the name of a deck of one's own.
+function showTitle() {
+  const card = byId("gallery"), { title } = answer.controls;
+  const known = cards.some((each) => each.name === title);
+  if (cards.length) text(card.options[0], known ? "own deck" : `own deck: ${title}`);
+  if (document.activeElement !== card) card.value = known ? title : "";
+}
+
+// A number that would help when it is freed is freed by a button.
+function showAdvice() {
+  const held = new Set(answer.controls.numbers.filter((each) => !each[4]).map((each) => each[0]));
+  const named = [...answer.message.matchAll(/free ([\w.]+?)(?= |,|;|$)/g)].map((each) => each[1]).filter((name) => held.has(name));
+  const code = named.join(" "), place = byId("remarks");
+  if (place.dataset.code === code) return;
+  place.dataset.code = code;
+  place.replaceChildren(...[...new Set(named)].map((name) => make("button", { type: "button", onclick: () => edit({ edit: "FreeNumber", name }) }, `Free ${name}`)));
 }
 
 // What is compared with kept designs; actuator and rubber are those of the question, not of an earlier one.
@@ -200,7 +238,7 @@ function limitRow([name, words, value, si, shown, upper, byDefault]) {
   const unit = shown === "%" ? "%" : si;
   const margin = answer.design?.margins.find((each) => each.limit === name);
   const from = byDefault ? "from the deck" : "set here";
-  return { name, path: name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
+  return { name, label: `${upper ? "largest" : "least"} ${words}`, value, unit, active: margin?.active ?? false, droppable: !byDefault,
     margin: margin ? `${from}; ${margin.active ? "the design sits on it" : `now ${withUnit(margin.value, unit, 3)}`}` : from };
 }
 
@@ -210,7 +248,9 @@ function startOf(limit) {
   const kind = kinds.find((each) => each.name === limit);
   const rows = (answer.design?.columns ?? []).filter((each) => ends[limit]?.test(each.name)).flatMap((each) => each.values).filter((value) => value !== null && value > 0);
   if (rows.length === 0) return 1;
-  const value = kind.upper ? Math.max(...rows) * 1.01 : Math.min(...rows) * 0.99;
+  // A strain that no rubber bears is no place to begin at.
+  const end = limit === "MaximumStrain" ? answer.design.strain_end ?? Infinity : Infinity;
+  const value = Math.min(end, kind.upper ? Math.max(...rows) * 1.01 : Math.min(...rows) * 0.99);
   return Number(value.toPrecision(3));
 }
 
@@ -227,12 +267,6 @@ function showKinds() {
   select.replaceChildren(...left.map((each) => make("option", { value: each.name }, `${each.upper ? "largest" : "least"} ${each.words}`)));
 }
 
-// Names of limits as people call them.
-function wordsOf(names) {
-  const words = new Map((answer?.controls.limits ?? []).map((each) => [each[0], each[1]]));
-  return names.map((name) => words.get(name) ?? name).join(", ");
-}
-
 function numberRow([name, value, unit, , free, , , source]) {
   const chosen = answer.design?.numbers.find((each) => each.name === name);
   return { name, path: `${name} (${source})`, label: name, value: free && chosen ? chosen.value : value, unit, free,
@@ -243,7 +277,7 @@ function showNumbers(design) {
   const rows = [
     ["torque error, rms", `${withUnit(design.rms_error, "N*m", 3)} (${plain(100 * design.relative_error, 2)} %)`],
     ["torque error, largest", withUnit(design.largest_error, "N*m", 3)],
-    ["limits it sits on", wordsOf(design.active) || "none"],
+    ["limits it sits on", sitsOn(design) || "none"],
     ["rubber", withUnit(design.rubber_volume, "m^3", 3)],
     ...(answer.controls.can_undo ? [["answered in", `${plain(1e3 * answer.seconds, 2)} ms`]] : []),
   ];
@@ -257,17 +291,18 @@ function showState() {
     return;
   }
   if (!answer) return;
-  const { design, conflicts } = answer;
-  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.");
+  const { design } = answer;
+  const message = answer.message.replace(/^misses its target: /i, "").replace(/(\w)$/, "$1.").replace(/^[a-z](?=[a-z]* )/, (first) => first.toUpperCase());
   const missed = design && !design.met ? `Torque error ${plain(100 * design.relative_error, 3)} % of the largest torque; 1 % is allowed. ` : "";
   const checking = full?.state === "computing" && full.revision === answer.revision ? `The check runs: ${full.message}. ` : "";
   const failed = full?.state === "failed" && full.revision === answer.revision ? `The check failed: ${full.message}. ` : "";
   const shown = answer.stale ? (design ? "What is shown greyed is the last good design, of an earlier question. " : "") : "";
-  const sits = design?.active.length ? `It sits on: ${wordsOf(design.active)}. ` : "No limit binds. ";
+  const sits = design && sitsOn(design) ? `It sits on: ${sitsOn(design)}. ` : "No limit binds. ";
   const good = design ? `Torque error ${withUnit(design.rms_error, "N*m", 3)} rms, ${plain(100 * design.relative_error, 2)} % of the largest torque. ${sits}` : "";
   let name, kind, words;
-  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `${conflicts.length ? `These limits contradict each other: ${wordsOf(conflicts)}. ` : ""}${message} `];
-  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message} `];
+  if (answer.state === "infeasible") [name, kind, words] = ["infeasible", "infeasible", `No design keeps all limits. ${message} `];
+  else if (answer.state === "not solved") [name, kind, words] = ["not solved yet", "failed", `${message.replace(/^not solved yet: /i, "").replace(/^[a-z](?=[a-z]* )/, (first) => first.toUpperCase())} `];
+  else if (design?.beyond.length) [name, kind, words] = ["beyond its rubber", "failed", `${design.checked ? "" : "Quick answer: "}${message} `];
   else if ((answer.source === "full" || design?.checked) && design.met && message) [name, kind, words] = ["checked, with remarks", "missed", `${good}${message} `];
   else if (answer.source === "full" || design?.checked) [name, kind, words] = design.met ? ["checked answer", "checked", `${good}${message} `] : ["misses its target", "missed", `${message || missed} `];
   else [name, kind, words] = design?.met ? ["quick answer", "quick", `${good}${message} `] : ["misses its target", "missed", `Quick answer: ${message || missed} `];
@@ -286,7 +321,7 @@ function later() {
   if (waiting) return;
   waiting = setTimeout(() => {
     waiting = 0;
-    if (questions.busy && !document.body.classList.contains("lost")) { showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
+    if (questions.busy && !document.body.classList.contains("lost")) { computing = true; showWords("computing", "computing", "What is shown is the answer to an earlier question."); fade(true); }
   }, 250);
 }
 
@@ -351,7 +386,7 @@ function showGallery(message) {
     make("option", { value: each.name, disabled: each.reason !== "", title: each.line }, each.reason ? `${each.name} (${each.reason})` : each.name)));
   select.replaceChildren(make("option", { value: "", disabled: true }, "own deck"), group("deck", "decks"), group("template", "templates"));
   select.disabled = false;
-  if (answer) select.value = cards.some((each) => each.name === answer.controls.title) ? answer.controls.title : "";
+  if (answer) showTitle();
   material.replaceChildren(make("option", { value: "" }, "that of the deck"), ...materials.map(({ name, reason }) =>
     make("option", { value: name, disabled: reason !== "" }, reason ? `${name} (${reason})` : name)));
   if (answer) material.value = answer.controls.material;
@@ -391,7 +426,10 @@ byId("open").addEventListener("change", async (event) => {
   const wrong = await upload("/api/open", file);
   byId("notice").hidden = true;
   if (wrong) refuse({ reason: wrong });
-  else angle = null;
+  else {
+    angle = null;
+    announce(`${file.name} is opened. Undo brings back the design before.`);
+  }
 });
 
 document.addEventListener("keydown", (event) => {

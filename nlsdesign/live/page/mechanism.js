@@ -1,7 +1,7 @@
 // Cam, cable and rubber in the plane, to scale; the server says where they are at the angle.
 
 import { draw, make, set, text } from "./elements.js";
-import { withUnit } from "./units.js";
+import { plain, withUnit } from "./units.js";
 import { ticks } from "./chart.js";
 
 const KEY = [["body", "cam"], ["cable", "cable"], ["arm", "lever arm"], ["rubber", "rubber"]];
@@ -35,6 +35,7 @@ export class MechanismPicture {
     const [wide, high] = mechanism.extent.map((v) => v * 1e3);
     const radius = Math.max(...mechanism.halves.flat().map(([x, y]) => Math.hypot(x, y))) * 1e3;
     const size = 0.06 * radius;
+    let arm = 0;
     mechanism.halves.forEach((points, k) => put(`half${k}`, "path", { class: "body", d: `${path(mm(points))}Z` }));
     mechanism.rubbers.forEach((points, k) => put(`rubber${k}`, "path", { class: "rubber", d: `${path(mm(points))}Z` }));
     mechanism.cables.forEach((points, k) => put(`cable${k}`, "path", { class: "cable", d: path(mm(points)) }));
@@ -44,6 +45,7 @@ export class MechanismPicture {
       const along = [(guide[0] - contact[0]) / long, (guide[1] - contact[1]) / long];
       const reach = contact[0] * along[0] + contact[1] * along[1];
       const foot = [contact[0] - along[0] * reach, contact[1] - along[1] * reach];
+      arm = Math.hypot(...foot);
       put(`arm${k}`, "path", { class: "arm", d: path([[0, 0], foot]) });
       put(`guide${k}`, "circle", { class: "guide", cx: guide[0], cy: guide[1], r: size });
       put(`contact${k}`, "circle", { class: "contact", cx: contact[0], cy: contact[1], r: size });
@@ -53,7 +55,7 @@ export class MechanismPicture {
     this.frame(wide, high, mechanism.halves.length > 1, Number(radius.toPrecision(2)));
     text(this.now, withUnit(mechanism.angle, "rad", 3));
     text(this.remark, mechanism.remark);
-    set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}` });
+    set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}: cam radius ${plain(radius, 3)} mm, lever arm ${plain(arm, 3)} mm` });
   }
 
   // Why there is no picture for this design; the one that is seen belongs to an earlier one.

@@ -40,6 +40,7 @@ export class Panels {
       for (const bound of new Set(bounds.map((each) => each.bound))) {
         series.push({ name: bounds[0].upper ? "largest allowed" : "least allowed", x: [angles[0], angles[angles.length - 1]], y: [bound, bound], tone: "orange", dash: "dashed", flat: true });
       }
+      if (limit === "MaximumStrain" && design.beyond.length) series.push({ name: "end of what is stated of the rubber", x: [angles[0], angles[angles.length - 1]], y: [design.strain_end, design.strain_end], tone: "vermillion", dash: "dotted", flat: true });
       const shown = capped ? series.map((s) => s.y.map((v) => (v === null ? null : Math.min(v, cap(series))))) : series.map((s) => s.y);
       const wanted = { x: [angles[0], angles[angles.length - 1]], y: range(shown, { zero }) };
       if (frozen && this.drawn) {
@@ -64,8 +65,7 @@ export class Panels {
       const share = broken ? 1 : Number.isFinite(used) ? Math.min(1.15, Math.max(0, used)) / 1.15 : 0;
       row.classList.toggle("active", each.active);
       nameText(row.children[0], each.of);
-      row.children[0].title = each.limit;
-      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${each.upper ? "≤" : "≥"} ${withUnit(each.bound, unit(each), 3)}${broken ? " · BROKEN" : each.active ? " · active" : ""}`);
+      text(row.children[1], `${withUnit(each.value, unit(each), 3)} ${bounded(each)}${broken ? " · BROKEN" : each.active ? " · active" : ""}`);
       row.children[2].firstChild.setAttribute("width", (300 * share).toFixed(1));
       row.children[2].firstChild.setAttribute("class", broken ? "broken" : each.active ? "sits" : "free");
     });
@@ -74,6 +74,15 @@ export class Panels {
   cursor(angle) {
     for (const { chart } of this.charts) chart.cursor(angle);
   }
+}
+
+// Limits that a design sits on, in words with their numbers.
+export function sitsOn(design) {
+  return design.margins.filter((each) => each.active).map((each) => `${each.of} ${bounded(each)}`).join(", ");
+}
+
+function bounded(margin) {
+  return `${margin.upper ? "≤" : "≥"} ${withUnit(margin.bound, unit(margin), 3)}`;
 }
 
 function unit(margin) {
@@ -104,7 +113,7 @@ export class AtAngle {
     this.poles = card("Poles of the plant", "poles");
     this.poles.chart = new Chart(inner(this.poles.place), { title: "", x: { name: "real part, logarithmic,", unit: "1/s" }, y: { name: "imaginary part, log.,", unit: "rad/s" }, height: 200, symlog: true });
     this.loop = card("Torque loop", "loop");
-    this.run = make("button", { type: "button", onclick: () => ask({ what: "work", name: "TorqueLoop" }) }, "Compute");
+    this.run = make("button", { type: "button", "aria-label": "Compute the torque loop", onclick: () => ask({ what: "work", name: "TorqueLoop" }) }, "Compute");
     this.loop.place.firstChild.append(this.run);
     this.loop.magnitude = new Chart(inner(this.loop.place), { title: "Magnitude", x: { name: "frequency", unit: "Hz" }, y: { name: "magnitude", unit: "dB" }, height: 150, log: true });
     this.loop.phase = new Chart(inner(this.loop.place), { title: "Phase", x: { name: "frequency", unit: "Hz" }, y: { name: "phase in °", unit: "" }, height: 130, log: true });
@@ -124,10 +133,10 @@ export class AtAngle {
       this.seen.list.replaceChildren(...rows.flatMap(([name, words]) => [make("dt", {}, name), make("dd", {}, words)]));
     }
     this.state(this.poles, at.poles, (groups) => groups.map((each) => `${each.words}: ${poleWords(each)}`).join("; "));
+    if (at.poles.value) this.poles.chart.alternative = `Poles of the plant: ${at.poles.value.map((each) => `${each.mode}: ${poleWords(each)}`).join("; ")}`;
     if (at.poles.value) this.poles.chart.show(at.poles.value.map((each, k) => ({ name: each.mode, x: each.real, y: each.imaginary, points: true, tone: TONES[k % 4] })));
-    this.state(this.loop, at.loop, (loop) => `${loop.stable ? "Stable" : "UNSTABLE"} ${at.loop.message}: ${loop.words}.`);
+    this.loopState();
     const loop = at.loop.value;
-    this.run.hidden = at.loop.state === "done" || at.loop.state === "computing";
     if (loop) {
       this.loop.magnitude.show([{ name: "", x: loop.frequencies, y: loop.magnitude, tone: "blue" }]);
       this.loop.phase.show([{ name: "", x: loop.frequencies, y: loop.phase, tone: "blue" }]);
@@ -135,12 +144,27 @@ export class AtAngle {
   }
 
   showLoopWork(work) {
-    if (work.state === "computing") text(this.loop.state, `computing: ${work.message}, for ${Math.round(work.seconds)} s`);
-    if (work.state === "computing") this.run.hidden = true;
-    if (work.state === "failed" || work.state === "cancelled") {
-      text(this.loop.state, work.state === "cancelled" ? "stopped" : `${work.state}: ${work.message}`);
-      this.run.hidden = false;
-    }
+    this.work = work;
+    this.loopState();
+  }
+
+  // One text for the loop, from what is known at the angle and from the work that runs.
+  loopState() {
+    const lazy = this.at?.loop, work = this.work, card = this.loop;
+    const done = lazy?.state === "done" && lazy.value !== null;
+    const running = work?.state === "computing", ofNow = lazy?.state === "computing" || work?.old === false;
+    card.shown ||= done;
+    const old = card.shown && !done;
+    card.place.classList.toggle("stale", old);
+    card.place.setAttribute("aria-busy", String(running && !done));
+    this.run.hidden = done || (running && ofNow);
+    const seen = old ? " The curve is greyed: it is of an earlier design." : "";
+    let words = old ? `Not computed for this design.${seen}` : "not computed yet";
+    if (done) words = `${lazy.value.stable ? "Stable" : "UNSTABLE"} ${lazy.message}${bandwidth(lazy.value)}: ${lazy.value.words}.`;
+    else if (running) words = `computing${ofNow ? "" : " of an earlier design"}: ${work.message}, for ${Math.round(work.seconds)} s.${seen}`;
+    else if (work?.state === "failed" && ofNow) words = `failed: ${work.message}.${seen}`;
+    else if (work?.state === "cancelled" && ofNow) words = `Stopped.${seen}`;
+    text(card.state, words);
   }
 
   // Each has a state of its own and says what it holds for.
@@ -152,6 +176,12 @@ export class AtAngle {
     const said = { computing: `computing ${lazy.message}`, failed: `failed: ${lazy.message}`, cancelled: "stopped", "asked for later": "not computed yet" };
     text(card.state, done ? words(lazy.value) : said[lazy.state] ?? lazy.state);
   }
+}
+
+// Where the response falls by 3 dB for the first time.
+function bandwidth({ frequencies, magnitude, stable }) {
+  const k = magnitude.findIndex((value) => value < -3);
+  return stable && k > 0 ? `, −3 dB at ${plain(frequencies[k], 2)} Hz` : "";
 }
 
 // Pairs once, as a person writes them.

@@ -6,7 +6,8 @@ export class Questions {
   constructor(send, told) {
     this.send = send;
     this.told = told;
-    this.number = 0;
+    // Above all numbers of an earlier load of this page, to which answers may still be on their way.
+    this.number = Date.now();
     this.waiting = [];
     this.open = null;
     this.dragged = null;

@@ -17,7 +17,6 @@ export class TargetEditor extends Chart {
     this.handles = [];
     this.dragged = -1;
     set(this.svg, { role: "group" });
-    set(this.svg, { "aria-label": "Torque over angle, with the points of the target" });
     this.svg.addEventListener("dblclick", (event) => {
       if (!event.target.closest(".handle")) this.act.add(...this.place(event));
     });
