@@ -30,8 +30,10 @@ def with_given_values(actuator: Assembly, given: Sequence[str]) -> tuple[Assembl
 
     Raises
     ------
+    UnknownNameError
+        If there is no such number.
     NlsError
-        If there is no such number, or it cannot be read or is refused by its part.
+        If it cannot be read, or is refused by its part.
     """
     declared, taken = actuator.quantities(), dict[str, str]()
     for name, text in read_pairs("--value", given).items():
@@ -77,8 +79,10 @@ def given_start(model: FlatModel, given: Sequence[str]) -> tuple[dict[str, float
 
     Raises
     ------
+    UnknownNameError
+        If there is no such state.
     NlsError
-        If there is no such state, or a number cannot be read.
+        If a number cannot be read.
     """
     units = {v.name: v.unit for v in model.states}
     start: dict[str, float] = {}

@@ -340,6 +340,9 @@ class PretensionRange(ParameterRange):
         Least and largest extension, in m.
     """
 
+    minimum: Quantity | float
+    maximum: Quantity | float
+
     def __post_init__(self) -> None:
         self._checked("m", 0.0, 1.0)
 
@@ -358,6 +361,9 @@ class AreaRange(ParameterRange):
     minimum, maximum
         Least and largest cross-section, in m².
     """
+
+    minimum: Quantity | float
+    maximum: Quantity | float
 
     def __post_init__(self) -> None:
         self._checked("m^2", 1e-8, 0.1)
@@ -378,6 +384,9 @@ class RestLengthRange(ParameterRange):
         Least and largest rest length, in m.
     """
 
+    minimum: Quantity | float
+    maximum: Quantity | float
+
     def __post_init__(self) -> None:
         self._checked("m", 1e-4, 1.0)
 
@@ -396,6 +405,9 @@ class AnchorDistance(ParameterRange):
     minimum, maximum
         Least and largest distance, in m.
     """
+
+    minimum: Quantity | float
+    maximum: Quantity | float
 
     def __post_init__(self) -> None:
         self._checked("m", 1e-3, 1e6)
