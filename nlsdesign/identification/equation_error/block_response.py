@@ -97,8 +97,8 @@ class DrivenBlock:
     span
         Time in s over which rates of measured signals are taken; between neighbours by default.
     straightened
-        Names of inputs whose noise the output rectifies: it is evaluated where they are smoothed over the span,
-        and what is smoothed away counts with the slope of the output there.
+        Names of inputs whose noise the output rectifies: it is evaluated where they are smoothed over the
+        span, and what is smoothed away counts with the slope of the output there.
 
     Raises
     ------

@@ -34,7 +34,7 @@ a twentieth of span and jump of the acceleration, and a usual jump is half the r
 _SLOW_SHARE = 1e-2
 """Of the filter of a row that may reach into a reversal."""
 _RECTIFIED = 0.1
-"""Share of the noise floor up to which a block may rectify the noise of an input: a hundredth of its square."""
+"""Share of the noise floor up to which a block may rectify the noise of an input: 0.01 of its square."""
 _LEAST_ROWS = 20
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
@@ -122,7 +122,8 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
 def _reverses(rate: Array) -> NDArray[np.bool_]:
     """Tell which samples have a reversal beside them: when in between it happened, no sample tells."""
     between = rate[1:] * rate[:-1] < 0.0
-    return np.append(between, False) | np.append(False, between)
+    beside: NDArray[np.bool_] = np.append(between, False) | np.append(False, between)
+    return beside
 
 
 def _heard(block: Block) -> list[str]:
@@ -231,8 +232,8 @@ class Bench:
     filters
         By name of the block, where they were chosen for other records of the same bench.
     clock
-        Time in s between samples at which the blocks show what they do, where that is known from other records
-        of the same bench, together with the noise on it.
+        Time in s between samples at which the blocks show what they do, where that is known from other
+        records of the same bench, together with the noise on it.
 
     Raises
     ------
@@ -290,7 +291,7 @@ class Bench:
                 )
 
     def _straightened(self, block: Block) -> Filters:
-        """Return the filters of a block with the inputs whose noise it rectifies beyond a share of its floor."""
+        """Return the filters of a block with the inputs whose noise it rectifies."""
         filters, names = self.filters[block.name], set[str]()
         for record in self._seen:
             floor = self.floors.get((block.name, record.name))

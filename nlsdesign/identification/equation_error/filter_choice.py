@@ -275,8 +275,8 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
     """Return by how much the noise of each input shifts the output of a block, root mean square in its unit.
 
     A filter behind the output averages noise only where the output is straight in it. Where it is bent, as
-    that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes upwards
-    and downwards stays. Rates are smooth already, and so is a motion.
+    that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes
+    upwards and downwards stays. Rates are smooth already, and so is a motion.
 
     Parameters
     ----------
