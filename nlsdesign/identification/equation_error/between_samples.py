@@ -7,8 +7,8 @@ splines, whose error at the frequencies that the filter passes is of sixth order
 between, and the same filter averages it. Whether that is needed is told by doubling the rate: twice as many
 samples must change the filtered output by little of its noise.
 
-Interpolated samples bring no information: noise and counts keep their power density, so they count with the
-square root of the rate. Records that show everything already stay as they are.
+Interpolated samples bring no information: which rows count, and what noise they have, is told by the samples
+as measured. Records that show everything already stay as they are.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from ..records.measurement import Record, RecordSet
 from ..records.quality import Finding
 from ..statistics.filters import Smoothing, kernel
 from .block_response import DrivenBlock
-from .noise import Noise
 
 Array = NDArray[np.float64]
 
@@ -68,12 +67,40 @@ def refined(record: Record, times: int) -> Record:
         record,
         trace=Trace(
             trace.time[0] + finer * record.step,
-            {name: make_interp_spline(clock, values, k=5)(finer) for name, values in trace.signals.items()},
+            {name: _between(clock, trace[name], record.masked_in([name]), finer) for name in trace.signals},
             trace.units,
             trace.name,
         ),
         resolution=resolution,
         masked={name: mask[below] | mask[above] for name, mask in record.masked.items()},
+    )
+
+
+def _between(clock: Array, values: Array, masked: NDArray[np.bool_], finer: Array) -> Array:
+    """Return a signal between its samples; those that are masked have no part in it."""
+    kept = ~masked
+    result: Array = make_interp_spline(clock[kept], values[kept], k=5)(finer)
+    return result
+
+
+def refined_filter(rows: Smoothing, width: float, times: int) -> Smoothing:
+    """Return a filter of the same rows and the same width in time on a finer clock.
+
+    Parameters
+    ----------
+    rows
+        Of the samples as measured.
+    width
+        Standard deviation of its Gaussian in these samples.
+    times
+        How many samples stand in the place of one.
+    """
+    return replace(
+        rows,
+        count=(rows.count - 1) * times + 1,
+        weights=kernel(width * times),
+        stride=rows.stride * times,
+        places=rows.places * times,
     )
 
 
@@ -87,7 +114,7 @@ def on_clock(records: RecordSet, step: float) -> RecordSet:
     step
         In s.
     """
-    times = [_times(record, step) for record in records.records]
+    times = [times_on(record, step) for record in records.records]
     changed = [(r, k) for r, k in zip(records.records, times, strict=True) if k > 1]
     if not changed:
         return records
@@ -100,26 +127,17 @@ def on_clock(records: RecordSet, step: float) -> RecordSet:
     return replace(records, records=finer, remarks=(*records.remarks, remark))
 
 
-def _times(record: Record, step: float) -> int:
-    return max(1, math.ceil(record.step / step - _SHARE))
-
-
-def noise_on_clock(noise: Noise, records: Sequence[Record], step: float) -> Noise:
-    """Return the noise of interpolated samples: white noise of the same power density.
+def times_on(record: Record, step: float) -> int:
+    """Return how many samples stand in the place of one on a clock.
 
     Parameters
     ----------
-    noise
-        Of the samples as measured.
-    records
+    record
         As measured.
     step
         Of the clock in s.
     """
-    share = float(np.median([math.sqrt(_times(r, step)) for r in records]))
-    if share == 1.0:
-        return noise
-    return replace(noise, level={k: share * v for k, v in noise.level.items()}, interpolated=share)
+    return max(1, math.ceil(record.step / step - _SHARE))
 
 
 class Reading(NamedTuple):
@@ -180,11 +198,4 @@ def _filtered(reading: Reading, times: int) -> Array:
     """Return the filtered output of a block, evaluated at several samples in the place of one."""
     record = refined(reading.record, times)
     output = reading.driven.respond(reading.driven.samples(record, {}), {}).output
-    rows = replace(
-        reading.rows,
-        count=len(output),
-        weights=kernel(reading.width / record.step),
-        stride=reading.rows.stride * times,
-        places=reading.rows.places * times,
-    )
-    return rows @ output
+    return refined_filter(reading.rows, reading.width / reading.record.step, times) @ output

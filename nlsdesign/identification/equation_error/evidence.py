@@ -18,7 +18,7 @@ from ..records.measurement import Record, RecordSet
 from ..statistics.coloured import NoisePart, independent_number
 from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
 from ..statistics.metrics import rmse
-from .between_samples import Reading, noise_on_clock, on_clock, resolving_step
+from .between_samples import Reading, on_clock, refined_filter, resolving_step, times_on
 from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
 from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces, rectified
@@ -100,8 +100,10 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
         # A rate that is measured itself is not taken over a span.
         blurred = _SMEARED * span * rmse(np.gradient(rate, step)) if drive.order else 0.0
         # The filter smears what happens at a reversal; so its whole reach must be in motion.
-        slow = (np.abs(rate) < math.hypot(noisy, blurred)) | _reverses(rate)
-        matrix = matrix[np.flatnonzero(matrix @ slow.astype(float) < _SLOW_SHARE)]
+        slow = np.abs(rate) < math.hypot(noisy, blurred)
+        moving = _in_motion(matrix, slow | _reverses(rate))
+        # A motion that is never between two reversals for long, as one that shakes, is read across them.
+        matrix = moving if len(moving.places) >= _LEAST_ROWS else _in_motion(matrix, slow)
     variance, raw = _variances(block, record, noise, filters, inputs)
     spacing = stride * step
     memory = _memory(block, step, noise, filters, inputs)
@@ -117,6 +119,20 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
         independent_number(whole, len(matrix.places), spacing) if whole else math.inf,
         min(squares, default=math.inf),
     )
+
+
+def _on_clock(floor: Floor, width: float, times: int) -> Floor:
+    """Return the same rows with the same noise floor, made of several samples in the place of one."""
+    if times == 1:
+        return floor
+    count = len(floor.raw_sigma)
+    raw = np.interp(np.arange((count - 1) * times + 1) / times, np.arange(count), floor.raw_sigma)
+    return replace(floor, filter=refined_filter(floor.filter, width, times), raw_sigma=raw)
+
+
+def _in_motion(matrix: Smoothing, still: NDArray[np.bool_]) -> Smoothing:
+    """Return the rows that hardly reach into what is still."""
+    return matrix[np.flatnonzero(matrix @ still.astype(float) < _SLOW_SHARE)]
 
 
 def _reverses(rate: Array) -> NDArray[np.bool_]:
@@ -170,7 +186,7 @@ def _variances(
         constant = noise.rounded[drive.signal] and drive.order == 0
         weights = filter_weights(filters.width, drive.order, step, filters.span)
         deviation = noise.deviation(drive.signal)
-        behind = deviation / noise.interpolated if constant else noise.behind(drive.signal, weights, step)
+        behind = deviation if constant else noise.behind(drive.signal, weights, step)
         variance += (gains[i] * behind) ** 2
         raw += (gains[i] * deviation) ** 2 if drive.order == 0 else 0.0
     every_row = np.minimum(np.arange(inputs.shape[1]) // stride, gains.shape[1] - 1)
@@ -233,7 +249,7 @@ class Bench:
         By name of the block, where they were chosen for other records of the same bench.
     clock
         Time in s between samples at which the blocks show what they do, where that is known from other
-        records of the same bench, together with the noise on it.
+        records of the same bench.
 
     Raises
     ------
@@ -265,15 +281,17 @@ class Bench:
             self._check_alive(block)
             if block.name not in self.filters:
                 self.filters[block.name] = chosen_filters(block, self._seen, self.noise, pace)
+        self._read()
+        for block in new:
+            self.filters[block.name] = self._straightened(block)
         if clock is None:
-            self._read()
-            for block in new:
-                self.filters[block.name] = self._straightened(block)
             clock = resolving_step(self._readings())
-            self.noise = noise_on_clock(self.noise, self._seen, clock)
         self.clock = clock
+        for (block_name, record_name), floor in self.floors.items():
+            record = next(r for r in self.records.records if r.name == record_name)
+            width = self.filters[block_name].width / record.step
+            self.floors[block_name, record_name] = _on_clock(floor, width, times_on(record, clock))
         self.records = on_clock(self.records, clock)
-        self._read()  # the rows that count are those of the new clock
 
     def _read(self) -> None:
         """Read each record by each block: rows and noise floor."""

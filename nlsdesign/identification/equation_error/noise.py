@@ -44,9 +44,6 @@ class Noise:
         Where that is known from.
     seen
         Lengths in s of the stretches in which the parts were seen.
-    interpolated
-        Factor by which interpolation between the samples has raised the level, so that its power density is
-        that of the samples. A constant error is not raised.
     """
 
     level: Mapping[str, float]
@@ -54,7 +51,6 @@ class Noise:
     parts: Mapping[str, tuple[NoisePart, ...]] = field(default_factory=dict)
     evidence: Mapping[str, Evidence] = field(default_factory=dict)
     seen: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    interpolated: float = 1.0
 
     def deviation(self, signal: str) -> float:
         """Return the standard deviation of the whole noise of a signal.
