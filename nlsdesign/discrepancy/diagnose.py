@@ -241,7 +241,7 @@ def _verdict(
         outcome.skipped,
         complete=is_complete(after),
         criteria=case.criteria,
-        remarks=tuple(str(each) for each in records.remarks),
+        remarks=tuple(dict.fromkeys(str(r) for r in (*records.remarks, *every.bench.records.remarks))),
         unnamed=tuple(_unnamed(better, each) for each in better.added[len(steps) :]),
         experiment=experiment,
     )

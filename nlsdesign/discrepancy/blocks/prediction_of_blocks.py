@@ -56,9 +56,10 @@ def band_errors(actuator: Assembly, records: RecordSet, name: str) -> dict[str, 
     MeasurementError
         If nothing measured drives the model.
     """
-    chosen = _record_of(records, name)
+    _record_of(records, name)
     blocks = blocks_of(flatten(actuator), records.signals)
     bench = Bench(records, blocks)
+    chosen = _record_of(bench.records, name)
     errors = {}
     for block in blocks:
         for each in bench.evidence(bench.driven(block, []), [chosen], {}):

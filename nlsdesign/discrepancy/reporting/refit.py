@@ -16,6 +16,7 @@ from ...components.assembly.named_parts import Assembly
 from ...errors import MeasurementError
 from ...identification.equation_error.evidence import Bench
 from ...identification.estimation.least_squares import Fit
+from ...identification.records.canonical_order import in_canonical_order
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ...model import flatten
@@ -168,8 +169,8 @@ def refit(
     """
     progress("refitting the declared numbers")
     bench = Bench(records, blocks_of(flatten(actuator), records.signals))
-    records = bench.records
-    comparison = Comparison(bench, typical_sizes(actuator, records))
+    records = in_canonical_order(records)
+    comparison = Comparison(bench, typical_sizes(actuator, bench.records))
     fitted = comparison.base(actuator)
     if not any(fit.parameters for fit in fitted.fits.values()):
         raise MeasurementError(

@@ -165,7 +165,7 @@ def out_of_reach(actuator: Assembly, records: RecordSet) -> list[Finding]:
                 Finding(
                     f"{record.source}: column '{column.name}', {outside[0]:.4g} s to {outside[-1]:.4g} s",
                     f"goes to {size.max():.3g} rad, the declared cam ends at {end:.3g} rad ({name}): "
-                    "is the unit right, or are these records of another rig?",
+                    "the unit is another one, or these are records of another rig",
                 )
             )
     return findings

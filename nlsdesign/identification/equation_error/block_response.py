@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import ConvergenceError, MeasurementError, unknown_name
 from ...symbolic import Expression, depends
 from ..records.measurement import Record
-from ..statistics.filters import derivative, without_rounding
+from ..statistics.filters import derivative, smoothed, without_rounding
 from .batch import ChainFunction, ColumnFunction, PointFunction
 from .block import Block, Drive
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
@@ -96,6 +96,9 @@ class DrivenBlock:
         Free parameters by name at which that is decided; those of the model by default.
     span
         Time in s over which rates of measured signals are taken; between neighbours by default.
+    straightened
+        Names of inputs whose noise the output rectifies: it is evaluated where they are smoothed over the
+        span, and what is smoothed away counts with the slope of the output there.
 
     Raises
     ------
@@ -111,12 +114,14 @@ class DrivenBlock:
         records: Sequence[Record],
         values: Mapping[str, float] | None = None,
         span: float = 0.0,
+        straightened: Collection[str] = (),
     ) -> None:
         self.block = block
         self._span = span
         self.free = free_in(block, free)
         self._fixed = block.model.values
-        e = _equations(block, self.free)
+        self._straightened = _places(block, straightened)
+        e = _equations(block, self.free, self._straightened)
         self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
         self._late = [_free_delay(d, self.free) for d in _late_drives(block, self.free)]
         self._output = ColumnFunction(_output_function(e))
@@ -155,7 +160,11 @@ class DrivenBlock:
         return Samples(at, begin, end, record.step)
 
     def _inputs(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> tuple[Array, Array]:
-        """Return the inputs of the model, and the slopes by which late ones change with their delay."""
+        """Return the inputs of the model, and the slopes by which late ones change with their delay.
+
+        Where the model rectifies the noise of an input, that is smoothed, and what was taken away stands in
+        the place of the slope.
+        """
         model, n = self.block.model, len(record.trace)
         inputs = np.repeat(model.start(model.inputs)[:, None], n, axis=1)
         rates = np.zeros_like(inputs)
@@ -169,6 +178,9 @@ class DrivenBlock:
             if smooth and drive.order == 0 and _is_motion(self.block, drive.signal):
                 signal = without_rounding(signal, record.step, self._span)
             inputs[i] = derivative(signal, record.step, order=drive.order, span=self._span)
+            if i in self._straightened:
+                even = smoothed(signal, record.step, order=drive.order, span=self._span)
+                inputs[i], rates[i] = even, inputs[i] - even
             if drive.shifted_by:
                 inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
             if set(drive.stretched_by) & set(self._late):
@@ -301,6 +313,15 @@ def _sloped(block: Block) -> list[int]:
     return sloped if moved else []
 
 
+def _places(block: Block, inputs: Collection[str]) -> list[int]:
+    """Return the places of some inputs, without those that come late: their slopes say how late."""
+    return [
+        i
+        for i, v in enumerate(block.model.inputs)
+        if v.name in inputs and v.name in block.drives and not block.drives[v.name].shifted_by
+    ]
+
+
 def _is_motion(block: Block, signal: str) -> bool:
     """Tell whether the rate of a signal drives the block too."""
     return any(d.signal == signal and d.order == 1 for d in block.drives.values())
@@ -363,7 +384,7 @@ def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
     return tuple(n for n in free if n in late or depends(together, s.parameter[names.index(n)]))
 
 
-def _equations(block: Block, free: Sequence[str]) -> _Equations:
+def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -> _Equations:
     model, s = block.model, block.model.symbols()
     names = [v.name for v in model.parameters]
     place = [names.index(n) for n in free]
@@ -382,6 +403,13 @@ def _equations(block: Block, free: Sequence[str]) -> _Equations:
             k = late.index(drive)
             shift = (p[list(free).index(_free_delay(drive, free))] - now[k]) * rates[i]
             together = ca.substitute(together, s.input[i], s.input[i] + shift)
+    if straightened:
+        n = s.state.numel()
+        seen = ca.vertcat(*[s.input[i] for i in straightened])
+        left = ca.vertcat(*[rates[i] for i in straightened])
+        straight = together[n:] + ca.jtimes(together[n:], seen, left)
+        whole = ca.substitute(together[:n], seen, seen + left) if n else ca.SX(0, 1)
+        together = ca.vertcat(whole, straight)
     given = ca.vertcat(s.input, rates)
     core, symbols, parts = ca.extract_parametric(ca.cse(together), given)
     core = ca.cse(core)

@@ -18,9 +18,10 @@ from ..records.measurement import Record, RecordSet
 from ..statistics.coloured import NoisePart, independent_number
 from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
 from ..statistics.metrics import rmse
+from .between_samples import Reading, on_clock, refined_filter, resolving_step, times_on
 from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
-from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces
+from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces, rectified
 from .noise import Noise as Noise
 from .noise import estimate_noise as estimate_noise
 
@@ -32,6 +33,8 @@ the span of the rate times the acceleration: where friction bends the motion at 
 a twentieth of span and jump of the acceleration, and a usual jump is half the root mean square of it."""
 _SLOW_SHARE = 1e-2
 """Of the filter of a row that may reach into a reversal."""
+_RECTIFIED = 0.1
+"""Share of the noise floor up to which a block may rectify the noise of an input: 0.01 of its square."""
 _LEAST_ROWS = 20
 _COARSE_SHARE, _COARSEST = 0.04, 12
 """The coarse look skips samples while no motion changes by more than this share of its range."""
@@ -97,8 +100,10 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
         # A rate that is measured itself is not taken over a span.
         blurred = _SMEARED * span * rmse(np.gradient(rate, step)) if drive.order else 0.0
         # The filter smears what happens at a reversal; so its whole reach must be in motion.
-        slow = (np.abs(rate) < math.hypot(noisy, blurred)).astype(float)
-        matrix = matrix[np.flatnonzero(matrix @ slow < _SLOW_SHARE)]
+        slow = np.abs(rate) < math.hypot(noisy, blurred)
+        moving = _in_motion(matrix, slow | _reverses(rate))
+        # A motion that is never between two reversals for long, as one that shakes, is read across them.
+        matrix = moving if len(moving.places) >= _LEAST_ROWS else _in_motion(matrix, slow)
     variance, raw = _variances(block, record, noise, filters, inputs)
     spacing = stride * step
     memory = _memory(block, step, noise, filters, inputs)
@@ -114,6 +119,27 @@ def noise_floor(block: Block, record: Record, noise: Noise, filters: Filters) ->
         independent_number(whole, len(matrix.places), spacing) if whole else math.inf,
         min(squares, default=math.inf),
     )
+
+
+def _on_clock(floor: Floor, width: float, times: int) -> Floor:
+    """Return the same rows with the same noise floor, made of several samples in the place of one."""
+    if times == 1:
+        return floor
+    count = len(floor.raw_sigma)
+    raw = np.interp(np.arange((count - 1) * times + 1) / times, np.arange(count), floor.raw_sigma)
+    return replace(floor, filter=refined_filter(floor.filter, width, times), raw_sigma=raw)
+
+
+def _in_motion(matrix: Smoothing, still: NDArray[np.bool_]) -> Smoothing:
+    """Return the rows that hardly reach into what is still."""
+    return matrix[np.flatnonzero(matrix @ still.astype(float) < _SLOW_SHARE)]
+
+
+def _reverses(rate: Array) -> NDArray[np.bool_]:
+    """Tell which samples have a reversal beside them: when in between it happened, no sample tells."""
+    between = rate[1:] * rate[:-1] < 0.0
+    beside: NDArray[np.bool_] = np.append(between, False) | np.append(False, between)
+    return beside
 
 
 def _heard(block: Block) -> list[str]:
@@ -221,6 +247,9 @@ class Bench:
         Of the measured signals, where it is known from other records of the same bench.
     filters
         By name of the block, where they were chosen for other records of the same bench.
+    clock
+        Time in s between samples at which the blocks show what they do, where that is known from other
+        records of the same bench.
 
     Raises
     ------
@@ -235,6 +264,7 @@ class Bench:
         *,
         noise: Noise | None = None,
         filters: Mapping[str, Filters] | None = None,
+        clock: float | None = None,
     ) -> None:
         self._blocks = tuple(blocks)
         self.records = in_canonical_order(records)
@@ -251,6 +281,22 @@ class Bench:
             self._check_alive(block)
             if block.name not in self.filters:
                 self.filters[block.name] = chosen_filters(block, self._seen, self.noise, pace)
+        self._read()
+        for block in new:
+            self.filters[block.name] = self._straightened(block)
+        if clock is None:
+            clock = resolving_step(self._readings())
+        self.clock = clock
+        for (block_name, record_name), floor in self.floors.items():
+            record = next(r for r in self.records.records if r.name == record_name)
+            width = self.filters[block_name].width / record.step
+            self.floors[block_name, record_name] = _on_clock(floor, width, times_on(record, clock))
+        self.records = on_clock(self.records, clock)
+
+    def _read(self) -> None:
+        """Read each record by each block: rows and noise floor."""
+        self.floors.clear()
+        for block in self._blocks:
             for record in self.records.records:
                 floor = noise_floor(block, record, self.noise, self.filters[block.name])
                 if len(floor.sigma) >= _LEAST_ROWS:
@@ -261,6 +307,28 @@ class Bench:
                     "no record moves enough to say anything about it",
                     next_step=self._what_would(block),
                 )
+
+    def _straightened(self, block: Block) -> Filters:
+        """Return the filters of a block with the inputs whose noise it rectifies."""
+        filters, names = self.filters[block.name], set[str]()
+        for record in self._seen:
+            floor = self.floors.get((block.name, record.name))
+            if floor is not None:
+                shifts = rectified(block, record, self.noise, filters.span)
+                names |= {n for n, shift in shifts.items() if shift > _RECTIFIED * rmse(floor.sigma)}
+        return filters._replace(straightened=tuple(sorted(names)))
+
+    def _readings(self) -> list[Reading]:
+        """Return how the blocks read the records that may decide on filters."""
+        result = []
+        for block in self._blocks:
+            driven = self.driven(block, [])
+            for record in self._seen:
+                floor = self.floors.get((block.name, record.name))
+                if floor is not None:
+                    width = self.filters[block.name].width
+                    result.append(Reading(driven, record, width, floor.filter, floor.sigma))
+        return result
 
     @property
     def _seen(self) -> tuple[Record, ...]:
@@ -275,7 +343,7 @@ class Bench:
         records
             All records.
         """
-        return Bench(records, self._blocks, noise=self.noise, filters=self.filters)
+        return Bench(records, self._blocks, noise=self.noise, filters=self.filters, clock=self.clock)
 
     def _check_alive(self, block: Block) -> None:
         if block.target is None or self.noise.deviation(block.target) > 0.0:
@@ -314,10 +382,10 @@ class Bench:
             if there are none, as where a finished model is only looked at, all do.
         """
         filters = self.filters.get(block.name)
-        span = filters.span if filters else 0.0
+        span, straightened = (filters.span, filters.straightened) if filters else (0.0, ())
         records = self.records.of("fit") or self.records.records
         block = block.scaled_to(self._scales.get(block.name, block.effort_per_drive))
-        return DrivenBlock(block, free, records=records, values=values, span=span)
+        return DrivenBlock(block, free, records=records, values=values, span=span, straightened=straightened)
 
     def evidence(
         self,

@@ -64,6 +64,27 @@ def derivative(signal: Array, step: float, *, order: int, span: float = 0.0) -> 
     return result / step**order
 
 
+def smoothed(signal: Array, step: float, *, order: int, span: float) -> Array:
+    """Return a signal or its derivative by quartics through all samples of a span (Savitzky and Golay 1964).
+
+    Parameters
+    ----------
+    signal
+        Shape (n,).
+    step
+        Time between samples in s.
+    order
+        0, 1 or 2.
+    span
+        Time in s; where it has too few samples nothing is smoothed.
+    """
+    points = 2 * round(0.5 * (span / step - 1.0)) + 1
+    if not _LEAST_POINTS <= points <= len(signal):
+        return derivative(signal, step, order=order)
+    smooth: Array = savgol_filter(signal, points, 4, deriv=order, delta=step, mode="interp")
+    return smooth
+
+
 @lru_cache(maxsize=64)
 def difference(order: int, span: float = 0.0) -> Array:
     """Return the weights of a derivative per sample, to be convolved with a signal.
