@@ -38,6 +38,7 @@ from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict
 from .screening.causality import lagging_forces
+from .screening.drive_check import drive_findings
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
 from .screening.wrong_numbers import sentence_of, with_numbers_let_go, wrong_numbers
@@ -139,6 +140,7 @@ def _decided(
         *out_of_reach(case.actuator, records),
         *scale_findings(case.comparison, base),
     ]
+    findings = findings or drive_findings(case.actuator, case.comparison, base)
     lagging = lagging_forces(case.actuator, records)
     if findings or (lagging.findings and not lagging.testable):
         findings += lagging.findings

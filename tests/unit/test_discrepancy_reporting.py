@@ -22,7 +22,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.reporting.acting_effort import Acting
+from nlsdesign.discrepancy.screening.acting_effort import Acting
 from nlsdesign.discrepancy.reporting.advice import where_they_differ
 from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
 from nlsdesign.discrepancy.reporting.refit import refit

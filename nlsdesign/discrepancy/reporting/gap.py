@@ -11,7 +11,7 @@ from ...identification.statistics.residuals import Binned, shapes
 from ...model import flatten
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
-from .acting_effort import Acting
+from ..screening.acting_effort import Acting
 from .verdict import Course, RecordGap
 
 
