@@ -41,7 +41,12 @@ from .screening.causality import lagging_forces
 from .screening.drive_check import drive_findings
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
-from .screening.wrong_numbers import sentence_of, with_numbers_let_go, wrong_numbers
+from .screening.wrong_numbers import (
+    is_explained_by_numbers,
+    sentence_of,
+    with_numbers_let_go,
+    wrong_numbers,
+)
 from .selection.comparison import Comparison
 from .selection.criteria import Criteria, is_complete
 from .selection.excess import excesses
@@ -168,7 +173,13 @@ def _searched(
         return fewer or outcome
     again = search(case.comparison, free, catalogue, case.criteria, progress)
     # Effects beside a wrong number are named only where nothing is left to be explained by something else.
-    return again if again.complete and wrong_numbers(again.last) else outcome
+    if again.complete and wrong_numbers(again.last):
+        return again
+    numbers = len(wrong_numbers(free)) <= len(outcome.last.unknowns) or not outcome.steps
+    explains = is_explained_by_numbers(
+        case.criteria, *(case.excesses(each) for each in (base, outcome.last, free))
+    )
+    return replace(outcome, last=free, steps=()) if numbers and explains else outcome
 
 
 def _with_fewer_effects(case: _Case, outcome: Outcome) -> Outcome | None:
@@ -211,6 +222,8 @@ def _verdict(
     base = base.as_written()
     better = outcome.last if verdict == "named" or outcome.last.released else base
     steps = outcome.steps if verdict == "named" else ()
+    # No record is proposed for the values of a table that has no name.
+    known = tuple(better.as_written().fits.values())
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria)
     better = better.as_written()
@@ -232,12 +245,12 @@ def _verdict(
         derived(sourced(better), case.actuator, "diagnosed"),
         sourced(base),
         course_of(base, better, every, worst),
-        tuple(text for fit in better.fits.values() for text in fit.unidentified()),
+        tuple(text for fit in known for text in fit.unidentified()),
         shapes_of(base, better, every, worst),
         tuple(better.fits.values()),
         _remainder(case.comparison, better, after) if verdict not in ("none", "data_suspect") else None,
         (
-            *_next_steps(case.comparison, steps, tuple(better.fits.values())),
+            *_next_steps(case.comparison, steps, known),
             *((experiment.words(),) if experiment else ()),
         ),
         outcome.skipped,
