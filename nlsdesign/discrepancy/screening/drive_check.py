@@ -112,7 +112,9 @@ def _divided(records: RecordSet, signal: str, factor: float) -> RecordSet:
     def changed(record: Record) -> Record:
         signals = {**record.trace.signals, signal: record.trace[signal] / factor}
         sharp = {
-            name: each._replace(noise=each.noise / size, quantum=each.quantum / size) if name == signal else each
+            name: each._replace(noise=each.noise / size, quantum=each.quantum / size)
+            if name == signal
+            else each
             for name, each in record.resolution.items()
         }
         return replace(record, trace=replace(record.trace, signals=signals), resolution=sharp)
