@@ -61,6 +61,8 @@ from .selection.without_name import with_what_has_no_name
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 """So many of each are shown; a longer list is not read."""
+_FAR, _MOST_FAR = 2.0, 4
+"""Standard deviations of its spread from which a refitted number is called by its name, and how many are."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +238,7 @@ def _verdict(
     return Verdict(
         verdict,
         tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
-        ((_strained(before[DECLARED], after[DECLARED]),) if before[DECLARED].open else ())
+        ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
         gaps_of(base, better, every),
@@ -315,11 +317,18 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     return (*sentences, *more_excitation(fits))
 
 
-def _strained(before: Excess, after: Excess) -> str:
+def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
+    scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
+    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
+    which = f": {', '.join(f'{n} {abs(scores[n]):.1f} {_side(scores[n])}' for n in far)}" if far else ""
     return (
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
-        f"{after.fit:.1f} after"
+        f"{after.fit:.1f} after{which}"
     )
+
+
+def _side(score: float) -> str:
+    return "above" if score > 0.0 else "below"
 
 
 def _not_predicted(key: Key) -> str:
