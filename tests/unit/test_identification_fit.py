@@ -312,7 +312,7 @@ def test_least_squares_follows_a_curved_valley_and_steps_around_a_hole() -> None
 
 
 def test_numbers_that_a_model_is_linear_in_are_found_along_a_narrow_valley() -> None:
-    """Viscous friction, dry friction and drag nearly stand for each other in records far sharper than that."""
+    """Viscous friction, dry friction and drag nearly stand for each other in sharp records."""
     speed = 0.3 * np.sin(np.linspace(0.0, 20.0, 400))
     matrix = 1e4 * np.column_stack([speed, np.tanh(speed / 1e-3), speed * np.abs(speed)])
     true = np.array([160.0, 15.0, 500.0])

@@ -163,9 +163,12 @@ def _rubbing(assembly: Assembly) -> list[str]:
 
 
 def _declared_friction(assembly: Assembly, place: str) -> str | None:
-    """Return the path of even dry friction that the deck declares; what an effect has added has richer forms."""
+    """Return the path of even dry friction that the deck declares.
+
+    What an effect has added has richer forms of its own.
+    """
     path = _even_friction(assembly, place)
-    return None if path is None or assembly.element(path).sliding_effort.source == SOURCE else path  # type: ignore[attr-defined]
+    return path if path and assembly.quantities()[f"{path}.sliding_effort"].source != SOURCE else None
 
 
 def _rubbing_as_declared(assembly: Assembly) -> list[str]:

@@ -1,10 +1,10 @@
 """Check of a drive: a command or a current whose sign is turned, or whose unit is a thousand times another.
 
-A measured force is compared with what the model predicts. A drive is an input: nothing predicts it, but a balance
-of efforts asks for one. Where what was measured is that drive many times over or turned, the records are taken
-with that undone: if the declared model then leaves next to nothing of the error, no effect is looked for. The
-second look is needed because an effect that outweighs all others, such as a weight that the deck lacks, turns the
-sign of what a balance asks for as well.
+A measured force is compared with what the model predicts. A drive is an input: nothing predicts it, but a
+balance of efforts asks for one. Where what was measured is that drive many times over or turned, the
+records are taken with that undone: if the declared model then leaves next to nothing of the error, no
+effect is looked for. The second look is needed because an effect that outweighs all others, such as a
+weight that the deck lacks, turns the sign of what a balance asks for as well.
 """
 
 from __future__ import annotations
@@ -56,13 +56,12 @@ def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis)
             left = _left_with(actuator, _divided(records, signal, factor), block)
             before = _error_share(comparison, base, block)
             if left is not None and left <= _LEFT * before:
-                findings.append(
-                    Finding(
-                        f"column '{records.column(signal).name}'",
-                        f"is {_range(ratios)} times what '{block}' asks of the drive; with that undone "
-                        f"the declared model explains {100.0 * (1.0 - left / before):.4g} % of the error: {words}",
-                    )
+                share = 100.0 * (1.0 - left / before)
+                said = (
+                    f"is {_range(ratios)} times what '{block}' asks of the drive; with that undone the "
+                    f"declared model explains {share:.4g} % of the error: {words}"
                 )
+                findings.append(Finding(f"column '{records.column(signal).name}'", said))
     return findings
 
 

@@ -1,10 +1,10 @@
 """Bounded nonlinear least squares: Levenberg–Marquardt, each step the exact minimum inside the box.
 
-Positive numbers are fitted on a logarithmic scale, where most of what is nonlinear is mild. But many laws are
-linear in their numbers: friction, drag, inertia. Where two such numbers can nearly stand for each other and the
-records are far sharper than the model is right, the valley of the cost is narrow and bent on that scale, and a step
-along its tangent leaves it. A step that fails is therefore tried once more as a straight line in the numbers
-themselves, which follows such a valley to its end.
+Positive numbers are fitted on a logarithmic scale, where most of what is nonlinear is mild. But many laws
+are linear in their numbers: friction, drag, inertia. Where two such numbers can nearly stand for each
+other and the records are far sharper than the model is right, the valley of the cost is narrow and bent
+on that scale, and a step along its tangent leaves it. A step that fails is therefore tried once more as a
+straight line in the numbers themselves, which follows such a valley to its end.
 """
 
 from __future__ import annotations
