@@ -74,14 +74,15 @@ def test_friction_that_an_effect_has_added_has_its_own_richer_form(tmp_path: Pat
 
 
 def diagnosed(folder: Path, hidden: dict[str, float], *names: str, inertia: float = 1.0) -> Verdict:
-    """The spindle of the bench, with dry friction in its deck and perhaps a wrong inertia."""
-    write_machine_set(folder / "set", MACHINES["spindle"], hidden, 3)
+    """The spindle of the bench with dry friction in its deck, perhaps a wrong inertia, its drive known."""
+    spindle = MACHINES["spindle"]
+    write_machine_set(folder / "set", spindle, hidden, 3)
     deck = folder / "set" / "deck.toml"
-    text = deck.read_text(encoding="utf-8") + _DRY
-    value = MACHINES["spindle"].inertia
-    deck.write_text(
-        text.replace(f"inertia = {{value = {value:.9g}", f"inertia = {{value = {value * inertia:.9g}")
+    text = deck.read_text(encoding="utf-8").replace(
+        f"inertia = {{value = {spindle.inertia:.9g}", f"inertia = {{value = {inertia * spindle.inertia:.9g}"
     )
+    before, name, after = text.partition("torque_constant")
+    deck.write_text(before + name + after.replace(", spread = 0.06", "", 1) + _DRY, encoding="utf-8")
     machine = declare(load_deck(deck))
     records = load_records(folder / "set", flatten(machine))
     return diagnose(machine, records, catalogue=[each for each in ALL if each.__name__ in names])
