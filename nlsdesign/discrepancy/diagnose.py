@@ -38,9 +38,15 @@ from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict
 from .screening.causality import lagging_forces
+from .screening.drive_check import drive_findings
 from .screening.other_rig import other_numbers, out_of_reach
 from .screening.scale_check import scale_findings, typical_sizes
-from .screening.wrong_numbers import sentence_of, with_numbers_let_go, wrong_numbers
+from .screening.wrong_numbers import (
+    is_explained_by_numbers,
+    sentence_of,
+    with_numbers_let_go,
+    wrong_numbers,
+)
 from .selection.comparison import Comparison
 from .selection.criteria import Criteria, is_complete
 from .selection.excess import excesses
@@ -55,6 +61,8 @@ from .selection.without_name import with_what_has_no_name
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 """So many of each are shown; a longer list is not read."""
+_FAR, _MOST_FAR = 2.0, 4
+"""Standard deviations of its spread from which a refitted number is called by its name, and how many are."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +147,7 @@ def _decided(
         *out_of_reach(case.actuator, records),
         *scale_findings(case.comparison, base),
     ]
+    findings = findings or drive_findings(case.actuator, case.comparison, base)
     lagging = lagging_forces(case.actuator, records)
     if findings or (lagging.findings and not lagging.testable):
         findings += lagging.findings
@@ -166,7 +175,13 @@ def _searched(
         return fewer or outcome
     again = search(case.comparison, free, catalogue, case.criteria, progress)
     # Effects beside a wrong number are named only where nothing is left to be explained by something else.
-    return again if again.complete and wrong_numbers(again.last) else outcome
+    if again.complete and wrong_numbers(again.last):
+        return again
+    numbers = len(wrong_numbers(free)) <= len(outcome.last.unknowns) or not outcome.steps
+    explains = is_explained_by_numbers(
+        case.criteria, *(case.excesses(each) for each in (base, outcome.last, free))
+    )
+    return replace(outcome, last=free, steps=()) if numbers and explains else outcome
 
 
 def _with_fewer_effects(case: _Case, outcome: Outcome) -> Outcome | None:
@@ -209,6 +224,8 @@ def _verdict(
     base = base.as_written()
     better = outcome.last if verdict == "named" or outcome.last.released else base
     steps = outcome.steps if verdict == "named" else ()
+    # No record is proposed for the values of a table that has no name.
+    known = tuple(better.as_written().fits.values())
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria)
     better = better.as_written()
@@ -221,7 +238,7 @@ def _verdict(
     return Verdict(
         verdict,
         tuple(_named(better, step, place, complete=is_complete(after)) for place, step in enumerate(steps)),
-        ((_strained(before[DECLARED], after[DECLARED]),) if before[DECLARED].open else ())
+        ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
         gaps_of(base, better, every),
@@ -230,12 +247,12 @@ def _verdict(
         derived(sourced(better), case.actuator, "diagnosed"),
         sourced(base),
         course_of(base, better, every, worst),
-        tuple(text for fit in better.fits.values() for text in fit.unidentified()),
+        tuple(text for fit in known for text in fit.unidentified()),
         shapes_of(base, better, every, worst),
         tuple(better.fits.values()),
         _remainder(case.comparison, better, after) if verdict not in ("none", "data_suspect") else None,
         (
-            *_next_steps(case.comparison, steps, tuple(better.fits.values())),
+            *_next_steps(case.comparison, steps, known),
             *((experiment.words(),) if experiment else ()),
         ),
         outcome.skipped,
@@ -300,11 +317,18 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     return (*sentences, *more_excitation(fits))
 
 
-def _strained(before: Excess, after: Excess) -> str:
+def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
+    scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
+    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
+    which = f": {', '.join(f'{n} {abs(scores[n]):.1f} {_side(scores[n])}' for n in far)}" if far else ""
     return (
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
-        f"{after.fit:.1f} after"
+        f"{after.fit:.1f} after{which}"
     )
+
+
+def _side(score: float) -> str:
+    return "above" if score > 0.0 else "below"
 
 
 def _not_predicted(key: Key) -> str:

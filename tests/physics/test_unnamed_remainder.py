@@ -16,7 +16,7 @@ import pytest
 
 from nlsdesign.components.assembly.deck_writer import declare, write_deck
 from nlsdesign.deck import load_deck
-from nlsdesign.discrepancy import ALL, predict
+from nlsdesign.discrepancy import ALL, diagnose, predict
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
 from nlsdesign.discrepancy.effects.candidate import Candidate
 from nlsdesign.discrepancy.effects.unnamed_tables import EFFECT, unnamed_part
@@ -83,6 +83,18 @@ def test_the_gap_closes_on_a_record_that_was_held_out(actuator: str, effect: str
     assert before > 1.0
     assert made.excess(after, block, "held_out") < 0.2 * before
     assert made.excess(after, block, "fit") < 0.2 * made.excess(made.base, block, "fit")
+
+
+@pytest.mark.slow
+def test_no_record_is_proposed_for_the_values_of_a_table(tmp_path: Path) -> None:
+    """Each value of a table stands for no part that anybody could look at."""
+    tables = make_records(ACTUATORS["arm"], {"rubbing_spot": 1.0}, SEED, only=RECORDS)
+    write_set(tmp_path, ACTUATORS["arm"], tables)
+    declared = declared_rig(tmp_path / "rig.toml", tmp_path / "cam.csv")
+    found = diagnose(declared, load_records(tmp_path, flatten(declared), hold_out=[HELD_OUT]), catalogue=())
+    assert found.unnamed
+    assert any("unnamed" in text for fit in found.fits for text in fit.unidentified())
+    assert not [text for text in (*found.unidentified, *found.next_steps) if "unnamed" in text]
 
 
 def test_what_repeats_in_time_is_refused() -> None:

@@ -212,14 +212,28 @@ def test_many_faulty_samples_make_a_record_suspect(rig: Assembly, clean: np.ndar
     )
 
 
+def turned_current(rows: np.ndarray) -> np.ndarray:
+    rows[:, CURRENT] *= -1.0
+    return rows
+
+
+def in_milliampere(rows: np.ndarray) -> np.ndarray:
+    rows[:, CURRENT] *= 1e3
+    return rows
+
+
 SUSPECT: dict[str, tuple[Callable[[np.ndarray], np.ndarray], str]] = {
     "clipped": (clipped, "a.csv: column 'force_N', rows "),
     "millinewton": (in_millinewton, "is it in thousandths of the stated unit?"),
     "degrees": (in_degrees, "the declared cam ends at"),
+    "turned": (turned_current, "column 'current_A': is -"),
+    "milliampere": (in_milliampere, "is it in thousandths of the stated unit?"),
 }
+SLOW = pytest.param("milliampere", marks=pytest.mark.slow)
+"""The turned current takes the same way."""
 
 
-@pytest.mark.parametrize("case", SUSPECT)
+@pytest.mark.parametrize("case", [c for c in SUSPECT if c != "milliampere"] + [SLOW])
 def test_what_looks_wrong_is_suspected_before_any_effect_is_tried(
     case: str, rig: Assembly, clean: np.ndarray, tmp_path: Path
 ) -> None:

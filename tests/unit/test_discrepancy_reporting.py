@@ -22,12 +22,12 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy.blocks.tearing import blocks_of
-from nlsdesign.discrepancy.reporting.acting_effort import Acting
 from nlsdesign.discrepancy.reporting.advice import where_they_differ
 from nlsdesign.discrepancy.reporting.gap import course_of, gaps_of
 from nlsdesign.discrepancy.reporting.refit import refit
 from nlsdesign.discrepancy.reporting.remainder import Remainder, remainder_of
 from nlsdesign.discrepancy.reporting.window_refit import fitted_over_windows, window_gaps, wiring_of
+from nlsdesign.discrepancy.screening.acting_effort import Acting
 from nlsdesign.discrepancy.selection.comparison import Comparison, Judged
 from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.errors import MeasurementError

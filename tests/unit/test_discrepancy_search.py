@@ -160,6 +160,16 @@ def test_an_effect_that_a_later_one_makes_superfluous_is_dropped() -> None:
     assert names(outcome(better, effect("b"), effect("c"))) == ["c"]
 
 
+def test_what_an_effect_gains_is_said_beside_all_others_that_are_named() -> None:
+    """Added first, b gained 70,000; beside c it gains 39,900, and that is what would be lost without it."""
+    table = Table({(): (1e5,), ("b",): (3e4,), ("c",): (4e4,), ("b", "c"): (100.0,)})
+    first, second = outcome(table, effect("b"), effect("c")).steps
+    assert (first.effect, second.effect) == ("b", "c")
+    assert first.gain.value == pytest.approx(2 * (4e4 - 100.0))
+    assert first.gains == {"one": pytest.approx(4e4 - 100.0), "other": pytest.approx(4e4 - 100.0)}
+    assert second.gain.value == pytest.approx(2 * (3e4 - 100.0))
+
+
 def test_two_effects_that_help_only_together_are_found_as_a_pair() -> None:
     table = {(): (1e5,), ("a",): (8e4,), ("b",): (9e4,), ("a", "b"): (10.0,)}
     found = outcome(Table(table), effect("a"), effect("b"))

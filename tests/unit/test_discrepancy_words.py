@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from nlsdesign.components import (
 )
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.discrepancy import ALL, Verdict
+from nlsdesign.discrepancy.diagnose import _strained
 from nlsdesign.discrepancy.effects.plain_names import (
     effect_in_words,
     kind_in_words,
@@ -33,7 +35,11 @@ from nlsdesign.discrepancy.effects.plain_names import (
 )
 from nlsdesign.discrepancy.reporting.circumstances import DiagnosisRun, RecordOfRun, settings_of
 from nlsdesign.discrepancy.reporting.named_effect import EffectEvidence, NamedEffect
+from nlsdesign.discrepancy.reporting.suspicion import as_sentence
 from nlsdesign.discrepancy.reporting.verdict import Course, RecordGap
+from nlsdesign.discrepancy.screening.scale_check import _hint
+from nlsdesign.discrepancy.selection.hypothesis import Hypothesis
+from nlsdesign.discrepancy.selection.measures import DECLARED, Excess
 from nlsdesign.discrepancy.selection.trials import Skipped
 from nlsdesign.figures import alternative_text
 from nlsdesign.identification.estimation.least_squares import Fit
@@ -355,3 +361,22 @@ def test_every_table_of_the_report_has_a_caption(tmp_path: Any) -> None:
     assert page.count("<table>") == page.count("<caption") >= 4
     tables = [p for p in made[1].parts if isinstance(p, report.TableSection)]  # type: ignore[attr-defined]
     assert all(table.caption for table in tables)
+
+
+def test_a_reason_that_asks_ends_with_its_question_mark() -> None:
+    assert (
+        as_sentence("is it in thousandths of the unit?") == "Is it in thousandths of the unit?"
+    )
+    assert as_sentence("the sign is turned") == "The sign is turned."
+
+
+def test_strained_numbers_are_called_by_their_names() -> None:
+    before = Excess(DECLARED, "1", 1.0, 2.3, 2.3, 16.0, 3, 3.0, open=True)
+    fit = SimpleNamespace(prior_z_scores=lambda: {"arm.mass": 3.46, "gear.loss": -2.1, "arm.inertia": 0.3})
+    said = _strained(before, before, cast(Hypothesis, SimpleNamespace(fits={"motor": fit})))
+    assert said.endswith("away before, 2.3 after: arm.mass 3.5 above, gear.loss 2.1 below")
+
+
+def test_a_motion_in_degrees_is_recognised_by_the_force_that_it_predicts() -> None:
+    assert "in degrees" in _hint(0.0205)
+    assert "another rig" in _hint(0.1)

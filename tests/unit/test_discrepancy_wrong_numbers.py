@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from nlsdesign.discrepancy import ALL, Verdict, diagnose
+from nlsdesign.discrepancy.screening.wrong_numbers import is_explained_by_numbers
+from nlsdesign.discrepancy.selection.criteria import Criteria
+from nlsdesign.discrepancy.selection.measures import DECLARED, Excess
 from nlsdesign.identification import load_records
 from nlsdesign.model import flatten
 from tests.diagnosed import declared_rig
@@ -70,3 +73,22 @@ def test_a_wrong_torque_constant_beside_friction_is_not_taken_for_effects(tmp_pa
     found = diagnose(rig, load_records(tmp_path / "records", flatten(rig)), catalogue=catalogue)
     assert [e.name for e in found.effects] == ["coulomb_friction"]
     assert any("motor.torque_constant" in each for each in found.where)
+
+
+@pytest.mark.parametrize(
+    ("effects", "numbers", "explained"),
+    [(400.0, 3.0, True), (1000.0, 3.0, True), (5.0, 3.0, False), (400.0, 60.0, False), (0.0, 0.0, False)],
+)
+def test_numbers_that_leave_a_trace_are_preferred_to_effects_that_leave_much(
+    effects: float, numbers: float, explained: bool
+) -> None:
+    """Friction that sticks leaves a trace whatever the numbers are; an effect must not be named for that."""
+
+    def left(excess: float) -> dict[str, Excess]:
+        strained = Excess(DECLARED, "1", 1.0, 3.0, 3.0, 9e9, 3, 3.0, open=True)
+        return {
+            DECLARED: strained,
+            "slide": Excess("slide", "N", 1.0, 1.0, 1.0, 100.0 + excess, 100, 50.0, open=True),
+        }
+
+    assert is_explained_by_numbers(Criteria(), left(1000.0), left(effects), left(numbers)) is explained

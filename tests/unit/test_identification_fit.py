@@ -311,6 +311,42 @@ def test_least_squares_follows_a_curved_valley_and_steps_around_a_hole() -> None
     np.testing.assert_allclose(found.x, 1.0, atol=0.02)
 
 
+def test_numbers_that_a_model_is_linear_in_are_found_along_a_narrow_valley() -> None:
+    """Viscous friction, dry friction and drag nearly stand for each other in sharp records."""
+    speed = 0.3 * np.sin(np.linspace(0.0, 20.0, 400))
+    matrix = 1e4 * np.column_stack([speed, np.tanh(speed / 1e-3), speed * np.abs(speed)])
+    true = np.array([160.0, 15.0, 500.0])
+    used = 0
+
+    def rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        nonlocal used
+        used += 1
+        return matrix @ (np.exp(x) - true), matrix * np.exp(x)
+
+    box = np.log([1.0, 0.1, 0.1]), np.log([1e4, 1e3, 1e5])
+    start = np.log([324.0, 7.0, 64.0])
+    found = minimise(rows, start, box, evaluations=20, share=1e-3, logarithmic=np.ones(3, dtype=bool))
+    np.testing.assert_allclose(np.exp(found.x), true, rtol=1e-4)
+    assert used <= 10
+    lost = minimise(rows, start, box, evaluations=20, share=1e-3)
+    assert lost.cost > 1e6 * max(found.cost, 1.0)
+
+
+def test_a_straight_step_keeps_within_the_bounds() -> None:
+    matrix = 1e3 * np.array([[1.0, 1.0], [1.0, 1.02], [1.0, 0.97]])
+    target = matrix @ np.array([2.0, 40.0])
+
+    def rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        assert np.all(x <= box[1] + 1e-12)
+        assert np.all(x >= box[0] - 1e-12)
+        return matrix @ np.exp(x) - target, matrix * np.exp(x)
+
+    box = np.log([1.0, 1.0]), np.log([30.0, 30.0])
+    found = minimise(rows, np.log([25.0, 1.5]), box, evaluations=60, logarithmic=np.ones(2, dtype=bool))
+    best = lsq_linear(matrix, target, (np.exp(box[0]), np.exp(box[1])), tol=1e-12)
+    np.testing.assert_allclose(np.exp(found.x), best.x, rtol=1e-3)
+
+
 def test_a_direction_that_many_numbers_share_evenly_is_told_too() -> None:
     """Of sixteen numbers each has a share of 0.25, which is less than what is mentioned otherwise."""
     parameters = tuple(Parameter(f"p{k}", "1", 1.0, 1.0, math.inf, 0.1, 10.0, "log") for k in range(16))

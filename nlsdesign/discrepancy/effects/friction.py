@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from ...components import (
     Assembly,
@@ -69,6 +70,33 @@ def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[As
     return assembly.with_part(part, tie(element, body)), part
 
 
+@dataclass(frozen=True)
+class _Surroundings:
+    """Signals around a place, in which numbers of friction there are counted.
+
+    Parameters
+    ----------
+    effort
+        The largest effort on a body, or the effort of a tie.
+    motion, speed
+        Of the body, or of that which drives the tie.
+    """
+
+    effort: str
+    motion: str
+    speed: str
+
+    @classmethod
+    def of(cls, assembly: Assembly, place: str) -> _Surroundings:
+        """Return the signals around a body that moves freely, or around a tie with no such body at an end."""
+        on_body = isinstance(assembly[place], Free)
+        body = place if on_body else driving_end(assembly, place)
+        effort = efforts_on(place) if on_body else f"{place}.{assembly.element(place).domain.effort}"
+        own = assembly[body].motion_names  # type: ignore[attr-defined]
+        motion, speed = (f"{body}.{each}" for each in own)
+        return cls(effort, motion, speed)
+
+
 class Placed:
     """A law of friction put on a body, or beside what a prescribed motion strains.
 
@@ -86,15 +114,11 @@ class Placed:
 
     def __init__(self, assembly: Assembly, place: str, name: str, law: Law) -> None:
         if isinstance(assembly[place], Free):
-            domain, body = domain_of(assembly, place), place
-            self.assembly, self.path = tied(assembly, name, place, law(domain))
-            self.effort = efforts_on(place)
+            self.assembly, self.path = tied(assembly, name, place, law(domain_of(assembly, place)))
         else:
-            domain, body = assembly.element(place).domain, driving_end(assembly, place)
-            self.assembly, self.path = beside(assembly, place, name, law(domain))
-            self.effort = f"{place}.{domain.effort}"
-        own = assembly[body].motion_names  # type: ignore[attr-defined]
-        self.motion, self.speed = (f"{body}.{each}" for each in own)
+            self.assembly, self.path = beside(assembly, place, name, law(assembly.element(place).domain))
+        around = _Surroundings.of(assembly, place)
+        self.effort, self.motion, self.speed = around.effort, around.motion, around.speed
 
 
 def _coulomb(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -136,6 +160,50 @@ def _rubbing(assembly: Assembly) -> list[str]:
     """Return the bodies and ties with even dry friction, declared or added before."""
     places = [*moving_bodies(assembly), *driven_ties(assembly)]
     return [place for place in places if _even_friction(assembly, place)]
+
+
+def _declared_friction(assembly: Assembly, place: str) -> str | None:
+    """Return the path of even dry friction that the deck declares.
+
+    What an effect has added has richer forms of its own.
+    """
+    path = _even_friction(assembly, place)
+    return path if path and assembly.quantities()[f"{path}.sliding_effort"].source != SOURCE else None
+
+
+def _rubbing_as_declared(assembly: Assembly) -> list[str]:
+    """Return the bodies and ties with even dry friction that the deck declares."""
+    return [place for place in _rubbing(assembly) if _declared_friction(assembly, place)]
+
+
+def _turning_as_declared(assembly: Assembly) -> list[str]:
+    return [body for body in turning_bodies(assembly) if _declared_friction(assembly, body)]
+
+
+def _falling(assembly: Assembly, place: str) -> Iterator[Edit]:
+    """Let declared friction fall with speed: its level is that of fast sliding."""
+    path = _declared_friction(assembly, place)
+    if path is not None:
+        even, around = assembly.element(path), _Surroundings.of(assembly, place)
+        more, speed = number(0.01, even.domain.effort_unit), number(0.2, even.domain.rate_unit)
+        falling = StribeckFriction(**numbers_of(even), breakaway=more, stribeck_speed=speed)
+        unknowns = (
+            Unknown(f"{path}.breakaway", (0.05,), 1e-4, 2.0, around.effort),
+            Unknown(f"{path}.stribeck_speed", (0.015, 0.08), 1e-3, 1.5, around.speed, null=None),
+        )
+        yield Edit(assembly.with_part(path, falling), unknowns)
+
+
+def _waving(assembly: Assembly, body: str) -> Iterator[Edit]:
+    """Let declared friction come round with the angle: its level stays what it is, in the mean."""
+    path = _declared_friction(assembly, body)
+    if path is not None:
+        kept = {name: value for name, value in numbers_of(assembly.element(path)).items() if name != "domain"}
+        waving = WavyFriction(**kept, sine=number(0.0, "N*m"), cosine=number(0.0, "N*m"))
+        unknowns = tuple(
+            Unknown(f"{path}.{part}", (0.0,), -2.0, 2.0, efforts_on(body)) for part in ("sine", "cosine")
+        )
+        yield Edit(assembly.with_part(path, waving), unknowns)
 
 
 def _asymmetric(assembly: Assembly, place: str) -> Iterator[Edit]:
@@ -220,13 +288,19 @@ stribeck_friction = Effect(
     "stribeck_friction",
     "Dry friction that falls with speed, on a body that turns or slides.",
     20,
-    tuple(
-        _forms(
+    (
+        *_forms(
             _stribeck,
             "an effort against the motion that is largest just off standstill",
             "Stribeck 1902; Armstrong-Hélouvry 1991",
             "dry friction",
-        )
+        ),
+        Form(
+            _rubbing_as_declared,
+            _falling,
+            "more friction just off standstill than is declared for all speeds",
+            "Stribeck 1902; Armstrong-Hélouvry 1991",
+        ),
     ),
 )
 load_dependent_friction = Effect(
@@ -287,6 +361,12 @@ position_dependent_friction = Effect(
             "a torque against the motion that is larger in one half of each turn",
             "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
             "dry friction",
+        ),
+        Form(
+            _turning_as_declared,
+            _waving,
+            "more friction in one half of each turn than is declared, and less in the other",
+            "Coulomb 1785; Armstrong-Hélouvry 1991 (friction that depends on position)",
         ),
     ),
 )

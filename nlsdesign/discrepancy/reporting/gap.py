@@ -9,9 +9,9 @@ from ...identification.equation_error.filter_choice import rate_span
 from ...identification.statistics.filters import derivative
 from ...identification.statistics.residuals import Binned, shapes
 from ...model import flatten
+from ..screening.acting_effort import Acting
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
-from .acting_effort import Acting
 from .verdict import Course, RecordGap
 
 

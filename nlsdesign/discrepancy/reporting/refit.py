@@ -22,6 +22,7 @@ from ...identification.records.quality import Finding
 from ...model import flatten
 from ...model.derived_deck import derived
 from ..blocks.tearing import blocks_of
+from ..screening.drive_check import drive_findings
 from ..screening.other_rig import out_of_reach
 from ..screening.scale_check import scale_findings, typical_sizes
 from ..selection.comparison import Comparison
@@ -179,6 +180,7 @@ def refit(
             next_step="give what is uncertain a spread, for instance spread = 0.1",
         )
     findings = (*records.findings, *out_of_reach(actuator, records), *scale_findings(comparison, fitted))
+    findings = findings or tuple(drive_findings(actuator, comparison, fitted))
     fits, window_errors = tuple(fitted.fits.values()), tuple[RecordGap, ...]()
     if window is not None:
         progress(f"simulating windows of {window:g} s")

@@ -15,7 +15,7 @@ CONTRADICTION = "deck and records contradict each other, so nothing is named"
 
 
 def as_sentence(text: str) -> str:
-    """Return a reason as a sentence; the name of a file at its beginning stays as it is.
+    """Return a reason as a sentence or a question; the name of a file at its beginning stays as it is.
 
     Parameters
     ----------
@@ -23,4 +23,5 @@ def as_sentence(text: str) -> str:
         Without a full stop, perhaps.
     """
     begins = text.split(maxsplit=1)[0].isalpha()
-    return f"{(capitalised(text) if begins else text).rstrip('.')}."
+    sentence = (capitalised(text) if begins else text).rstrip(".")
+    return sentence if sentence.endswith("?") else f"{sentence}."

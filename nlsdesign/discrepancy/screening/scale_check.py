@@ -150,6 +150,7 @@ def _hint(ratio: float) -> str:
         "is it in thousandths of the stated unit?": 1e3,
         "is it in thousands of the stated unit?": 1e-3,
         "degrees for radians?": 180.0 / np.pi,
+        "is the motion in degrees, not in the stated unit?": np.pi / 180.0,
     }
     close = [words for words, size in usual.items() if 0.5 < ratio / size < 2.0]
     return f"; {close[0]}" if close else "; are these records of another rig?"

@@ -111,6 +111,30 @@ def wrong_numbers(hypothesis: Hypothesis) -> list[str]:
     return words
 
 
+def is_explained_by_numbers(
+    criteria: Criteria, before: Excesses, with_effects: Excesses, with_numbers: Excesses
+) -> bool:
+    """Tell whether numbers let go explain plainly more than effects do, although not all.
+
+    What is left may be as little as the inexact form of an effect may leave: a bench has friction that sticks
+    or counts that round, which leave a trace whatever the numbers are. A wrong number that explains all but
+    that is no reason to name an effect that explains less.
+
+    Parameters
+    ----------
+    criteria
+        Of the decision.
+    before
+        What the declared model leaves, its numbers held in their ranges.
+    with_effects, with_numbers
+        What is left with the effects that were named, if any, and with numbers let go instead.
+    """
+    first, effects, numbers = (
+        sum(each.excess for each in _blocks(every).values()) for every in (before, with_effects, with_numbers)
+    )
+    return numbers <= criteria.inexact * first and criteria.richer * numbers < effects
+
+
 def _blocks(every: Excesses) -> Excesses:
     return {name: each for name, each in every.items() if name != DECLARED}
 

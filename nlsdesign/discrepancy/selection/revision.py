@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from ...errors import ConvergenceError
 from ..effects.candidate import Candidate
 from .criteria import Criteria, is_complete, is_superfluous, objections_of_numbers
 from .hypothesis import Hypothesis
+from .measures import gain, gains_by_record
 from .standing import standing_of
 from .trials import Step, Trials, rival_of
 
@@ -27,6 +28,38 @@ class Revision:
 
     trials: Trials
     start: Hypothesis
+    _fewer: dict[tuple[Step, ...], list[Step]] = field(default_factory=dict, repr=False)
+
+    def weighed(self, steps: list[Step]) -> list[Step]:
+        """Return the steps with what prediction gains by each effect beside all others that are named.
+
+        A step says what it gained when it was added. What was added later may have taken most of that over.
+
+        Parameters
+        ----------
+        steps
+            In the order in which they were added.
+        """
+        if len(steps) < 2:
+            return steps
+        every = self.trials.excesses_of(steps[-1].chosen)
+        weighed = list[Step]()
+        for place, step in enumerate(steps):
+            fewer = self._without(steps, place)
+            if fewer:
+                without = self.trials.excesses_of(fewer[-1].chosen)
+                step = replace(step, gain=gain(without, every), gains=gains_by_record(without, every))
+            weighed.append(step)
+        return weighed
+
+    def _without(self, steps: Sequence[Step], place: int) -> list[Step]:
+        """Return the steps anew without one of them; nothing if one of the others no longer fits."""
+        kept = tuple(step for k, step in enumerate(steps) if k != place)
+        if place == len(steps) - 1:
+            return list(kept)
+        if kept not in self._fewer:
+            self._fewer[kept] = self.rebuilt(kept)
+        return list(self._fewer[kept])
 
     def backward(self, steps: list[Step]) -> list[Step]:
         """Drop the effects that later ones have made superfluous, the first added first.
@@ -39,7 +72,7 @@ class Revision:
         place = 0
         while len(steps) > 1 and place < len(steps) - 1:
             self.trials.progress(f"trying without {steps[place].effect}")
-            fewer = self.rebuilt([s for k, s in enumerate(steps) if k != place])
+            fewer = self._without(steps, place)
             if fewer and self._is_superfluous(fewer, steps):
                 steps = self.enriched(fewer)
             else:

@@ -96,6 +96,7 @@ class _Search:
         skipped = tuple(dict.fromkeys(self.trials.skipped))
         if last is None:
             return Outcome(base, (), self.tried, is_complete(self.trials.on_all(start)), skipped)
+        steps = revision.weighed(steps)
         done = self.trials.excesses_of(last)
         return Outcome(last, tuple(steps), self.tried, is_complete(done), skipped)
 

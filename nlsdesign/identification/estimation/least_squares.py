@@ -168,7 +168,16 @@ def fit(
         fixed = rows(start)[0]
         ended = Minimum(start, 0.5 * float(fixed @ fixed), True)
     else:
-        ended = minimise(rows, start, (low, high), evaluations=evaluations, share=tolerance, least=least)
+        logarithmic = np.array([p.scale == "log" for p in parameters])
+        ended = minimise(
+            rows,
+            start,
+            (low, high),
+            evaluations=evaluations,
+            share=tolerance,
+            least=least,
+            logarithmic=logarithmic,
+        )
     if not np.isfinite(ended.cost):
         raise ConvergenceError("fit", "ended without a finite cost", next_step="narrow the bounds")
     residual, slope = rows(ended.x)

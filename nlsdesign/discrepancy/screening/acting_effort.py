@@ -55,6 +55,16 @@ class Acting:
             return f"{effort} of the drive"
         return f"measured {effort}" if others else f"{effort} of the inertia"
 
+    def drives(self, block: Block) -> list[str]:
+        """Return the measured signals that drive the body of a balance.
+
+        Parameters
+        ----------
+        block
+            Of any hypothesis.
+        """
+        return self._outside(block)[0]
+
     def filtered(self, judged: Judged) -> Array:
         """Return the signal or effort over a record, filtered as the error is, in the unit of the block.
 
