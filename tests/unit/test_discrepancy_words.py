@@ -364,9 +364,7 @@ def test_every_table_of_the_report_has_a_caption(tmp_path: Any) -> None:
 
 
 def test_a_reason_that_asks_ends_with_its_question_mark() -> None:
-    assert (
-        as_sentence("is it in thousandths of the unit?") == "Is it in thousandths of the unit?"
-    )
+    assert as_sentence("is it in thousandths of the unit?") == "Is it in thousandths of the unit?"
     assert as_sentence("the sign is turned") == "The sign is turned."
 
 
