@@ -20,6 +20,6 @@ def typed_command(*words: object) -> str:
     >>> typed_command("nlsdesign", "deck", "check", "my leg.toml")
     "nlsdesign deck check 'my leg.toml'"
     """
-    texts = [str(word) for word in words]
+    texts = [str(item) for item in words]
     # The shells of Windows know double quotes only.
     return subprocess.list2cmdline(texts) if os.name == "nt" else shlex.join(texts)

@@ -115,5 +115,5 @@ def fit(deck_name: str, records: Path, out: Path, as_json: bool, **options: Any)
 
 def _as_read(mapping: Path | None, hold_out: Sequence[str]) -> list[str]:
     """Return the options with which another command reads the same records in the same way."""
-    words = [word for name in hold_out for word in ("--hold-out", name)]
+    words = [item for name in hold_out for item in ("--hold-out", name)]
     return words if mapping is None else [*words, "--mapping", str(mapping)]

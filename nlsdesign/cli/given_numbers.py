@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..components.assembly.named_parts import Assembly
     from ..model import FlatModel
 
-BARE = "A number without a unit is in that of the model (rad, N*m, kg*m^2), as tables and heads show it"
+BARE = "A number without a unit is in that of the model (rad, N·m, kg·m²), as tables and heads show it"
 """The rule, for help texts."""
 
 

@@ -109,7 +109,7 @@ def next_command(*words: object) -> str:
     """
     context = click.get_current_context(silent=True)
     packages = () if context is None else context.find_root().params.get("packages") or ()
-    given = [word for package in packages for word in ("--with", package)]
+    given = [item for package in packages for item in ("--with", package)]
     return typed_command("nlsdesign", *given, *words)
 
 

@@ -57,11 +57,11 @@ def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis)
             before = _error_share(comparison, base, block)
             if left is not None and left <= _LEFT * before:
                 share = 100.0 * (1.0 - left / before)
-                said = (
+                text = (
                     f"is {_range(ratios)} times what '{block}' asks of the drive; with that undone the "
                     f"declared model explains {share:.4g} % of the error: {words}"
                 )
-                findings.append(Finding(f"column '{records.column(signal).name}'", said))
+                findings.append(Finding(f"column '{records.column(signal).name}'", text))
     return findings
 
 

@@ -140,7 +140,7 @@ def times_on(record: Record, step: float) -> int:
     return max(1, math.ceil(record.step / step - _SHARE))
 
 
-class Reading(NamedTuple):
+class BlockRecord(NamedTuple):
     """A record as a block reads it.
 
     Parameters
@@ -164,29 +164,31 @@ class Reading(NamedTuple):
     sigma: Array
 
 
-def resolving_step(readings: Sequence[Reading]) -> float:
+def resolving_step(block_records: Sequence[BlockRecord]) -> float:
     """Return the time between samples in s at which blocks show what they do; infinite if any is enough.
 
     Parameters
     ----------
-    readings
+    block_records
         Of the records that may decide on filters.
     """
-    return min((each.record.step / _needed(each) for each in readings if _averages(each)), default=math.inf)
+    return min(
+        (each.record.step / _needed(each) for each in block_records if _averages(each)), default=math.inf
+    )
 
 
-def _averages(reading: Reading) -> bool:
-    return reading.width >= _OVER_SAMPLES * reading.record.step
+def _averages(seen: BlockRecord) -> bool:
+    return seen.width >= _OVER_SAMPLES * seen.record.step
 
 
-def _needed(reading: Reading) -> int:
+def _needed(seen: BlockRecord) -> int:
     """Return how many samples are needed in the place of one."""
     times = 1
     try:
-        now = _filtered(reading, times)
+        now = _filtered(seen, times)
         while times < _MOST:
-            finer = _filtered(reading, 2 * times)
-            if float(np.mean(((finer - now) / reading.sigma) ** 2)) <= _RESOLVED:
+            finer = _filtered(seen, 2 * times)
+            if float(np.mean(((finer - now) / seen.sigma) ** 2)) <= _RESOLVED:
                 break
             times, now = 2 * times, finer
     except ConvergenceError:
@@ -194,8 +196,8 @@ def _needed(reading: Reading) -> int:
     return times
 
 
-def _filtered(reading: Reading, times: int) -> Array:
+def _filtered(seen: BlockRecord, times: int) -> Array:
     """Return the filtered output of a block, evaluated at several samples in the place of one."""
-    record = refined(reading.record, times)
-    output = reading.driven.respond(reading.driven.samples(record, {}), {}).output
-    return refined_filter(reading.rows, reading.width / reading.record.step, times) @ output
+    record = refined(seen.record, times)
+    output = seen.driven.respond(seen.driven.samples(record, {}), {}).output
+    return refined_filter(seen.rows, seen.width / seen.record.step, times) @ output

@@ -9,12 +9,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import ConvergenceError, MeasurementError, unknown_name
+from ...errors import ConvergenceError, unknown_name
 from ...symbolic import Expression, depends
 from ..records.measurement import Record
 from ..statistics.filters import derivative, smoothed, without_rounding
 from .batch import ChainFunction, ColumnFunction, PointFunction
-from .block import Block, Drive
+from .block import Block
+from .late_signals import advanced, free_delay, late_drives
 from .stepping import STIFF, Stage, exact_step, implicit_steps, is_short, placed, rosenbrock_step, stages_of
 
 Array = NDArray[np.float64]
@@ -123,7 +124,7 @@ class DrivenBlock:
         self._straightened = _places(block, straightened)
         e = _equations(block, self.free, self._straightened)
         self._digest, self._size = ColumnFunction(e.digest), e.state.numel()
-        self._late = [_free_delay(d, self.free) for d in _late_drives(block, self.free)]
+        self._late = [free_delay(d, self.free) for d in late_drives(block, self.free)]
         self._output = ColumnFunction(_output_function(e))
         self._equations = e
         self._sloped = _sloped(block)
@@ -182,7 +183,7 @@ class DrivenBlock:
                 even = smoothed(signal, record.step, order=drive.order, span=self._span)
                 inputs[i], rates[i] = even, inputs[i] - even
             if drive.shifted_by:
-                inputs[i], rates[i] = _advanced(record.trace.time, inputs[i], delay)
+                inputs[i], rates[i] = advanced(record.trace.time, inputs[i], delay)
             if set(drive.stretched_by) & set(self._late):
                 rates[i] = rates[i] * since  # what a change of the rate shifts grows with time
         return inputs, rates
@@ -315,11 +316,9 @@ def _sloped(block: Block) -> list[int]:
 
 def _places(block: Block, inputs: Collection[str]) -> list[int]:
     """Return the places of some inputs, without those that come late: their slopes say how late."""
-    return [
-        i
-        for i, v in enumerate(block.model.inputs)
-        if v.name in inputs and v.name in block.drives and not block.drives[v.name].shifted_by
-    ]
+    drives = block.drives
+    kept = {name for name in inputs if name in drives and not drives[name].shifted_by}
+    return [i for i, v in enumerate(block.model.inputs) if v.name in kept]
 
 
 def _is_motion(block: Block, signal: str) -> bool:
@@ -334,29 +333,6 @@ def _centred(mean: Array) -> Array:
         np.concatenate([steps[:, :1], steps], axis=1) + np.concatenate([steps, steps[:, -1:]], axis=1)
     )
     return result
-
-
-def _advanced(time: Array, signal: Array, delay: Array) -> tuple[Array, Array]:
-    """Return a signal read later by linear interpolation, and the slope of the line it is read from."""
-    slopes = np.append(np.diff(signal) / np.diff(time), 0.0)
-    place = np.clip(np.searchsorted(time, time + delay, side="right") - 1, 0, len(time) - 1)
-    return np.interp(time + delay, time, signal), slopes[place]
-
-
-def _late_drives(block: Block, free: Sequence[str]) -> list[Drive]:
-    return [d for d in block.drives.values() if set(d.shifted_by) & set(free)]
-
-
-def _free_delay(drive: Drive, free: Sequence[str]) -> str:
-    """Return the one delay of a signal that is free; of several, records show the sum alone."""
-    names = [name for name in drive.shifted_by if name in free]
-    if len(names) > 1:
-        raise MeasurementError(
-            f"signal '{drive.signal}'",
-            f"is delayed by {' and by '.join(names)}, both free, which cannot be told apart",
-            next_step="let one of them free, and give the other a number without a spread",
-        )
-    return names[0]
 
 
 def free_in(block: Block, free: Sequence[str]) -> tuple[str, ...]:
@@ -391,7 +367,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
     rest = [i for i in range(len(names)) if i not in place]
     p = ca.SX(ca.vertcat(*[s.parameter[i] for i in place]))
     rates = ca.SX.sym("rate", s.input.shape)
-    late = _late_drives(block, free)
+    late = late_drives(block, free)
     now = ca.SX.sym("now", len(late))
     together = ca.vertcat(s.derivative, s.output) if s.state.numel() else s.output
     fixed = ca.vertcat(*[s.parameter[i] for i in rest])
@@ -401,7 +377,7 @@ def _equations(block: Block, free: Sequence[str], straightened: Sequence[int]) -
         if drive in late:
             # The samples were advanced by the present delay; its derivative is that of the signal.
             k = late.index(drive)
-            shift = (p[list(free).index(_free_delay(drive, free))] - now[k]) * rates[i]
+            shift = (p[list(free).index(free_delay(drive, free))] - now[k]) * rates[i]
             together = ca.substitute(together, s.input[i], s.input[i] + shift)
     if straightened:
         n = s.state.numel()

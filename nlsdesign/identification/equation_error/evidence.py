@@ -18,7 +18,7 @@ from ..records.measurement import Record, RecordSet
 from ..statistics.coloured import NoisePart, independent_number
 from ..statistics.filters import Smoothing, difference, every, filter_weights, smoothing
 from ..statistics.metrics import rmse
-from .between_samples import Reading, on_clock, refined_filter, resolving_step, times_on
+from .between_samples import BlockRecord, on_clock, refined_filter, resolving_step, times_on
 from .block import Block, Drive
 from .block_response import DrivenBlock, Samples
 from .filter_choice import Filters, chosen_filters, measured_inputs, output_slopes, paces, rectified
@@ -276,16 +276,16 @@ class Bench:
         self._scales = {block.name: block.effort_per_drive for block in blocks}
         self._thin: dict[tuple[str, str, bool], tuple[Record, Floor]] = {}
         new = [block for block in blocks if block.name not in self.filters]
-        pace = paces(new, self._seen, self.noise)
+        pace = paces(new, self.seen, self.noise)
         for block in blocks:
             self._check_alive(block)
             if block.name not in self.filters:
-                self.filters[block.name] = chosen_filters(block, self._seen, self.noise, pace)
+                self.filters[block.name] = chosen_filters(block, self.seen, self.noise, pace)
         self._read()
         for block in new:
-            self.filters[block.name] = self._straightened(block)
+            self.filters[block.name] = _straightened(self, block)
         if clock is None:
-            clock = resolving_step(self._readings())
+            clock = resolving_step(_block_records(self, blocks))
         self.clock = clock
         for (block_name, record_name), floor in self.floors.items():
             record = next(r for r in self.records.records if r.name == record_name)
@@ -308,30 +308,8 @@ class Bench:
                     next_step=self._what_would(block),
                 )
 
-    def _straightened(self, block: Block) -> Filters:
-        """Return the filters of a block with the inputs whose noise it rectifies."""
-        filters, names = self.filters[block.name], set[str]()
-        for record in self._seen:
-            floor = self.floors.get((block.name, record.name))
-            if floor is not None:
-                shifts = rectified(block, record, self.noise, filters.span)
-                names |= {n for n, shift in shifts.items() if shift > _RECTIFIED * rmse(floor.sigma)}
-        return filters._replace(straightened=tuple(sorted(names)))
-
-    def _readings(self) -> list[Reading]:
-        """Return how the blocks read the records that may decide on filters."""
-        result = []
-        for block in self._blocks:
-            driven = self.driven(block, [])
-            for record in self._seen:
-                floor = self.floors.get((block.name, record.name))
-                if floor is not None:
-                    width = self.filters[block.name].width
-                    result.append(Reading(driven, record, width, floor.filter, floor.sigma))
-        return result
-
     @property
-    def _seen(self) -> tuple[Record, ...]:
+    def seen(self) -> tuple[Record, ...]:
         """Records that may decide on filters: those held out only where there are no others."""
         return self.records.of("fit", "selection") or self.records.records
 
@@ -470,3 +448,27 @@ class Bench:
             fastest = float(np.max(np.abs(np.gradient(gaussian_filter1d(record.trace[signal], 2.0)))))
             allowed = min(allowed, int(_COARSE_SHARE * span / max(fastest, 1e-300)))
         return max(1, allowed)
+
+
+def _straightened(bench: Bench, block: Block) -> Filters:
+    """Return the filters of a block with the inputs whose noise it rectifies."""
+    filters, names = bench.filters[block.name], set[str]()
+    for record in bench.seen:
+        floor = bench.floors.get((block.name, record.name))
+        if floor is not None:
+            shifts = rectified(block, record, bench.noise, filters.span)
+            names |= {n for n, shift in shifts.items() if shift > _RECTIFIED * rmse(floor.sigma)}
+    return filters._replace(straightened=tuple(sorted(names)))
+
+
+def _block_records(bench: Bench, blocks: Sequence[Block]) -> list[BlockRecord]:
+    """Return how blocks read the records that may decide on filters."""
+    result = []
+    for block in blocks:
+        driven = bench.driven(block, [])
+        for record in bench.seen:
+            floor = bench.floors.get((block.name, record.name))
+            if floor is not None:
+                width = bench.filters[block.name].width
+                result.append(BlockRecord(driven, record, width, floor.filter, floor.sigma))
+    return result

@@ -306,8 +306,8 @@ def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[s
         weights = filter_weights(0.0, drive.order, record.step, span)
         step = np.zeros((len(model.inputs), 1))
         step[i] = noise.behind(drive.signal, weights, record.step)
-        bent = 0.5 * (at(inputs + step) + at(inputs - step)) - at(inputs)
-        shifts[variable.name] = float(np.sqrt(np.nanmean(bent**2)))
+        rest = 0.5 * (at(inputs + step) + at(inputs - step)) - at(inputs)
+        shifts[variable.name] = float(np.sqrt(np.nanmean(rest**2)))
     return shifts
 
 

@@ -91,8 +91,8 @@ def minimise(
     here = _linearised(residual, slope)
     if here is None:
         raise ConvergenceError("fit", _ENDLESS, next_step="narrow the bounds")
-    bent = np.zeros(x.shape, dtype=bool) if logarithmic is None else logarithmic
-    straight_left = _STRAIGHT_FAILURES if bent.any() else 0
+    logs = np.zeros(x.shape, dtype=bool) if logarithmic is None else logarithmic
+    straight_left = _STRAIGHT_FAILURES if logs.any() else 0
     while used < evaluations:
         step = _step(here, damping, _walls(x, box))
         gain = here.gain(step)
@@ -100,9 +100,9 @@ def minimise(
             return Minimum(x, here.cost, True)
         used, there = used + 1, _better(rows, x + step, here)
         if there is None and straight_left and used < evaluations:
-            straight = _step(here, damping, _straight_walls(x, box, bent))
+            straight = _step(here, damping, _straight_walls(x, box, logs))
             step, gain = (
-                np.where(bent, np.log1p(np.where(bent, straight, 0.0)), straight),
+                np.where(logs, np.log1p(np.where(logs, straight, 0.0)), straight),
                 here.gain(straight),
             )
             used, there = used + 1, _better(rows, x + step, here)
@@ -153,11 +153,11 @@ def _walls(x: Array, box: tuple[Array, Array]) -> tuple[Array, Array]:
     return np.maximum(box[0] - x, -_LONGEST), np.minimum(box[1] - x, _LONGEST)
 
 
-def _straight_walls(x: Array, box: tuple[Array, Array], bent: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _straight_walls(x: Array, box: tuple[Array, Array], logs: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return the least and the largest step, of logarithms as shares of the number."""
     usual = _walls(x, box)
     far = np.maximum(box[0] - x, -_LONGEST_STRAIGHT), np.minimum(box[1] - x, _LONGEST_STRAIGHT)
-    low, high = (np.where(bent, np.expm1(f), u) for f, u in zip(far, usual, strict=True))
+    low, high = (np.where(logs, np.expm1(f), u) for f, u in zip(far, usual, strict=True))
     return low, high
 
 
